@@ -1,0 +1,86 @@
+"""Errors: one family, and a collector that reports every problem of an input at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+MAX_PROBLEMS = 20
+"""Problems shown in one message; the rest are counted."""
+
+
+class KratosLiteError(ValueError):
+    """Base of every error that kratos_lite raises on purpose.
+
+    The text says where, what was found, what was expected and the cure.
+    """
+
+
+class InputError(KratosLiteError):
+    """A file, an option or an argument cannot be understood as written."""
+
+
+class MeshError(KratosLiteError):
+    """A mesh is broken: an inverted element, a repeated node, a missing name."""
+
+
+class MaterialError(KratosLiteError):
+    """A material constant lies outside its physical bounds."""
+
+
+class ModelError(KratosLiteError):
+    """A model has no unique solution: missing supports, missing material, contradicting values."""
+
+
+class SolveError(KratosLiteError):
+    """The equations could not be solved to the accuracy asked for."""
+
+
+class Problems:
+    """Collect problems and raise them together.
+
+    Examples
+    --------
+    >>> problems = Problems("cube.mdpa")
+    >>> problems.add("id -8 is not allowed; ids are 1 .. 2^63-1", line=18)
+    >>> try:
+    ...     problems.raise_if_any()
+    ... except InputError as error:
+    ...     print(error)
+    cube.mdpa:18: id -8 is not allowed; ids are 1 .. 2^63-1
+    """
+
+    def __init__(self, source: str = "", kind: type[KratosLiteError] = InputError) -> None:
+        self.source = source
+        self.kind = kind
+        self.messages: list[str] = []
+        self.count = 0
+
+    def add(self, message: str, line: int | None = None, column: int | None = None) -> None:
+        """Note one problem, at a line and column (both from 1) of the source if known."""
+        self.count += 1
+        if self.count <= MAX_PROBLEMS:
+            place = [self.source] if self.source else []
+            place += [str(part) for part in (line, column) if part is not None]
+            self.messages.append(f"{':'.join(place)}: {message}" if place else message)
+
+    def __bool__(self) -> bool:
+        return self.count > 0
+
+    def raise_if_any(self) -> None:
+        """Raise one error that holds every problem noted so far, if there is one."""
+        if self.count:
+            more = self.count - len(self.messages)
+            text = "\n".join(self.messages) + (f"\n… and {more} more" if more else "")
+            raise self.kind(text)
+
+
+def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
+    """Return a hint that names the known words closest to `name`, or an empty string.
+
+    >>> nearest("KinematicLinear3D9N", ["KinematicLinear3D8N", "Isotropic3D"])
+    ' Did you mean KinematicLinear3D8N?'
+    """
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, list(known), n=count, cutoff=0.6)
+    return f" Did you mean {' or '.join(close)}?" if close else ""

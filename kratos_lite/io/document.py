@@ -1,0 +1,88 @@
+"""Document: what a file says, before anything is made of it.
+
+The readers of `.mdpa` and `.elem` fill one, the `.mdpa` writer writes one, and
+``kratos_lite.io.kratos`` turns it into a Model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.mesh import Block, Mesh
+
+
+@dataclass
+class Properties:
+    """One ``Properties`` block: variables by name, with the line of each."""
+
+    id: int
+    values: dict[str, Any] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+    line: int = 0
+
+
+@dataclass(eq=False)
+class Data:
+    """Values of one variable on nodes, elements or conditions.
+
+    Attributes
+    ----------
+    variable : e.g. ``DISPLACEMENT_X``.
+    ids : (m,) int ids as written in the file.
+    fixed : (m,) bool, True where the degree of freedom is fixed (nodal data only).
+    values : (m,) or (m, k) float; empty for flags.
+    line : line of the ``Begin``.
+    """
+
+    variable: str
+    ids: NDArray[np.int64]
+    fixed: NDArray[np.bool_]
+    values: NDArray[np.float64]
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """One linear multi-point constraint: u[slave] = sum(weights · u[masters]) + constant.
+
+    Degrees of freedom are (node id, variable name) pairs.
+    """
+
+    id: int
+    slave: tuple[int, str]
+    masters: tuple[tuple[int, str], ...]
+    weights: tuple[float, ...]
+    constant: float
+    line: int = 0
+    name: str = "LinearMasterSlaveConstraint"
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something the reader kept without use, skipped, or found odd."""
+
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.text}" if self.line else self.text
+
+
+@dataclass
+class Document:
+    """Everything that a model file says."""
+
+    mesh: Mesh
+    properties: dict[int, Properties] = field(default_factory=dict)
+    nodal_data: list[Data] = field(default_factory=list)
+    element_data: list[Data] = field(default_factory=list)
+    condition_data: list[Data] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    geometries: list[Block] = field(default_factory=list)
+    tables: dict[int, Any] = field(default_factory=dict)
+    model_data: dict[str, Any] = field(default_factory=dict)
+    notes: list[Note] = field(default_factory=list)

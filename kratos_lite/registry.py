@@ -1,0 +1,54 @@
+"""Registry: classes put themselves under their names; files and scripts look them up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Generic, TypeVar
+
+from kratos_lite.errors import InputError, nearest
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """Names to classes, with aliases and a helpful answer to an unknown name.
+
+    Examples
+    --------
+    >>> colours = Registry[int]("colour")
+    >>> colours.add("red", 1, aliases=["rouge"])
+    >>> colours["rouge"], sorted(colours)
+    (1, ['red'])
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._items: dict[str, T] = {}
+        self._aliases: dict[str, str] = {}
+
+    def add(self, name: str, item: T, aliases: Iterable[str] = ()) -> None:
+        """Register `item`; a later one of the same name replaces it (a script may be run twice)."""
+        self._items[name] = item
+        for alias in aliases:
+            self._aliases[alias] = name
+
+    def __getitem__(self, name: str) -> T:
+        key = self._aliases.get(name, name)
+        if key not in self._items:
+            known = [*self._items, *self._aliases]
+            raise InputError(f"unknown {self.kind} {name!r}.{nearest(name, known)}")
+        return self._items[key]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._items or name in self._aliases
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(list(self._items))
+
+    def values(self) -> list[T]:
+        """Return the registered classes in the order in which they came."""
+        return list(self._items.values())
+
+    def aliases(self, name: str) -> list[str]:
+        """Return the other names under which `name` is found."""
+        return [alias for alias, target in self._aliases.items() if target == name]

@@ -1,0 +1,41 @@
+"""Shapes: reference cells with their shape functions, faces and node orders."""
+
+from kratos_lite.shapes.base import SHAPES, Shape
+from kratos_lite.shapes.faces import (
+    FACE_SHAPES,
+    Line2,
+    Line3,
+    Point1,
+    Quadrilateral4,
+    Quadrilateral8,
+    Quadrilateral9,
+    Triangle3,
+    Triangle6,
+)
+from kratos_lite.shapes.hexahedra import Hexahedron8, Hexahedron20, Hexahedron27
+from kratos_lite.shapes.pyramids import Pyramid5, Pyramid13
+from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
+from kratos_lite.shapes.wedges import Wedge6, Wedge15
+
+__all__ = [
+    "FACE_SHAPES",
+    "SHAPES",
+    "Hexahedron8",
+    "Hexahedron20",
+    "Hexahedron27",
+    "Line2",
+    "Line3",
+    "Point1",
+    "Pyramid5",
+    "Pyramid13",
+    "Quadrilateral4",
+    "Quadrilateral8",
+    "Quadrilateral9",
+    "Shape",
+    "Tetrahedron4",
+    "Tetrahedron10",
+    "Triangle3",
+    "Triangle6",
+    "Wedge6",
+    "Wedge15",
+]

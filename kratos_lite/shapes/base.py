@@ -1,0 +1,96 @@
+"""Shape: the geometry of one reference cell and its shape functions."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.registry import Registry
+
+Array = NDArray[np.float64]
+
+SHAPES: Registry[type[Shape]] = Registry("shape")
+"""Every shape by its class name."""
+
+
+class Shape:
+    """A reference cell: node coordinates, shape functions N and their derivatives dN.
+
+    A subclass states the data below and writes two functions; it registers itself.
+    Nodes stand in Kratos order: corners, then mid-edge nodes in the order of `edges`,
+    then face nodes, then the centre.
+
+    Attributes
+    ----------
+    cell : family of the cell: ``point line triangle quadrilateral tetrahedron hexahedron wedge pyramid``.
+    nodes : (n, d) float, reference coordinates of the nodes.
+    corners : number of corner nodes (they come first).
+    degree : highest degree of the complete polynomials that the functions span on an affine cell.
+    edges : corner pairs; the mid-edge node of edge e, if there is one, is node ``corners + e``.
+    faces : node tuples of the faces, corners first, counter-clockwise from outside.
+    vtk : VTK cell type number.
+    to_vtk, to_gmsh : ``target[i] = kratos[perm[i]]``.
+    gmsh : Gmsh element type number.
+    """
+
+    cell: ClassVar[str]
+    nodes: ClassVar[Array]
+    corners: ClassVar[int]
+    degree: ClassVar[int]
+    edges: ClassVar[tuple[tuple[int, int], ...]] = ()
+    faces: ClassVar[tuple[tuple[int, ...], ...]] = ()
+    vtk: ClassVar[int] = 0
+    gmsh: ClassVar[int] = 0
+    to_vtk: ClassVar[tuple[int, ...]] = ()
+    to_gmsh: ClassVar[tuple[int, ...]] = ()
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "nodes" not in cls.__dict__:
+            return
+        cls.nodes = np.array(cls.nodes, dtype=float)
+        cls.nodes.setflags(write=False)
+        same = tuple(range(len(cls.nodes)))
+        cls.to_vtk = cls.to_vtk or same
+        cls.to_gmsh = cls.to_gmsh or same
+        SHAPES.add(cls.__name__, cls)
+
+    @staticmethod
+    def N(xi: ArrayLike) -> Array:
+        """Return the shape functions at `xi` (..., d) as (..., n)."""
+        raise TypeError("a shape must define N(xi); see docs/add-an-element.md")
+
+    @staticmethod
+    def dN(xi: ArrayLike) -> Array:
+        """Return the derivatives dN_a/dxi_j at `xi` (..., d) as (..., n, d)."""
+        raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
+
+
+def coordinates(xi: ArrayLike) -> Array:
+    """Split points (..., d) into d arrays: ``r, s, t = coordinates(xi)``."""
+    return np.moveaxis(np.asarray(xi, dtype=float), -1, 0)
+
+
+def mid_edges(
+    corners: ArrayLike, edges: tuple[tuple[int, int], ...]
+) -> Array:
+    """Return the corners (n, d) followed by the middles of `edges`."""
+    X = np.asarray(corners, dtype=float)
+    return np.vstack([X, X[np.array(edges)].mean(axis=1)])
+
+
+def quadratic_faces(
+    faces: tuple[tuple[int, ...], ...],
+    edges: tuple[tuple[int, int], ...],
+    corners: int,
+    centres: tuple[int, ...] = (),
+) -> tuple[tuple[int, ...], ...]:
+    """Append to each corner face its mid-edge nodes and, where given, its centre node."""
+    middle = {frozenset(edge): corners + e for e, edge in enumerate(edges)}
+    full = []
+    for f, face in enumerate(faces):
+        mids = tuple(middle[frozenset(pair)] for pair in zip(face, face[1:] + face[:1], strict=True))
+        full.append(face + mids + centres[f : f + 1])
+    return tuple(full)

@@ -1,0 +1,43 @@
+"""Shape functions on the unit simplex in barycentric coordinates L = (1 - sum xi, xi_1, ..., xi_d).
+
+Source: Zienkiewicz & Taylor, The Finite Element Method, vol. 1, ch. 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.shapes.base import Array
+
+Edges = tuple[tuple[int, int], ...]
+
+
+def barycentric(xi: ArrayLike) -> tuple[Array, Array]:
+    """Return L (..., d+1) and the constant dL/dxi (d+1, d)."""
+    x = np.asarray(xi, dtype=float)
+    d = x.shape[-1]
+    L = np.concatenate([1 - x.sum(axis=-1, keepdims=True), x], axis=-1)
+    return L, np.vstack([-np.ones((1, d)), np.eye(d)])
+
+
+def linear_dN(xi: ArrayLike) -> Array:
+    """Return the derivatives of L at each point, (..., d+1, d)."""
+    L, dL = barycentric(xi)
+    return np.broadcast_to(dL, (*L.shape[:-1], *dL.shape)).copy()
+
+
+def quadratic_N(xi: ArrayLike, edges: Edges) -> Array:
+    """Return L_i (2 L_i - 1) at the corners and 4 L_i L_j on the edges."""
+    L, _ = barycentric(xi)
+    i, j = np.array(edges).T
+    return np.concatenate([L * (2 * L - 1), 4 * L[..., i] * L[..., j]], axis=-1)
+
+
+def quadratic_dN(xi: ArrayLike, edges: Edges) -> Array:
+    """Return the derivatives of `quadratic_N`."""
+    L, dL = barycentric(xi)
+    i, j = np.array(edges).T
+    corner = (4 * L - 1)[..., None] * dL
+    middle = 4 * (L[..., i, None] * dL[j] + L[..., j, None] * dL[i])
+    return np.concatenate([corner, middle], axis=-2)
