@@ -1,0 +1,66 @@
+"""kratos_lite: a small, fast and exact finite-element library for solids.
+
+Names are imported when they are first used, so that ``import kratos_lite`` costs little more
+than numpy.  See https://en.wikipedia.org/wiki/Finite_element_method for the method and the
+``docs`` folder for the library.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from kratos_lite.elements import (
+        ELEMENTS,
+        KinematicLinear,
+        KinematicLinear3D4N,
+        KinematicLinear3D5N,
+        KinematicLinear3D6N,
+        KinematicLinear3D8N,
+        KinematicLinear3D10N,
+        KinematicLinear3D13N,
+        KinematicLinear3D15N,
+        KinematicLinear3D20N,
+        KinematicLinear3D27N,
+    )
+    from kratos_lite.errors import InputError, KratosLiteError, MaterialError, MeshError, ModelError, SolveError
+    from kratos_lite.generate import annulus, box
+    from kratos_lite.loads import BodyForce, Gravity, NodalForces, PointLoad, Pressure, Traction
+    from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
+    from kratos_lite.mesh import Block, Mesh, Part
+    from kratos_lite.model import Model
+    from kratos_lite.result import Result
+    from kratos_lite.shapes import Shape
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "kratos_lite.elements": (
+        "ELEMENTS KinematicLinear KinematicLinear3D4N KinematicLinear3D5N KinematicLinear3D6N "
+        "KinematicLinear3D8N KinematicLinear3D10N KinematicLinear3D13N KinematicLinear3D15N "
+        "KinematicLinear3D20N KinematicLinear3D27N"
+    ),
+    "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
+    "kratos_lite.generate": "annulus box",
+    "kratos_lite.loads": "BodyForce Gravity NodalForces PointLoad Pressure Traction",
+    "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
+    "kratos_lite.mesh": "Block Mesh Part",
+    "kratos_lite.model": "Model",
+    "kratos_lite.result": "Result",
+    "kratos_lite.shapes": "Shape",
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
+__all__ = [*sorted(_MODULE_OF), "__version__"]  # noqa: PLE0604  # made of the table above
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'kratos_lite' has no attribute {name!r}")
+    value = getattr(import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_MODULE_OF})

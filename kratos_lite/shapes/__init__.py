@@ -13,6 +13,7 @@ from kratos_lite.shapes.faces import (
     Triangle6,
 )
 from kratos_lite.shapes.hexahedra import Hexahedron8, Hexahedron20, Hexahedron27
+from kratos_lite.shapes.inverse import Inverse, inverse_map
 from kratos_lite.shapes.pyramids import Pyramid5, Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.shapes.wedges import Wedge6, Wedge15
@@ -23,6 +24,7 @@ __all__ = [
     "Hexahedron8",
     "Hexahedron20",
     "Hexahedron27",
+    "Inverse",
     "Line2",
     "Line3",
     "Point1",
@@ -38,4 +40,5 @@ __all__ = [
     "Triangle6",
     "Wedge6",
     "Wedge15",
+    "inverse_map",
 ]

@@ -1,0 +1,292 @@
+"""KinematicLinear: small-strain solid elements built on the B-operator.
+
+One class serves one element, X (n, 3), or a batch, X (..., n, 3): all methods broadcast over
+the leading axes.  With g Gauss points xi and weights gamma,
+
+    r_int = Σ B^T σ γ det J        r_ext = Σ N ρg γ det J        K = Σ B^T C B γ det J
+
+Source: KratosWiki, *Kinematic Linear Element*; Zienkiewicz & Taylor, vol. 1, ch. 6.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite import voigt
+from kratos_lite.errors import MeshError
+from kratos_lite.quadrature import Rule
+from kratos_lite.registry import Registry
+from kratos_lite.shapes import Shape
+
+Array = NDArray[np.float64]
+
+ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
+"""Every element by its class name and by the names that mean the same in files."""
+
+SAME_ELEMENT = (
+    "SmallDisplacementElement",
+    "TotalLagrangian",
+    "TotalLagrangianElement",
+    "UpdatedLagrangianElement",
+    "Element",
+)
+"""Prefixes of element names in files that are solved as KinematicLinear."""
+
+
+@lru_cache(maxsize=256)
+def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
+    """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
+    N = np.array([shape.N(xi) for xi in rule.points])
+    dN = np.array([shape.dN(xi) for xi in rule.points])
+    N.setflags(write=False)
+    dN.setflags(write=False)
+    return N, dN
+
+
+@lru_cache(maxsize=256)
+def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
+    """Return whether the row sums of the mass matrix of the reference cell are all positive."""
+    sums = rule.weights @ tabulate(shape, rule)[0]
+    return bool((sums > 1e-9 * sums.max()).all())
+
+
+def determinant(J: Array) -> Array:
+    """Return det of (..., 3, 3)."""
+    a, b, c = np.moveaxis(J, -1, 0)
+    return np.asarray((a * np.cross(b, c)).sum(axis=-1))
+
+
+def cofactors(J: Array) -> Array:
+    """Return det(J) J^-1 of (..., 3, 3)."""
+    a, b, c = np.moveaxis(J, -1, 0)
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+
+
+class KinematicLinear:
+    """A small-strain solid element: shape × rule × the B-operator.
+
+    Parameters
+    ----------
+    X : (n, 3) or (..., n, 3) float, m; reference coordinates of the nodes.
+    rule : quadrature rule in place of the element's own.
+
+    Raises
+    ------
+    MeshError
+        If X does not have the right shape.
+
+    Notes
+    -----
+    A subclass states `shape`, `rule` and, where the rule cannot integrate N N, `mass_rule`.
+    Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
+
+    Examples
+    --------
+    >>> from kratos_lite import Isotropic3D, KinematicLinear3D8N
+    >>> element = KinematicLinear3D8N(0.5 * KinematicLinear3D8N.nodes)
+    >>> K = element.stiffness(Isotropic3D(E=210e6, nu=0.3).C)
+    >>> K.shape, float(element.volume())
+    ((24, 24), 1.0)
+    """
+
+    shape: ClassVar[type[Shape]]
+    nodes: ClassVar[Array]
+    rule: Rule
+    mass_rule: Rule
+    aliases: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "shape" not in cls.__dict__:
+            return
+        cls.nodes = cls.shape.nodes
+        if "mass_rule" not in cls.__dict__:
+            cls.mass_rule = cls.rule
+        suffix = cls.__name__.removeprefix("KinematicLinear")
+        same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]
+        ELEMENTS.add(cls.__name__, cls, [*cls.aliases, *same])
+
+    def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
+        self.X: Array = np.asarray(X, dtype=float)
+        if self.X.ndim < 2 or self.X.shape[-2:] != self.nodes.shape:
+            n = len(self.nodes)
+            raise MeshError(f"{type(self).__name__} needs X of shape (..., {n}, 3); got {self.X.shape}")
+        if rule is not None:
+            self.rule = rule
+
+    # ---- geometry at given points ----------------------------------------------------------
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the shape functions at xi (..., 3) as (..., n)."""
+        return cls.shape.N(xi)
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return dN_a/dxi_j at xi (..., 3) as (..., n, 3)."""
+        return cls.shape.dN(xi)
+
+    def _jacobian(self, dN: Array) -> Array:
+        """Return dX_i/dxi_j for tabulated dN (g, n, 3) as (..., g, 3, 3)."""
+        n, g = len(self.nodes), len(dN)
+        flat = np.swapaxes(self.X, -1, -2) @ dN.transpose(1, 0, 2).reshape(n, 3 * g)
+        return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
+
+    def J(self, xi: ArrayLike) -> Array:
+        """Return the Jacobian dX_i/dxi_j at one point xi (3,) as (..., 3, 3)."""
+        return self._jacobian(self.dN(xi)[None])[..., 0, :, :]
+
+    def detJ(self, xi: ArrayLike) -> Array:
+        """Return det J at one point xi (3,) as (...)."""
+        return determinant(self.J(xi))
+
+    def dNdX(self, xi: ArrayLike) -> Array:
+        """Return dN_a/dX_i at one point xi (3,) as (..., n, 3) in 1/m."""
+        J = self.J(xi)
+        return np.asarray(self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None]))
+
+    def B(self, xi: ArrayLike) -> Array:
+        """Return the B-operator at one point xi (3,): strain = B u, as (..., 6, 3n) in 1/m."""
+        D = np.moveaxis(self.dNdX(xi), -1, 0)
+        B = np.zeros((*D.shape[1:-1], 6, D.shape[-1], 3))
+        for row, (i, j) in enumerate(voigt.PAIRS):
+            B[..., row, :, i] = D[j]
+            B[..., row, :, j] = D[i]
+        return B.reshape(*D.shape[1:-1], 6, 3 * D.shape[-1])
+
+    def position(self, xi: ArrayLike) -> Array:
+        """Return the point X(xi) of one point xi (3,) as (..., 3) in m."""
+        return np.asarray(self.N(xi) @ self.X)
+
+    # ---- geometry at the Gauss points, made once per instance --------------------------------
+
+    @cached_property
+    def _gauss(self) -> tuple[Array, Array]:
+        """Return weights γ det J (..., g) and gradients dN_a/dX_i as (..., g, 3, n)."""
+        _, dN = tabulate(self.shape, self.rule)
+        J = self._jacobian(dN)
+        inverse = cofactors(J)
+        det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
+        inverse /= det[..., None, None]
+        D = dN[:, None, :, 0] * inverse[..., 0, :, None]
+        for j in (1, 2):
+            D += dN[:, None, :, j] * inverse[..., j, :, None]
+        return det * self.rule.weights, D
+
+    @property
+    def dV(self) -> Array:
+        """Volume of each Gauss point, γ det J, as (..., g) in m³."""
+        return self._gauss[0]
+
+    def volume(self) -> Array:
+        """Return the volume as (...) in m³."""
+        return np.asarray(self.dV.sum(axis=-1))
+
+    def gauss_points(self) -> Array:
+        """Return the Gauss points X as (..., g, 3) in m."""
+        return tabulate(self.shape, self.rule)[0] @ self.X
+
+    # ---- strain, stress, loads, stiffness ----------------------------------------------------
+
+    def strain(self, u: ArrayLike) -> Array:
+        """Return the strain at the Gauss points, (..., g, 6), of nodal displacements u (..., n, 3) in m."""
+        _, D = self._gauss
+        gradient = D @ np.asarray(u, dtype=float)[..., None, :, :]
+        return voigt.symmetric_gradient(np.swapaxes(gradient, -1, -2))
+
+    def stress(self, C: ArrayLike, u: ArrayLike) -> Array:
+        """Return σ = C ε at the Gauss points, (..., g, 6) in Pa; C (6, 6) or (..., 6, 6) in Pa."""
+        C = np.asarray(C, dtype=float)
+        return self.strain(u) @ np.swapaxes(C, -1, -2)
+
+    def internal_load(self, stress: ArrayLike) -> Array:
+        """Return r_int = Σ B^T σ γ det J as (..., n, 3) in N, of the stress (..., g, 6) in Pa."""
+        dV, D = self._gauss
+        s = voigt.tensor(stress) * dV[..., None, None]
+        return np.asarray((np.swapaxes(D, -1, -2) @ s).sum(axis=-3))
+
+    def body_force(self, b: ArrayLike) -> Array:
+        """Return r_ext = Σ N b γ det J as (..., n, 3) in N.
+
+        `b` is the force per volume in N/m³: (3,) or (..., 3) for a constant one, or
+        (..., n, 3) for one that is interpolated from the nodes.
+        """
+        b = np.asarray(b, dtype=float)
+        if b.ndim >= 2 and b.shape[-2:] == self.nodes.shape:
+            return self.scalar_mass() @ b
+        share = self.dV @ tabulate(self.shape, self.rule)[0]
+        return share[..., :, None] * b[..., None, :]
+
+    def stiffness(self, C: ArrayLike) -> Array:
+        """Return K = Σ B^T C B γ det J as (..., 3n, 3n) in N/m; C (6, 6) or (..., 6, 6) in Pa."""
+        K = self.stiffness_by_axis(C)
+        n = len(self.nodes)
+        order = np.moveaxis(K, (-4, -2), (-3, -1))
+        return order.reshape(*K.shape[:-4], 3 * n, 3 * n)
+
+    def stiffness_by_axis(self, C: ArrayLike) -> Array:
+        """Return K as (..., 3, n, 3, n): axis and node of the row, axis and node of the column.
+
+        This is the order in which assembly wants it.  An isotropic C takes the short way
+        K_iajb = λ P_iajb + μ P_jaib + μ δ_ij P_kakb with P_iajb = Σ dN_a/dX_i dN_b/dX_j dV.
+        """
+        C = np.asarray(C, dtype=float)
+        dV, D = self._gauss
+        g, n = D.shape[-3], D.shape[-1]
+        if C.ndim == 2 and (lame := _isotropic(C)):
+            A = D.reshape(*D.shape[:-3], g, 3 * n)
+            P = (np.swapaxes(A, -1, -2) * dV[..., None, :]) @ A
+            P = P.reshape(*P.shape[:-2], 3, n, 3, n)
+            K = lame[0] * P + lame[1] * np.swapaxes(P, -4, -2)
+            trace = lame[1] * (P[..., 0, :, 0, :] + P[..., 1, :, 1, :] + P[..., 2, :, 2, :])
+            for i in range(3):
+                K[..., i, :, i, :] += trace
+            return np.asarray(K)
+        B = np.zeros((*D.shape[:-2], 6, 3, n))
+        for row, (i, j) in enumerate(voigt.PAIRS):
+            B[..., row, i, :] = D[..., j, :]
+            B[..., row, j, :] = D[..., i, :]
+        B = B.reshape(*B.shape[:-2], 3 * n)
+        CB = (C[..., None, :, :] if C.ndim > 2 else C) @ B * dV[..., None, None]
+        K = np.swapaxes(B.reshape(*B.shape[:-3], 6 * g, 3 * n), -1, -2) @ CB.reshape(*B.shape[:-3], 6 * g, 3 * n)
+        return np.asarray(K.reshape(*K.shape[:-2], 3, n, 3, n))
+
+    # ---- mass ----------------------------------------------------------------------------------
+
+    def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
+        """Return Σ ρ N N^T γ det J as (..., n, n) in kg: the mass matrix of one axis."""
+        N, dN = tabulate(self.shape, self.mass_rule)
+        dV = determinant(self._jacobian(dN)) * self.mass_rule.weights * np.asarray(density)[..., None]
+        return np.asarray((N.T * dV[..., None, :]) @ N)
+
+    def mass(self, density: ArrayLike) -> Array:
+        """Return the consistent mass matrix as (..., 3n, 3n) in kg; density (...) in kg/m³."""
+        m = self.scalar_mass(density)
+        n = len(self.nodes)
+        M = m[..., :, None, :, None] * np.eye(3)[:, None, :]
+        return np.asarray(M.reshape(*m.shape[:-2], 3 * n, 3 * n))
+
+    def lumped_mass(self, density: ArrayLike) -> Array:
+        """Return the mass of each node as (..., n) in kg; always positive, sums to the mass.
+
+        Row sums where these are positive on the reference cell, otherwise the scaled diagonal
+        of Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
+        """
+        m = self.scalar_mass(density)
+        if has_positive_row_sums(self.shape, self.mass_rule):
+            return np.asarray(m.sum(axis=-1))
+        diagonal = np.diagonal(m, axis1=-2, axis2=-1)
+        scale = m.sum(axis=(-2, -1)) / diagonal.sum(axis=-1)
+        return np.asarray(diagonal * scale[..., None])
+
+
+def _isotropic(C: Array) -> tuple[float, float] | None:
+    """Return (λ, μ) if C is an isotropic elasticity matrix to the last bits, else None."""
+    lam, mu = float(C[0, 1]), float(C[3, 3])
+    ideal = np.diag([2 * mu] * 3 + [mu] * 3)
+    ideal[:3, :3] += lam
+    return (lam, mu) if (np.abs(C - ideal) <= 4e-16 * np.abs(C).max()).all() else None

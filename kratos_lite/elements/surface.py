@@ -1,0 +1,81 @@
+"""Loads on faces and edges of elements: tractions and pressures as nodal forces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.quadrature import Rule, rule_for
+from kratos_lite.shapes import Shape
+
+Array = NDArray[np.float64]
+
+
+def face_rule(shape: type[Shape]) -> Rule:
+    """Return the rule for loads on a face: exact for N, times N, on plane faces."""
+    return rule_for(shape.cell, 2 * shape.degree + 1)
+
+
+def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> Array:
+    """Return normal × area of each Gauss point of faces X (..., k, 3) as (..., g, 3) in m².
+
+    The normal points to the side from which the nodes run counter-clockwise.
+    """
+    rule = rule or face_rule(shape)
+    _, dN = tabulate(shape, rule)
+    tangents = np.einsum("...ai,gaj->...gji", np.asarray(X, dtype=float), dN)
+    return np.cross(tangents[..., 0, :], tangents[..., 1, :]) * rule.weights[:, None]
+
+
+def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array:
+    """Return ∫ N t dA of faces (or ∫ N t ds of lines, or t of points) as nodal forces.
+
+    Parameters
+    ----------
+    shape : shape of the face, line or point.
+    X : (..., k, 3) float, m.
+    traction : (3,) or (..., 3) constant, or (..., k, 3) nodal; Pa, N/m or N.
+
+    Returns
+    -------
+    (..., k, 3) float, N.
+
+    Examples
+    --------
+    >>> from kratos_lite.shapes import Triangle3
+    >>> surface_load(Triangle3, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], (0, 0, 6.0))[:, 2]
+    array([1., 1., 1.])
+    """
+    X, t = np.asarray(X, dtype=float), np.asarray(traction, dtype=float)
+    rule = face_rule(shape)
+    N, dN = tabulate(shape, rule)
+    if shape.cell == "point":
+        measure = np.ones((*X.shape[:-2], 1))
+    elif shape.cell == "line":
+        tangents = np.einsum("...ai,gaj->...gji", X, dN)
+        measure = np.linalg.norm(tangents[..., 0, :], axis=-1) * rule.weights
+    else:
+        measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
+    if t.ndim >= 2 and t.shape[-2:] == (len(shape.nodes), 3):
+        return np.asarray((N.T * measure[..., None, :]) @ (N @ t))
+    return (measure @ N)[..., :, None] * t[..., None, :]
+
+
+def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
+    """Return -∫ N p n dA of faces as nodal forces (..., k, 3) in N: a pressure pushes against n.
+
+    Parameters
+    ----------
+    shape : shape of the face.
+    X : (..., k, 3) float, m.
+    pressure : number, (...) per face, or (..., k) nodal; Pa.
+    """
+    X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
+    rule = face_rule(shape)
+    N, _ = tabulate(shape, rule)
+    if p.ndim and p.shape == X.shape[:-1]:
+        at_points = (p @ N.T)[..., None]
+    else:
+        at_points = p[..., None, None]
+    return np.asarray(-N.T @ (area_vectors(shape, X, rule) * at_points))

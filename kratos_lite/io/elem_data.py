@@ -1,0 +1,114 @@
+"""Properties and nodal data of a five-file set."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from kratos_lite.io.document import Data, Properties
+from kratos_lite.io.elem_files import FIX, INIT, MATRIX, VECTOR, ElemFiles
+from kratos_lite.io.elem_grammar import Form, Run, Source
+from kratos_lite.io.elem_mesh import twice
+from kratos_lite.mesh import Floats, Mesh
+
+VECTORS = frozenset((b"DISPLACEMENT", b"VELOCITY", b"ACCELERATION", b"ROTATION", b"REACTION"))
+Values: TypeAlias = "dict[int, tuple[float, int]]"
+"""Value and line by node id."""
+
+
+def read_properties(files: ElemFiles) -> dict[int, Properties]:
+    """Return the properties by id; values are floats, vectors and matrices."""
+    found: dict[int, Properties] = {}
+    for run in files.runs[".prop"]:
+        source = files.sources[".prop"]
+        numbers = source.integers(run.columns[0], run.starts, least=0).tolist()
+        lines = source.lines(run.starts).tolist()
+        for number, line, start, name, text in zip(numbers, lines, run.starts, *run.columns[1:], strict=True):
+            properties = found.setdefault(number, Properties(number, line=line))
+            variable = name.decode("ascii")
+            if variable in properties.values:
+                source.add(start, twice(f"{variable} of properties {number}", properties.lines[variable]))
+            properties.values[variable] = _value(source, run.form, text, start)
+            properties.lines[variable] = line
+    return found
+
+
+def use_properties(files: ElemFiles, mesh: Mesh, properties: dict[int, Properties]) -> None:
+    """Check the property ids of the elements; conditions may name any."""
+    declared = {0, *properties}
+    for block in mesh.blocks:
+        used, cells = np.unique(block.properties, return_index=True)
+        for number, cell in zip(used.tolist(), cells.tolist(), strict=True):
+            if number not in declared and properties:
+                have = ", ".join(map(str, sorted(declared - {0})))
+                message = f"properties {number} are not declared in {files.stem}.prop; expected one of {have}"
+                files.problems.add(f"{mesh.place(block, cell)}: {message}")
+    for number in sorted({int(number) for block in mesh.blocks for number in np.unique(block.properties)}):
+        properties.setdefault(number, Properties(number))
+
+
+def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
+    """Return one Data per variable for its fixed degrees of freedom, then one for its free ones."""
+    fixed, initial = _by_variable(files, ".cond", mesh), _by_variable(files, ".init", mesh)
+    data = []
+    for variable, nodes in fixed.items():
+        values = initial.get(variable, {})
+        data.append(_data(variable, {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}, True))
+    return data + [_data(variable, nodes, False) for variable, nodes in initial.items() if nodes]
+
+
+def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]:
+    found: dict[str, Values] = {}
+    for run in files.runs[ending]:
+        if run.form not in (FIX, INIT):
+            continue
+        source = files.sources[ending]
+        ids = source.integers(run.columns[0], run.starts)
+        for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
+            source.add(run.starts[i], files.no_node(ids[i]))
+        values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
+        lines = source.lines(run.starts).tolist()
+        for node, name, value, line, start in zip(
+            ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
+        ):
+            nodes = found.setdefault(name.decode("ascii"), {})
+            earlier, at = nodes.setdefault(node, (value, line))
+            if earlier != value:
+                source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
+            elif at != line:
+                files.note(source, start, f"{name.decode('ascii')} of node {node} is repeated from line {at}")
+        for name in set(run.columns[1]) & VECTORS:
+            start = run.starts[run.columns[1].index(name)]
+            text = name.decode("ascii")
+            source.add(start, f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z")
+    return found
+
+
+def _initial(source: Source, run: Run) -> Floats:
+    """Return the values of ``.init`` statements; their step must be 0."""
+    steps = source.integers(run.columns[2], run.starts, least=0)
+    for i in np.flatnonzero(steps):
+        source.add(run.starts[i], f"step {steps[i]} of the solution is not known at the start; expected 0")
+    return source.reals(run.columns[3], run.starts)
+
+
+def _value(source: Source, form: Form, text: bytes, start: int) -> Any:
+    """Return the value of a property: a float, or a vector or matrix as an array."""
+    if form is not MATRIX:
+        values = source.reals([text], [start] * (text.count(b",") + 1))
+        return values if form is VECTOR else float(values[0])
+    rows = [row.strip(b", \t\n") for row in text.replace(b"[", b"").split(b"]")[:-1]]
+    matrix = [source.reals([row], [start] * (row.count(b",") + 1)) for row in rows]
+    if len({len(row) for row in matrix}) > 1:
+        source.add(
+            start, f"the rows of the matrix have {[len(row) for row in matrix]} numbers; expected equal rows"
+        )
+        return None
+    return np.array(matrix)
+
+
+def _data(variable: str, nodes: Values, fixed: bool) -> Data:
+    values = np.array([value for value, _ in nodes.values()])
+    ids = np.array(list(nodes), dtype=np.int64)
+    return Data(variable, ids, np.full(len(ids), fixed), values, min(line for _, line in nodes.values()))

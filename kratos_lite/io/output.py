@@ -1,0 +1,100 @@
+"""Whole-or-nothing output: a file is replaced only once its successor is safe on the disk."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+from uuid import uuid4
+
+from kratos_lite.errors import InputError
+
+
+def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> None:
+    """Write a file as a whole, or leave what was there before untouched.
+
+    The bytes go to a temporary file in the same folder, are forced to the disk, and only then take the
+    place of `path`.  A failure of any kind, also Ctrl-C, deletes the temporary file.
+
+    Parameters
+    ----------
+    path : the file to write; its folder must exist.
+    data : the bytes, or a function that writes them to the open binary file it is given.
+
+    Raises
+    ------
+    InputError
+        The folder is missing or not writable, the disk is full, or `path` is no ordinary file; the
+        ``OSError`` is its cause.
+
+    Examples
+    --------
+    >>> folder = getfixture("tmp_path")
+    >>> write_whole(folder / "a.txt", b"first")
+    >>> write_whole(folder / "a.txt", lambda file: file.writelines([b"sec", b"ond"]))
+    >>> (folder / "a.txt").read_bytes(), len(list(folder.iterdir()))
+    (b'second', 1)
+    """
+    needed = len(data) if isinstance(data, bytes) else 0
+    with replacing(path, needed) as temporary, open(temporary, "r+b") as file:
+        if callable(data):
+            data(file)
+        else:
+            file.write(data)
+
+
+@contextmanager
+def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
+    """Give an empty temporary file, with the ending of `path`, that replaces `path` on success.
+
+    Use this where another library insists on a file name; otherwise use `write_whole`.
+
+    Parameters
+    ----------
+    path : the file to write; its folder must exist.
+    needed : bytes that will be written, if known; they appear in the error of a full disk.
+
+    Raises
+    ------
+    InputError
+        As `write_whole`.
+    """
+    try:
+        # Through a symbolic link the target is replaced, not the link.
+        target = Path(os.path.realpath(path))
+        if target.exists() and not target.is_file():
+            # Replacing a device such as /dev/null would harm the whole machine.
+            raise OSError(errno.EINVAL, "it is a folder or a device, not a file")
+        temporary = target.with_name(f".{uuid4().hex}{''.join(target.suffixes)[-40:]}")
+        temporary.open("xb").close()
+        try:
+            if target.exists():
+                shutil.copymode(target, temporary)
+            yield temporary
+            with open(temporary, "r+b") as file:
+                os.fsync(file.fileno())
+            os.replace(temporary, target)
+        except BaseException:
+            with suppress(OSError):
+                needed = max(needed, temporary.stat().st_size)
+                temporary.unlink()
+            raise
+    except OSError as error:
+        raise InputError(_text(Path(path), error, needed)) from error
+
+
+def _text(path: Path, error: OSError, needed: int) -> str:
+    """Say what went wrong with `path` and how to cure it; `needed` are the bytes known to be needed."""
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
+    cure = "choose a file name in a folder where you may write"
+    with suppress(OSError):
+        free = shutil.disk_usage(folder).free
+        if error.errno == errno.ENOSPC:
+            cure = f"at least {needed} bytes are needed, {free} bytes are free; free some space"
+    return f"{path}: cannot be written: {error.strerror or error}; {cure}"

@@ -1,0 +1,238 @@
+"""Loads: gravity, body force, traction, pressure and point load as nodal forces."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.batches import Batch, add_nodal
+from kratos_lite.elements import surface_load, surface_pressure
+from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.mesh import Block, Mesh, Where
+
+Array = NDArray[np.float64]
+
+
+def _finite(values: ArrayLike, what: str, shapes: str) -> Array:
+    array = np.asarray(values, dtype=float)
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite; got {values}")
+    if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
+        raise InputError(f"{what} must be {shapes}; got shape {array.shape}")
+    return array
+
+
+class Load(ABC):
+    """Something that pushes: it turns into nodal forces."""
+
+    @abstractmethod
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+
+
+def _chosen_elements(mesh: Mesh, where: str | None) -> NDArray[np.bool_] | None:
+    """Return a mask of the elements of a part, or None for all."""
+    if where is None:
+        return None
+    part = mesh.part(where)
+    mask = np.zeros(mesh.n_elements, dtype=bool)
+    mask[part.elements] = True
+    if not mask.any():
+        raise MeshError(f"part {where!r} has no elements; a volume load needs a part with elements")
+    return mask
+
+
+class BodyForce(Load):
+    """Force per volume.
+
+    Parameters
+    ----------
+    force : (3,) float, N/m³.
+    where : part whose elements carry it; all if not given.
+    """
+
+    def __init__(self, force: ArrayLike, where: str | None = None) -> None:
+        self.force = _finite(force, "a body force", "(3,) in N/m³")
+        self.where = where
+
+    def per_volume(self, batch: Batch) -> Array:
+        """Return the force per volume on the elements of a batch, (3,) or nodal (n, 3)."""
+        return self.force
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return ∫ N b dV as nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        mask = _chosen_elements(mesh, self.where)
+        for batch in batches:
+            b = self.per_volume(batch)
+            if not b.any():
+                continue
+            for chunk in batch.chunks():
+                nodes = batch.nodes[chunk]
+                share = batch.at(mesh.points, chunk).body_force(b if b.ndim == 1 else b[nodes])
+                if mask is not None:
+                    share = share * mask[batch.rows[chunk], None, None]
+                add_nodal(total, nodes, share)
+        return total
+
+
+class Gravity(BodyForce):
+    """Weight: density times an acceleration.
+
+    Parameters
+    ----------
+    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s².
+    where : part whose elements carry it; all if not given.
+
+    Examples
+    --------
+    >>> Gravity((0.0, 0.0, -9.81)).force
+    array([ 0.  ,  0.  , -9.81])
+    """
+
+    def __init__(self, acceleration: ArrayLike, where: str | None = None) -> None:
+        self.force = _finite(acceleration, "gravity", "(3,) or (n, 3) in m/s²")
+        self.where = where
+
+    def per_volume(self, batch: Batch) -> Array:
+        """Return density × acceleration."""
+        return batch.material.density * self.force
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return ∫ N ρ g dV as nodal forces (n, 3) in N."""
+        if self.force.ndim == 2 and len(self.force) != mesh.n_nodes:
+            raise InputError(f"nodal gravity needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
+        return super().forces(mesh, batches)
+
+
+def _faces(mesh: Mesh, where: Where, what: str) -> list[Block]:
+    faces = [block for block in mesh.faces(where) if block.shape is not None]
+    if not faces:
+        name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
+        raise ModelError(
+            f"{what} finds no face on {name}: it has no surface conditions and no element face "
+            "on the boundary has all its nodes in it"
+        )
+    return faces
+
+
+class Traction(Load):
+    """Force per area on the faces of a part (per length on lines, per node on points).
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    traction : (3,) float, Pa.
+    """
+
+    def __init__(self, where: Where, traction: ArrayLike) -> None:
+        self.where = where
+        self.traction = _finite(traction, "a traction", "(3,) in Pa")
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return ∫ N t dA as nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        for block in _faces(mesh, self.where, "a traction"):
+            assert block.shape is not None
+            add_nodal(total, block.nodes, surface_load(block.shape, mesh.points[block.nodes], self.traction))
+        return total
+
+
+class Pressure(Load):
+    """Pressure on the faces of a part; a positive one pushes into the body.
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    pressure : float, Pa.
+    normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
+        the nodes of each condition run counter-clockwise, as Kratos does.
+    """
+
+    def __init__(self, where: Where, pressure: float, normal: str = "outward") -> None:
+        if normal not in ("outward", "nodes"):
+            raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
+        if not np.isfinite(pressure):
+            raise InputError(f"a pressure must be finite; got {pressure}")
+        self.where, self.pressure, self.normal = where, float(pressure), normal
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return -∫ N p n dA as nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        for block in _faces(mesh, self.where, "a pressure"):
+            if block.shape is None or block.shape.cell not in ("triangle", "quadrilateral"):
+                raise ModelError(f"a pressure acts on faces; {block.name} is not one")
+            sign = outward_signs(mesh, block) if self.normal == "outward" else np.ones(len(block))
+            p = self.pressure * sign
+            add_nodal(total, block.nodes, surface_pressure(block.shape, mesh.points[block.nodes], p))
+        return total
+
+
+class PointLoad(Load):
+    """The same force on each node of a part.
+
+    Parameters
+    ----------
+    where : nodes.
+    force : (3,) float, N, on each node.
+    """
+
+    def __init__(self, where: Where, force: ArrayLike) -> None:
+        self.where = where
+        self.force = _finite(force, "a point load", "(3,) in N")
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        rows = mesh.nodes(self.where)
+        if not len(rows):
+            raise ModelError(f"a point load finds no node in {self.where!r}")
+        total[rows] += self.force
+        return total
+
+
+class NodalForces(Load):
+    """Given nodal forces.
+
+    Parameters
+    ----------
+    values : (n, 3) float, N.
+    """
+
+    def __init__(self, values: ArrayLike) -> None:
+        self.values = _finite(values, "nodal forces", "(n, 3) in N")
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return a copy of the values."""
+        if self.values.shape != mesh.points.shape:
+            raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
+        return self.values.copy()
+
+
+def outward_signs(mesh: Mesh, block: Block) -> Array:
+    """Return +1 for faces whose node order runs counter-clockwise from outside, else -1.
+
+    A face that is not on the boundary of the body has no outward side: that is an error.
+    """
+    assert block.shape is not None
+    c = block.shape.corners
+    corners = block.nodes[:, :c]
+    boundary = [b.nodes[:, :c] for b in mesh.boundary if b.shape is not None and b.shape.corners == c]
+    outside = np.vstack([np.zeros((0, c), dtype=np.int32), *boundary])
+    both, k = np.vstack([outside, corners]), len(outside)
+    _, key = np.unique(np.sort(both, axis=1), axis=0, return_inverse=True)
+    key = key.ravel()
+    owner = np.full(key.max(initial=-1) + 1, -1)
+    owner[key[:k]] = np.arange(k)
+    match = owner[key[k:]]
+    if (match < 0).any():
+        lost = block.ids[int(np.argmax(match < 0))]
+        raise ModelError(
+            f"face {lost} ({block.name}) is not on the boundary of the body, so it has no outward normal"
+        )
+    start = np.argmax(outside[match] == corners[:, :1], axis=1)
+    following = np.take_along_axis(outside[match], ((start + 1) % c)[:, None], axis=1)[:, 0]
+    return np.where(following == corners[:, 1], 1.0, -1.0)

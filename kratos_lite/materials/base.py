@@ -1,0 +1,108 @@
+"""LinearMaterial: what every linear elastic law shares."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from functools import cached_property
+from math import isfinite
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.errors import MaterialError
+from kratos_lite.registry import Registry
+
+Array = NDArray[np.float64]
+
+MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
+"""Every material by its class name and by the names of Kratos."""
+
+
+class LinearMaterial:
+    """A linear elastic material: stress = C strain in Voigt order xx yy zz xy yz zx.
+
+    A subclass is a frozen dataclass of its constants that defines `compliance` (or overrides
+    `elasticity`); it registers itself under its class name and its `aliases`.
+
+    Attributes
+    ----------
+    density : kg/m³, ≥ 0.
+    aliases : further names, such as those of Kratos' constitutive laws.
+    variables : field name → name of the variable in `.mdpa` and JSON files.
+    """
+
+    density: float
+    aliases: ClassVar[tuple[str, ...]] = ()
+    variables: ClassVar[dict[str, str]] = {"density": "DENSITY"}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        MATERIALS.add(cls.__name__, cls, cls.aliases)
+
+    def __post_init__(self) -> None:
+        if is_dataclass(self):
+            for item in fields(self):
+                value = getattr(self, item.name)
+                if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                    raise MaterialError(f"{self._name(item.name)} must be a number; got {value!r}")
+                if not isfinite(value):
+                    raise MaterialError(f"{self._name(item.name)} must be finite; got {value}")
+        if self.density < 0:
+            raise MaterialError(
+                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; turn gravity around instead"
+            )
+        self.check()
+
+    @classmethod
+    def _name(cls, field: str) -> str:
+        variable = cls.variables.get(field)
+        return f"{field} ({variable})" if variable else field
+
+    def check(self) -> None:
+        """Raise MaterialError unless C is symmetric and positive definite."""
+        if not np.allclose(self.C, self.C.T, rtol=1e-10, atol=0):
+            raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
+        scale = np.sqrt(np.abs(np.diag(self.C)))
+        smallest = np.linalg.eigvalsh(self.C / np.outer(scale, scale))[0]
+        if not smallest > 0:
+            raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
+
+    def why_unstable(self) -> str:
+        """Name the bound that the constants violate."""
+        return "the strain energy of some strain is not positive"
+
+    def compliance(self) -> Array:
+        """Return S (6, 6) in 1/Pa with strain = S stress."""
+        raise TypeError(f"{type(self).__name__} must define compliance() or elasticity()")
+
+    def elasticity(self) -> Array:
+        """Return C (6, 6) in Pa; by default the inverse of the compliance."""
+        try:
+            return np.linalg.inv(self.compliance())
+        except np.linalg.LinAlgError:
+            raise MaterialError(f"{type(self).__name__}: the compliance is singular") from None
+
+    @cached_property
+    def C(self) -> Array:
+        """Elasticity matrix (6, 6) in Pa, read-only."""
+        C = np.asarray(self.elasticity(), dtype=float)
+        C.setflags(write=False)
+        return C
+
+    def stress(self, strain: ArrayLike) -> Array:
+        """Return the stress (..., 6) in Pa of a strain (..., 6)."""
+        return np.asarray(strain, dtype=float) @ self.C.T
+
+    @classmethod
+    def from_variables(cls, values: dict[str, Any]) -> LinearMaterial:
+        """Make the material from the variables of a file, such as YOUNG_MODULUS.
+
+        A variable that is missing raises MaterialError; the density may be missing (0).
+        """
+        given = {field: values[name] for field, name in cls.variables.items() if name in values}
+        needed = {item.name for item in fields(cls) if item.name != "density"}  # type: ignore[arg-type]
+        missing = [cls.variables.get(field, field) for field in sorted(needed - given.keys())]
+        if missing:
+            raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
+        return cls(**given)

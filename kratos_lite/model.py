@@ -1,0 +1,266 @@
+"""Model: mesh, materials, supports and loads, solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite import checks
+from kratos_lite.assembly import Progress
+from kratos_lite.batches import Batch
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.loads import Load
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Block, Mesh, Where
+from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.result import Result
+from kratos_lite.statics import solve_static
+from kratos_lite.supports import Link, Supports, axis_numbers
+
+Array = NDArray[np.float64]
+
+
+class Model:
+    """A body under load.
+
+    Parameters
+    ----------
+    mesh : points, elements and named parts.
+    material : one material for all elements, or materials by part name or property id.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
+    >>> for side, axis in (("x-", "x"), ("x+", "x"), ("y-", "y"), ("y+", "y"), ("z-", "z")):
+    ...     model.fix(side, axis)
+    >>> model.add(kl.Gravity((0.0, 0.0, -9.81)))
+    >>> result = model.solve()
+    >>> print(f"{result.displacement('z+')[:, 2].mean():.7e} m")
+    -1.3221478e-04 m
+    """
+
+    def __init__(
+        self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
+    ) -> None:
+        self.mesh = mesh
+        self.supports = Supports(mesh)
+        self.loads: list[Load] = []
+        self.notes: list[str] = []
+        self.initial_displacement: Array | None = None
+        self.prestress: Array | None = None
+        self._materials: list[LinearMaterial] = []
+        self._material_of = np.full(mesh.n_elements, -1)
+        self._rules: dict[int, Rule | int] = {}
+        self._rule_of = np.full(mesh.n_elements, -1)
+        if isinstance(material, LinearMaterial):
+            self.assign(material)
+        elif material is not None:
+            for where, one in material.items():
+                self.assign(one, where)
+
+    # ---- what the model is made of -----------------------------------------------------------
+
+    def _elements(self, where: str | int | ArrayLike | None) -> NDArray[np.int64]:
+        """Return element rows of a part, of a property id, of an array of rows, or of all."""
+        if where is None:
+            return np.arange(self.mesh.n_elements)
+        if isinstance(where, str):
+            rows = self.mesh.part(where).elements
+            if not len(rows):
+                raise MeshError(f"part {where!r} has no elements")
+            return rows
+        if isinstance(where, (int, np.integer)):
+            ids = np.concatenate([np.zeros(0), *(block.properties for block in self.mesh.blocks)])
+            return np.flatnonzero(ids == where)
+        return np.asarray(where, dtype=np.int64)
+
+    def assign(self, material: LinearMaterial, where: str | int | ArrayLike | None = None) -> None:
+        """Give elements a material: all, those of a part, of a property id, or of given rows."""
+        if not isinstance(material, LinearMaterial):
+            raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
+        rows = self._elements(where)
+        self._materials.append(material)
+        self._material_of[rows] = len(self._materials) - 1
+
+    def use_rule(self, rule: Rule | int, where: str | int | ArrayLike | None = None) -> None:
+        """Replace the quadrature rule of elements by a Rule or an INTEGRATION_ORDER 1 … 5."""
+        number = len(self._rules)
+        self._rules[number] = rule
+        self._rule_of[self._elements(where)] = number
+
+    def fix(self, where: Where, axes: str = "xyz", value: ArrayLike = 0.0, *, override: bool = False) -> None:
+        """Prescribe the displacement of nodes.
+
+        Parameters
+        ----------
+        where : part name, predicate on the points (n, 3), mask or node rows.
+        axes : some of ``"x"``, ``"y"``, ``"z"``, e.g. ``"xz"``.
+        value : m; one number, one per axis, or one row per node.
+        override : let this value win over an earlier one for the same degree of freedom.
+
+        Raises
+        ------
+        ModelError
+            If no node is chosen, or a degree of freedom gets two different values.
+        """
+        rows = self.mesh.nodes(where)
+        if not len(rows):
+            what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
+            raise ModelError(f"cannot fix {axes}: {what}")
+        self.supports.fix(rows, axes, value, override)
+
+    def link(
+        self,
+        slave: tuple[int, str],
+        masters: Mapping[tuple[int, str], float],
+        constant: float = 0.0,
+    ) -> None:
+        """Tie a degree of freedom to others: u[slave] = Σ weight · u[master] + constant.
+
+        Degrees of freedom are (node row, axis letter) pairs.
+        """
+
+        def dof(where: tuple[int, str]) -> int:
+            node, axis = where
+            if not 0 <= node < self.mesh.n_nodes or len(axis) != 1:
+                raise InputError(f"a degree of freedom is (node row, axis letter); got {where}")
+            return 3 * int(node) + axis_numbers(axis)[0]
+
+        weights = tuple(float(w) for w in masters.values())
+        if not np.isfinite([constant, *weights]).all():
+            raise InputError(f"weights and constant of a constraint must be finite; got {weights}, {constant}")
+        self.supports.link([Link(dof(slave), tuple(map(dof, masters)), weights, float(constant))])
+
+    def add(self, load: Load) -> None:
+        """Add a load; loads add up."""
+        if not isinstance(load, Load):
+            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+        self.loads.append(load)
+
+    def activate(self, displacement: ArrayLike) -> None:
+        """Make the body stress-free at a displacement u0 (n, 3) in m: strain comes from u - u0."""
+        u0 = np.asarray(displacement, dtype=float)
+        if u0.shape != self.mesh.points.shape or not np.isfinite(u0).all():
+            raise InputError(f"the initial displacement must be finite with shape {self.mesh.points.shape}")
+        self.initial_displacement = u0
+
+    def add_prestress(self, stress: ArrayLike, where: str | int | ArrayLike | None = None) -> None:
+        """Add a stress (6,) or (m, 6) in Pa that elements carry before they are strained."""
+        s = np.asarray(stress, dtype=float)
+        if s.shape[-1:] != (6,) or not np.isfinite(s).all():
+            raise InputError(f"a prestress has six finite components xx yy zz xy yz zx; got {stress}")
+        if self.prestress is None:
+            self.prestress = np.zeros((self.mesh.n_elements, 6))
+        self.prestress[self._elements(where)] += s
+
+    # ---- batches -------------------------------------------------------------------------------
+
+    def batches(self) -> list[Batch]:
+        """Return the elements grouped by kind, rule and material.
+
+        Raises ModelError for elements without material and InputError for unknown kinds.
+        """
+        found: list[Batch] = []
+        start = 0
+        for block in self.mesh.blocks:
+            rows = np.arange(start, start + len(block))
+            start += len(block)
+            if len(block):
+                found += self._split(block, rows)
+        if not found:
+            raise ModelError("the model has no elements; nothing can be solved")
+        return found
+
+    def _split(self, block: Block, rows: NDArray[np.int64]) -> list[Batch]:
+        element = self._element_class(block)
+        material, rule = self._material_of[rows], self._rule_of[rows]
+        if (material < 0).any():
+            e = int(np.argmax(material < 0))
+            raise ModelError(
+                f"{self.mesh.place(block, e)} has no material (property {block.properties[e]}); "
+                "give one with Model(mesh, material), model.assign or --material"
+            )
+        batches = []
+        for m, r in sorted(set(zip(material.tolist(), rule.tolist(), strict=True))):
+            mine = (material == m) & (rule == r)
+            chosen = self._rules.get(r, element.rule)
+            if isinstance(chosen, int):
+                chosen = by_order(element.shape.cell, chosen)
+            stress = None if self.prestress is None else self.prestress[rows[mine]]
+            nodes = block.nodes if mine.all() else block.nodes[mine]
+            batches.append(Batch(element, chosen, self._materials[m], nodes, rows[mine], stress))
+        return batches
+
+    def _element_class(self, block: Block) -> Any:
+        if block.name not in ELEMENTS:
+            try:
+                ELEMENTS[block.name]
+            except InputError as error:
+                raise InputError(f"{self.mesh.place(block, 0)}: {error}") from None
+        return ELEMENTS[block.name]
+
+    # ---- solving -------------------------------------------------------------------------------
+
+    def check(self) -> list[str]:
+        """Check the model as `solve` does, without solving; return the warnings.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            With every element or part that is wrong.
+        """
+        mesh, batches = self.mesh, self.batches()
+        checks.check_points(mesh)
+        checks.check_repeated_nodes(mesh)
+        used = np.zeros(mesh.n_nodes, dtype=bool)
+        for batch in batches:
+            used[batch.nodes] = True
+        warnings = checks.check_jacobians(mesh, batches)
+        warnings += checks.check_rules(batches)
+        warnings += checks.check_coincident(mesh, used)
+        warnings += checks.check_scales(mesh, batches)
+        if not used.all():
+            lost = mesh.node_ids[~used]
+            shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
+            warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
+        checks.check_supports(mesh, batches, self.supports)
+        return warnings
+
+    def solve(
+        self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+    ) -> Result:
+        """Check the model and solve it.
+
+        Parameters
+        ----------
+        solver : ``auto``, ``dense``, ``direct`` or ``amg``.
+        tolerance : relative residual at which the iterative solver stops.
+        progress : called with the phase and the share done, 0 … 1.
+
+        Returns
+        -------
+        Result
+            Displacements, reactions, stresses and a report.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            If the model is broken or its supports leave rigid motions free.
+        SolveError
+            If the accuracy asked for cannot be reached.
+        """
+        return solve_static(self, solver, tolerance, progress)
+
+    def __repr__(self) -> str:
+        mesh = self.mesh
+        kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block)) or "no elements"
+        return (
+            f"Model({mesh.source or 'mesh'}: {mesh.n_nodes} nodes; {kinds}; {len(mesh.parts)} parts; "
+            f"{int(self.supports.fixed.sum())} fixed components; {len(self.supports.links)} constraints; "
+            f"{len(self.loads)} loads)"
+        )

@@ -1,0 +1,178 @@
+"""Quadrature: for each cell the rule with the fewest points that has at least a given degree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from itertools import permutations
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.errors import InputError
+from kratos_lite.quadrature import gauss
+from kratos_lite.quadrature.base import Rule
+
+__all__ = [
+    "CELLS",
+    "Rule",
+    "by_order",
+    "hexahedron",
+    "line",
+    "point",
+    "pyramid",
+    "quadrilateral",
+    "rule_for",
+    "tetrahedron",
+    "triangle",
+    "wedge",
+]
+
+
+def _points_for(degree: int) -> int:
+    """Return how many Gauss points one direction needs for `degree`."""
+    return degree // 2 + 1
+
+
+def _orbits(d: int, orbits: list[tuple[float, tuple[float, ...]]]) -> tuple[NDArray[np.float64], ...]:
+    """Return all permutations of barycentric points with their weights (share of the volume)."""
+    points, weights = [], []
+    for weight, barycentric in orbits:
+        orbit = sorted(set(permutations(barycentric)))
+        points += [p[1:] for p in orbit]
+        weights += [weight] * len(orbit)
+    return np.array(points), np.array(weights) / (6 if d == 3 else 2)
+
+
+@lru_cache
+def point(degree: int = 0) -> Rule:
+    """Return the one-point rule of a point."""
+    return Rule(np.zeros((1, 0)), np.ones(1), 99, "point")
+
+
+@lru_cache
+def line(degree: int) -> Rule:
+    """Return the Gauss-Legendre rule on [-1, 1]."""
+    n = _points_for(degree)
+    return Rule(*gauss.tensor_product(n, 1), 2 * n - 1, f"Gauss-Legendre {n}")
+
+
+@lru_cache
+def quadrilateral(degree: int) -> Rule:
+    """Return the Gauss-Legendre product on [-1, 1]^2."""
+    n = _points_for(degree)
+    return Rule(*gauss.tensor_product(n, 2), 2 * n - 1, f"Gauss-Legendre {n}x{n}")
+
+
+@lru_cache
+def hexahedron(degree: int) -> Rule:
+    """Return the Gauss-Legendre product on [-1, 1]^3."""
+    n = _points_for(degree)
+    return Rule(*gauss.tensor_product(n, 3), 2 * n - 1, f"Gauss-Legendre {n}x{n}x{n}")
+
+
+@lru_cache
+def triangle(degree: int) -> Rule:
+    """Return a symmetric rule on the unit triangle (1, 3, 6 or 7 points), conical above degree 5.
+
+    Source: Dunavant, Int. J. Numer. Meth. Eng. 21 (1985) 1129-1148; closed forms after Radon
+    (degree 5) and Lyness & Jespersen (degree 4).
+    """
+    if degree <= 1:
+        return Rule(*_orbits(2, [(1.0, (1 / 3,) * 3)]), 1, "centroid")
+    if degree <= 2:
+        return Rule(*_orbits(2, [(1 / 3, (2 / 3, 1 / 6, 1 / 6))]), 2, "Strang-Fix 3")
+    if degree <= 4:
+        orbits = []
+        for s in (1, -1):
+            a = (8 - sqrt(10) + s * sqrt(38 - 44 * sqrt(2 / 5))) / 18
+            w = (620 + s * sqrt(213125 - 53320 * sqrt(10))) / 3720
+            orbits.append((w, (1 - 2 * a, a, a)))
+        return Rule(*_orbits(2, orbits), 4, "Dunavant 6")
+    if degree <= 5:
+        orbits = [(9 / 40, (1 / 3,) * 3)]
+        for s in (1, -1):
+            a = (6 + s * sqrt(15)) / 21
+            orbits.append(((155 + s * sqrt(15)) / 1200, (1 - 2 * a, a, a)))
+        return Rule(*_orbits(2, orbits), 5, "Radon 7")
+    n = _points_for(degree)
+    return Rule(*gauss.conical_simplex(n, 2), 2 * n - 1, f"conical {n}x{n}")
+
+
+@lru_cache
+def tetrahedron(degree: int) -> Rule:
+    """Return a rule on the unit tetrahedron: 1, 4, 8, 15 points, conical above degree 5.
+
+    All weights are positive.  Source: Stroud, Approximate Calculation of Multiple Integrals
+    (1971): T3:2-1, conical product, T3:5-1.
+    """
+    if degree <= 1:
+        return Rule(*_orbits(3, [(1.0, (1 / 4,) * 4)]), 1, "centroid")
+    if degree <= 2:
+        a = (5 - sqrt(5)) / 20
+        return Rule(*_orbits(3, [(1 / 4, (1 - 3 * a, a, a, a))]), 2, "Stroud T3:2-1")
+    if degree in (4, 5):
+        c = (10 - 2 * sqrt(15)) / 40
+        orbits = [(16 / 135, (1 / 4,) * 4), (10 / 189, (c, c, 1 / 2 - c, 1 / 2 - c))]
+        for s in (1, -1):
+            a = (7 - s * sqrt(15)) / 34
+            orbits.append(((2665 + s * 14 * sqrt(15)) / 37800, (1 - 3 * a, a, a, a)))
+        return Rule(*_orbits(3, orbits), 5, "Stroud T3:5-1")
+    n = _points_for(degree)
+    return Rule(*gauss.conical_simplex(n, 3), 2 * n - 1, f"conical {n}x{n}x{n}")
+
+
+@lru_cache
+def wedge(degree: int) -> Rule:
+    """Return the product of a triangle rule and a Gauss-Legendre rule on t in [-1, 1]."""
+    base, height = triangle(degree), line(degree)
+    points = [(*rs, t) for t in height.points[:, 0] for rs in base.points]
+    weights = np.outer(height.weights, base.weights).ravel()
+    return Rule(np.array(points), weights, min(base.degree, height.degree), f"{base.name} x {height.name}")
+
+
+@lru_cache
+def pyramid(degree: int) -> Rule:
+    """Return the conical product on the pyramid with base [-1, 1]^2 at z = 0 and apex at z = 1."""
+    n = _points_for(degree)
+    ab, w = gauss.tensor_product(n, 2)
+    z, v = gauss.jacobi(n, 2)
+    points = [(a * (1 - h), b * (1 - h), h) for h in z for a, b in ab]
+    return Rule(np.array(points), np.outer(v, w).ravel(), 2 * n - 1, f"conical {n}x{n}x{n}")
+
+
+CELLS: dict[str, Callable[[int], Rule]] = {
+    "point": point,
+    "line": line,
+    "triangle": triangle,
+    "quadrilateral": quadrilateral,
+    "tetrahedron": tetrahedron,
+    "hexahedron": hexahedron,
+    "wedge": wedge,
+    "pyramid": pyramid,
+}
+"""Rules by the name of the reference cell."""
+
+
+def rule_for(cell: str, degree: int) -> Rule:
+    """Return the rule of a cell with at least this degree.
+
+    >>> len(rule_for("tetrahedron", 2))
+    4
+    """
+    if cell not in CELLS:
+        raise InputError(f"there are no rules for cell {cell!r}; cells are {', '.join(CELLS)}")
+    if not 0 <= degree <= 40:
+        raise InputError(f"the degree of a rule must lie in 0 … 40; got {degree}")
+    return CELLS[cell](int(degree))
+
+
+def by_order(cell: str, order: int) -> Rule:
+    """Return the rule that INTEGRATION_ORDER 1 … 5 asks for.
+
+    Tetrahedra: degree = order.  Other cells: `order` points in each direction, degree 2·order - 1.
+    """
+    if order not in (1, 2, 3, 4, 5):
+        raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")
+    return rule_for(cell, order if cell == "tetrahedron" else 2 * order - 1)

@@ -1,0 +1,48 @@
+"""Rule: points and weights on a reference cell, with the degree that they integrate exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A quadrature rule: sum of weights · f(points) is exact for polynomials up to `degree`.
+
+    Attributes
+    ----------
+    points : (g, d) float, Gauss points xi in the reference cell.
+    weights : (g,) float, weights gamma; they sum to the volume of the reference cell.
+    degree : total degree of the polynomials that are integrated exactly.
+    name : where the rule comes from.
+
+    Examples
+    --------
+    >>> from kratos_lite.quadrature import hexahedron
+    >>> sum(gamma for xi, gamma in hexahedron(degree=3))
+    8.0
+    """
+
+    points: Array
+    weights: Array
+    degree: int
+    name: str
+
+    def __post_init__(self) -> None:
+        for array in (self.points, self.weights):
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    def __iter__(self) -> Iterator[tuple[Array, float]]:
+        return iter(zip(self.points, self.weights.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        return f"Rule({self.name}: {len(self)} points, degree {self.degree})"

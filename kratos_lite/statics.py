@@ -1,0 +1,187 @@
+"""Statics: from a model to displacements in one linear solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import checks, solvers
+from kratos_lite.assembly import Pattern, Progress, assemble_dense, assemble_stiffness, internal_load
+from kratos_lite.batches import Batch
+from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.supports import Reduction, reduction, rigid_modes
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+
+
+class Phases:
+    """Seconds spent in each named phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Measure the body of a ``with`` statement."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+
+
+def solve_static(
+    model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+) -> Result:
+    """Solve K u = f with the supports of a model eliminated; see `Model.solve`."""
+    if not 0 < tolerance < 1:
+        raise InputError(f"tolerance must lie between 0 and 1; got {tolerance}")
+    solvers.choose(solver, 0)
+    phase = Phases()
+    with phase("check"):
+        warnings = model.check()
+        batches = model.batches()
+    with phase("load"):
+        loads = external_loads(model, batches)
+        forces = loads - initial_loads(model, batches)
+    active, local = renumber(model, batches, forces)
+    points = model.mesh.points[active]
+    reduced = reduction(model.supports, active)
+    f = forces[active].ravel()
+    method, reason = solvers.choose(solver, len(reduced.free))
+    with phase("assemble"):
+        K: Any
+        if method == "dense":
+            K = assemble_dense(points, local)
+        else:
+            K = assemble_stiffness(points, local, Pattern(len(points), [b.nodes for b in local]), progress)
+    with phase("solve"):
+        solution = solve_reduced(K, f, reduced, method, tolerance, points, progress)
+        if solution.method == method:
+            solution = replace(solution, reason=reason)
+    with phase("verify"):
+        u = np.where(model.supports.fixed, model.supports.values, 0.0)
+        u[active] = reduced.expand(solution.x).reshape(-1, 3)
+        residual = np.zeros_like(u)
+        residual[active] = (K @ u[active].ravel() - f).reshape(-1, 3)
+        reactions = np.where(constrained(model), residual, 0.0)
+        force, moment = checks.equilibrium(model.mesh.points, loads, reactions)
+        if not np.isfinite(u).all() or solution.backward_error > 1e-8:
+            raise SolveError(
+                f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
+                "look for very thin elements, very unlike stiffnesses or nearly free parts"
+            )
+    report = Report(
+        unknowns=len(reduced.free),
+        total_load=loads.sum(axis=0),
+        total_reaction=reactions.sum(axis=0),
+        solver=solution.method,
+        reason=solution.reason,
+        iterations=solution.iterations,
+        backward_error=solution.backward_error,
+        force_error=force,
+        moment_error=moment,
+        seconds=phase.seconds,
+        peak_memory=peak_memory(),
+        warnings=warnings,
+        notes=list(model.notes),
+    )
+    return Result(model.mesh, batches, u, reactions, loads, report, model.initial_displacement)
+
+
+def external_loads(model: Model, batches: Sequence[Batch]) -> Array:
+    """Return the nodal forces (n, 3) in N of all loads."""
+    total = np.zeros_like(model.mesh.points)
+    for load in model.loads:
+        total += load.forces(model.mesh, batches)
+    return total
+
+
+def initial_loads(model: Model, batches: Sequence[Batch]) -> Array:
+    """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
+    u0 = model.initial_displacement
+    if u0 is None and model.prestress is None:
+        return np.zeros_like(model.mesh.points)
+    start = np.zeros_like(model.mesh.points) if u0 is None else -u0
+    return internal_load(model.mesh.points, batches, start)
+
+
+def renumber(model: Model, batches: list[Batch], forces: Array) -> tuple[NDArray[np.int64], list[Batch]]:
+    """Return the rows of the nodes that elements use, and the batches numbered by them."""
+    mesh = model.mesh
+    used = np.zeros(mesh.n_nodes, dtype=bool)
+    for batch in batches:
+        used[batch.nodes] = True
+    lost = np.flatnonzero(~used & (forces != 0).any(axis=1))
+    if len(lost):
+        raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")
+    active = np.flatnonzero(used)
+    if used.all():
+        return active, batches
+    local = (np.cumsum(used) - 1).astype(np.int32)
+    return active, [replace(batch, nodes=local[batch.nodes]) for batch in batches]
+
+
+def constrained(model: Model) -> NDArray[np.bool_]:
+    """Return a mask (n, 3) of the degrees of freedom that carry reactions or constraint forces."""
+    mask = model.supports.fixed.copy()
+    for link in model.supports.links:
+        mask.flat[[link.slave, *link.masters]] = True
+    return mask
+
+
+def solve_reduced(
+    K: Any,
+    f: Array,
+    reduced: Reduction,
+    method: str,
+    tolerance: float,
+    points: Array,
+    progress: Progress | None = None,
+) -> solvers.Solution:
+    """Solve T^T K T q = T^T (f - K c); fall back from multigrid to a factorisation if need be."""
+    b = reduced.reduce(f - K @ reduced.c)
+    if method == "dense":
+        A = K[np.ix_(reduced.free, reduced.free)] if reduced.T is None else reduced.T.T @ K @ reduced.T
+        A = np.asarray(A)
+        q = solvers.solve_dense(A, b) if len(b) else b
+        return solvers.Solution(q, method, "", 0, solvers.backward_error(A, q, b))
+    A = reduced_matrix(K, reduced)
+    if not len(b):
+        return solvers.Solution(b, method, "", 0, 0.0)
+    why = ""
+    if method == "amg":
+        modes = rigid_modes(points)
+        modes = modes[reduced.free] if reduced.T is None else modes[reduced.free]
+        precondition = solvers.multigrid(A, modes)
+        q, iterations, ok = solvers.conjugate_gradients(A, b, precondition, tolerance, progress=progress)
+        if ok:
+            return solvers.Solution(q, method, "", iterations, solvers.backward_error(A, q, b))
+        why = f"multigrid stopped after {iterations} iterations without reaching {tolerance:g}"
+        if len(b) > solvers.FALLBACK_LIMIT:
+            raise SolveError(
+                f"{why}; {len(b)} unknowns are too many to factorise instead; look for thin elements or "
+                "ν near 0.5, use quadratic elements, or ask for solver='direct'"
+            )
+    q = solvers.solve_direct(A, b)
+    return solvers.Solution(q, "direct", why, 0, solvers.backward_error(A, q, b))
+
+
+def reduced_matrix(K: Any, reduced: Reduction) -> Any:
+    """Return T^T K T as CSR."""
+    A = K.tocsr()
+    if reduced.T is not None:
+        return (reduced.T.T @ A @ reduced.T).tocsr()
+    if len(reduced.free) == A.shape[0]:
+        return A
+    return A[reduced.free][:, reduced.free]

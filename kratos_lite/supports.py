@@ -1,0 +1,244 @@
+"""Supports: prescribed displacements and linear multi-point constraints, by elimination.
+
+The displacement of all degrees of freedom is u = T q + c with q the free ones; the equations
+T^T K T q = T^T (f - K c) keep symmetry and hold the constraints exactly (no penalty).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+AXES = "xyz"
+
+
+def axis_numbers(axes: str) -> list[int]:
+    """Return the axis numbers of a word such as ``"xz"``.
+
+    >>> axis_numbers("xz")
+    [0, 2]
+    """
+    if not axes or any(a not in AXES for a in axes) or len(set(axes)) != len(axes):
+        raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
+    return [AXES.index(a) for a in axes]
+
+
+@dataclass(frozen=True)
+class Link:
+    """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant.
+
+    Degrees of freedom count 3·node + axis.
+    """
+
+    slave: int
+    masters: tuple[int, ...]
+    weights: tuple[float, ...]
+    constant: float = 0.0
+
+
+class Supports:
+    """Fixed degrees of freedom with their values, and links between degrees of freedom."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.fixed: NDArray[np.bool_] = np.zeros(mesh.points.shape, dtype=bool)
+        self.values: Array = np.zeros(mesh.points.shape)
+        self.links: list[Link] = []
+
+    def name(self, dof: int) -> str:
+        """Return the readable name of a degree of freedom."""
+        return f"node {self.mesh.node_ids[dof // 3]} along {AXES[dof % 3]}"
+
+    def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
+        """Prescribe the displacement of nodes along axes.
+
+        `value` in m is one number, one per axis, or (rows, axes).  A degree of freedom that is
+        prescribed twice must be given the same value, unless `override` lets the later one win.
+        """
+        numbers = axis_numbers(axes)
+        given = np.asarray(value, dtype=float)
+        if not np.isfinite(given).all():
+            raise InputError(f"a prescribed displacement must be finite; got {value}")
+        try:
+            given = np.broadcast_to(given, (len(rows), len(numbers)))
+        except ValueError:
+            raise InputError(
+                f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
+                f"or have shape ({len(rows)}, {len(numbers)}); got shape {given.shape}"
+            ) from None
+        at = np.ix_(rows, numbers)
+        clash = self.fixed[at] & (self.values[at] != given)
+        if clash.any() and not override:
+            i, j = np.argwhere(clash)[0]
+            dof = int(3 * rows[i] + numbers[j])
+            raise ModelError(
+                f"{self.name(dof)} is prescribed twice: {self.values.flat[dof]:g} m and {given[i, j]:g} m"
+            )
+        self.fixed[at] = True
+        self.values[at] = given
+
+    def link(self, links: Iterable[Link]) -> None:
+        """Add multi-point constraints."""
+        self.links += links
+
+    def rows_of_constraints(self) -> tuple[Ints, Ints, Array]:
+        """Return all constraints but their values as sparse rows: (row, dof, weight)."""
+        fixed = np.flatnonzero(self.fixed.ravel())
+        row, dof, weight = [np.arange(len(fixed))], [fixed], [np.ones(len(fixed))]
+        for r, link in enumerate(self.links, start=len(fixed)):
+            row.append(np.full(1 + len(link.masters), r))
+            dof.append(np.array([link.slave, *link.masters], dtype=np.int64))
+            weight.append(np.array([1.0, *(-w for w in link.weights)]))
+        return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)
+
+
+@dataclass(eq=False)
+class Reduction:
+    """The map u = T q + c from the free degrees of freedom q to all.
+
+    Attributes
+    ----------
+    free : (q,) int, the free degrees of freedom.
+    c : (N,) float, the displacement at q = 0.
+    T : (N, q) sparse, or None where u[free] = q is all (no links).
+    """
+
+    free: Ints
+    c: Array
+    T: csr_array[Any, Any] | None = None
+
+    def expand(self, q: Array) -> Array:
+        """Return all displacements (N,) of the free ones."""
+        if self.T is not None:
+            return np.asarray(self.T @ q + self.c)
+        u = self.c.copy()
+        u[self.free] = q
+        return u
+
+    def reduce(self, r: Array) -> Array:
+        """Return T^T r."""
+        return np.asarray(self.T.T @ r) if self.T is not None else r[self.free]
+
+
+def reduction(supports: Supports, active: Ints) -> Reduction:
+    """Return the reduction for the degrees of freedom of the `active` node rows, renumbered in order."""
+    fixed = supports.fixed[active].ravel()
+    c = np.where(fixed, supports.values[active].ravel(), 0.0)
+    if not supports.links:
+        return Reduction(np.flatnonzero(~fixed), c)
+    local = np.full(supports.mesh.n_nodes, -1)
+    local[active] = np.arange(len(active))
+    links = resolve(supports, local)
+    slaves = np.array(sorted(links), dtype=np.int64)
+    is_free = ~fixed
+    is_free[slaves] = False
+    free = np.flatnonzero(is_free)
+    column = np.full(len(fixed), -1)
+    column[free] = np.arange(len(free))
+    rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
+    for slave, (terms, constant) in links.items():
+        c[slave] = constant
+        dofs = np.array(list(terms), dtype=np.int64)
+        rows.append(np.full(len(dofs), slave))
+        columns.append(column[dofs])
+        weights.append(np.array(list(terms.values()), dtype=float))
+    from scipy.sparse import csr_array
+
+    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
+    return Reduction(free, c, csr_array(entries, shape=(len(fixed), len(free))))
+
+
+def resolve(supports: Supports, local: Ints) -> dict[int, tuple[dict[int, float], float]]:
+    """Express every slave by free degrees of freedom alone, in the numbering `local` of the nodes."""
+
+    def renumber(dof: int) -> int:
+        node = int(local[dof // 3])
+        if node < 0:
+            raise ModelError(f"a constraint uses {supports.name(dof)}, which belongs to no element")
+        return 3 * node + dof % 3
+
+    by_slave: dict[int, Link] = {}
+    for link in supports.links:
+        if link.slave in by_slave:
+            raise ModelError(f"{supports.name(link.slave)} is the slave of two constraints")
+        if supports.fixed.flat[link.slave]:
+            raise ModelError(f"{supports.name(link.slave)} is both fixed and the slave of a constraint")
+        by_slave[link.slave] = link
+    done: dict[int, tuple[dict[int, float], float]] = {}
+    for start in by_slave:
+        _resolve_one(start, by_slave, done, supports)
+    return {
+        renumber(slave): ({renumber(dof): w for dof, w in terms.items()}, constant)
+        for slave, (terms, constant) in done.items()
+    }
+
+
+def _resolve_one(
+    start: int,
+    by_slave: dict[int, Link],
+    done: dict[int, tuple[dict[int, float], float]],
+    supports: Supports,
+) -> None:
+    """Fill `done[start]`, first resolving the masters that are slaves themselves (a stack, no recursion)."""
+    stack: list[int] = [start]
+    open_: set[int] = set()
+    while stack:
+        slave = stack[-1]
+        waiting = [m for m in by_slave[slave].masters if m in by_slave and m not in done]
+        if slave in done or not waiting:
+            stack.pop()
+            open_.discard(slave)
+            done.setdefault(slave, _substitute(by_slave[slave], done, supports))
+        elif slave in open_:
+            raise ModelError(f"the constraints of {supports.name(slave)} go round in a circle")
+        else:
+            open_.add(slave)
+            stack += waiting
+
+
+def _substitute(
+    link: Link, done: dict[int, tuple[dict[int, float], float]], supports: Supports
+) -> tuple[dict[int, float], float]:
+    """Return the terms of free masters and the constant of one link."""
+    terms: dict[int, float] = {}
+    constant = link.constant
+    for master, weight in zip(link.masters, link.weights, strict=True):
+        if supports.fixed.flat[master]:
+            constant += weight * supports.values.flat[master]
+            continue
+        inner, offset = done.get(master, ({master: 1.0}, 0.0))
+        constant += weight * offset
+        for dof, factor in inner.items():
+            terms[dof] = terms.get(dof, 0.0) + weight * factor
+    return terms, constant
+
+
+def rigid_modes(points: Array, centre: ArrayLike | None = None) -> Array:
+    """Return the six rigid modes (3n, 6): translations x y z, rotations about x y z through `centre`.
+
+    >>> rigid_modes(np.eye(3)).shape
+    (9, 6)
+    """
+    X = points - (points.mean(axis=0) if centre is None else np.asarray(centre))
+    R = np.zeros((len(points), 3, 6))
+    R[:, range(3), range(3)] = 1
+    x, y, z = X.T
+    R[:, 1, 3], R[:, 2, 3] = -z, y
+    R[:, 0, 4], R[:, 2, 4] = z, -x
+    R[:, 0, 5], R[:, 1, 5] = -y, x
+    return R.reshape(-1, 6)
+
+
+__all__: Sequence[str] = ["Link", "Reduction", "Supports", "axis_numbers", "reduction", "rigid_modes"]

@@ -1,0 +1,113 @@
+import errno
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.output import replacing, write_whole
+
+
+def _full(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.fixture
+def old(tmp_path):
+    file = tmp_path / "result.vtu"
+    file.write_bytes(b"old")
+    return file
+
+
+def test_bytes_and_functions_replace_the_old_file(old):
+    write_whole(old, b"one")
+    assert old.read_bytes() == b"one"
+    write_whole(str(old), lambda file: file.writelines([b"t", b"wo"]))
+    assert old.read_bytes() == b"two"
+    assert list(old.parent.iterdir()) == [old]
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_failing_disk_leaves_the_old_file_and_says_how_much_was_needed(old, monkeypatch, call):
+    monkeypatch.setattr(os, call, _full)
+    with pytest.raises(
+        InputError, match=r"result\.vtu: .*No space left.*at least 7 bytes are needed, \d+"
+    ) as error:
+        write_whole(old, b"seven b")
+    assert isinstance(error.value.__cause__, OSError)
+    assert old.read_bytes() == b"old"
+    assert list(old.parent.iterdir()) == [old]
+
+
+def test_a_disk_that_fills_midway_leaves_the_old_file(old):
+    def write(file):
+        file.write(b"half")
+        file.flush()
+        _full()
+
+    with pytest.raises(InputError, match="at least 4 bytes are needed"):
+        write_whole(old, write)
+    assert old.read_bytes() == b"old"
+    assert list(old.parent.iterdir()) == [old]
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, ZeroDivisionError])
+def test_any_interruption_passes_through_and_leaves_the_old_file(old, kind):
+    def write(file):
+        file.write(b"half")
+        raise kind
+
+    with pytest.raises(kind):
+        write_whole(old, write)
+    assert old.read_bytes() == b"old"
+    assert list(old.parent.iterdir()) == [old]
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"there is no folder .*nowhere; create it"):
+        write_whole(tmp_path / "nowhere" / "a.txt", b"")
+
+
+@pytest.mark.parametrize("path", ["folder", "/dev/full"])
+def test_folders_and_devices_are_refused(tmp_path, path):
+    (tmp_path / "folder").mkdir()
+    target = tmp_path / path
+    if not target.exists():
+        pytest.skip(f"no {path} on this system")
+    kind = stat.S_IFMT(target.stat().st_mode)
+    with pytest.raises(InputError, match="a folder or a device, not a file"):
+        write_whole(target, b"x")
+    assert stat.S_IFMT(target.stat().st_mode) == kind
+
+
+def test_a_link_stays_a_link_and_permissions_are_kept(tmp_path):
+    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
+    real.write_bytes(b"old")
+    real.chmod(0o640)
+    link.symlink_to(real)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert real.read_bytes() == b"new"
+    assert stat.S_IMODE(real.stat().st_mode) == 0o640
+
+
+def test_a_new_file_gets_the_permissions_of_the_user(tmp_path):
+    write_whole(tmp_path / "a", b"")
+    (tmp_path / "b").touch()
+    assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+def test_a_relative_name_without_folder_is_written_here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_whole("a.txt", b"here")
+    assert Path("a.txt").read_bytes() == b"here"
+
+
+def test_replacing_keeps_the_ending_that_other_writers_go_by(old):
+    with replacing(old) as temporary:
+        assert temporary.suffix == ".vtu"
+        assert temporary.parent == old.parent
+        temporary.write_bytes(b"new")
+        assert old.read_bytes() == b"old"
+    assert old.read_bytes() == b"new"
