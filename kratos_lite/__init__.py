@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from kratos_lite.errors import InputError, KratosLiteError, MaterialError, MeshError, ModelError, SolveError
     from kratos_lite.generate import annulus, box
+    from kratos_lite.io.files import read, write
     from kratos_lite.loads import BodyForce, Gravity, NodalForces, PointLoad, Pressure, Traction
     from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
     from kratos_lite.mesh import Block, Mesh, Part
@@ -43,6 +44,7 @@ _HOME = {
     ),
     "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
     "kratos_lite.generate": "annulus box",
+    "kratos_lite.io.files": "read write",
     "kratos_lite.loads": "BodyForce Gravity NodalForces PointLoad Pressure Traction",
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.batches import Batch
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import determinant, tabulate
+from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, MeshError, ModelError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.quadrature import Rule
@@ -47,38 +47,37 @@ def check_repeated_nodes(mesh: Mesh) -> None:
             )
 
 
-def check_jacobians(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
+def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[str]:
     """Raise MeshError for elements with det J ≤ 0 at a Gauss point or < 0 at a node.
 
-    det J = 0 at a corner node alone (quarter-point elements) is allowed and noted.
+    `kinds` holds the element class of each block.  det J = 0 at a corner node alone
+    (quarter-point elements) is allowed and noted.
     """
     problems: list[str] = []
     count, flat = 0, 0
-    block_of = _BlockFinder(mesh)
-    for batch in batches:
-        shape, g = batch.element.shape, len(batch.rule)
-        _, dN = tabulate(shape, batch.rule)
-        at_nodes = np.array([shape.dN(xi) for xi in shape.nodes])
-        for chunk in batch.chunks():
-            element = batch.at(mesh.points, chunk)
-            det = determinant(element._jacobian(np.concatenate([dN, at_nodes])))
+    for block, kind in zip(mesh.blocks, kinds, strict=True):
+        shape, g = kind.shape, len(kind.rule)
+        _, dN = tabulate(shape, kind.rule)
+        dN = np.concatenate([dN, [shape.dN(xi) for xi in shape.nodes]])
+        limit = np.where(np.arange(len(dN)) < g, 0.0, -1e-10)
+        step = max(1, 4_000_000 // (72 * len(dN)))
+        for start in range(0, len(block), step):
+            det = kind(mesh.points[block.nodes[start : start + step]]).determinants(dN)
             scale = np.abs(det[:, :g]).mean(axis=1, keepdims=True)
-            limit = np.concatenate([np.zeros(g), np.full(len(at_nodes), -1e-10)]) * scale
-            bad = np.where(np.arange(det.shape[1]) < g, det <= limit, det < limit)
-            flat += int(((np.abs(det) <= 1e-10 * scale)[:, g:]).any(axis=1).sum())
+            bad = np.where(np.arange(len(dN)) < g, det <= limit * scale, det < limit * scale)
+            flat += int((np.abs(det[:, g:]) <= 1e-10 * scale).any(axis=1).sum())
             for e in np.flatnonzero(bad.any(axis=1)):
                 count += 1
                 if len(problems) < MAX_PROBLEMS:
-                    worst = int(np.argmin(det[e]))
-                    block, cell = block_of(int(batch.rows[chunk][e]))
-                    problems.append(_describe_inverted(mesh, block, cell, det[e], worst, g))
+                    problems.append(_describe_inverted(mesh, block, start + int(e), det[e], g))
     if problems:
         more = f"\n… and {count - len(problems)} more" if count > len(problems) else ""
         raise MeshError("\n".join(problems) + more)
     return [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
 
 
-def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, worst: int, g: int) -> str:
+def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
+    worst = int(np.argmin(det))
     where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
     nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
     if (det < 0).all():
@@ -88,18 +87,6 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, worst: i
     else:
         cure = "two of its nodes look swapped or one lies too far off"
     return f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
-
-
-class _BlockFinder:
-    """Find the block and the cell in it of an element row."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.blocks = mesh.blocks
-        self.starts = np.cumsum([0, *(len(block) for block in mesh.blocks)])
-
-    def __call__(self, row: int) -> tuple[Block, int]:
-        b = int(np.searchsorted(self.starts, row, side="right")) - 1
-        return self.blocks[b], row - int(self.starts[b])
 
 
 @lru_cache(maxsize=64)
@@ -136,12 +123,10 @@ def components(n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> Ints:
             return labels
 
 
-def check_supports(mesh: Mesh, batches: Sequence[Batch], supports: Supports) -> None:
+def check_supports(mesh: Mesh, supports: Supports) -> None:
     """Raise ModelError that names the rigid modes which the supports leave free, part by part."""
-    labels = components(mesh.n_nodes, [batch.nodes for batch in batches])
-    used = np.zeros(mesh.n_nodes, dtype=bool)
-    for batch in batches:
-        used[batch.nodes] = True
+    labels = components(mesh.n_nodes, [block.nodes for block in mesh.blocks if len(block)])
+    used = mesh.used_nodes()
     roots = np.unique(labels[used])
     index = np.full(mesh.n_nodes, -1)
     index[roots] = np.arange(len(roots))

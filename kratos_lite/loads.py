@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
-from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Block, Mesh, Where, WhereElements
 
 Array = NDArray[np.float64]
 
@@ -33,28 +33,16 @@ class Load(ABC):
         """Return the nodal forces (n, 3) in N."""
 
 
-def _chosen_elements(mesh: Mesh, where: str | None) -> NDArray[np.bool_] | None:
-    """Return a mask of the elements of a part, or None for all."""
-    if where is None:
-        return None
-    part = mesh.part(where)
-    mask = np.zeros(mesh.n_elements, dtype=bool)
-    mask[part.elements] = True
-    if not mask.any():
-        raise MeshError(f"part {where!r} has no elements; a volume load needs a part with elements")
-    return mask
-
-
 class BodyForce(Load):
     """Force per volume.
 
     Parameters
     ----------
     force : (3,) float, N/m³.
-    where : part whose elements carry it; all if not given.
+    where : elements that carry it: part name, property id or rows; all if not given.
     """
 
-    def __init__(self, force: ArrayLike, where: str | None = None) -> None:
+    def __init__(self, force: ArrayLike, where: WhereElements = None) -> None:
         self.force = _finite(force, "a body force", "(3,) in N/m³")
         self.where = where
 
@@ -65,7 +53,10 @@ class BodyForce(Load):
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
-        mask = _chosen_elements(mesh, self.where)
+        mask = None
+        if self.where is not None:
+            mask = np.zeros(mesh.n_elements, dtype=bool)
+            mask[mesh.elements(self.where)] = True
         for batch in batches:
             b = self.per_volume(batch)
             if not b.any():
@@ -85,7 +76,7 @@ class Gravity(BodyForce):
     Parameters
     ----------
     acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s².
-    where : part whose elements carry it; all if not given.
+    where : elements that carry it: part name, property id or rows; all if not given.
 
     Examples
     --------
@@ -93,7 +84,7 @@ class Gravity(BodyForce):
     array([ 0.  ,  0.  , -9.81])
     """
 
-    def __init__(self, acceleration: ArrayLike, where: str | None = None) -> None:
+    def __init__(self, acceleration: ArrayLike, where: WhereElements = None) -> None:
         self.force = _finite(acceleration, "gravity", "(3,) or (n, 3) in m/s²")
         self.where = where
 
@@ -210,6 +201,40 @@ class NodalForces(Load):
         if self.values.shape != mesh.points.shape:
             raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
         return self.values.copy()
+
+
+class ConditionLoads(Load):
+    """Loads on the conditions of the mesh, as a file states them.
+
+    The load on a condition is its own value plus the one interpolated from its nodes.
+
+    Parameters
+    ----------
+    force : (c, 3) per condition and (n, 3) per node; Pa on faces, N/m on lines, N on points.
+    pressure : (c,) per condition and (n,) per node; Pa, positive against the normal about which
+        the nodes of the condition run counter-clockwise.
+    """
+
+    def __init__(self, force: tuple[Array, Array], pressure: tuple[Array, Array]) -> None:
+        self.force, self.pressure = force, pressure
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        start = 0
+        for block in mesh.conditions:
+            rows = slice(start, start + len(block))
+            start += len(block)
+            if block.shape is None or not len(block):
+                continue
+            X = mesh.points[block.nodes]
+            force = self.force[0][rows, None, :] + self.force[1][block.nodes]
+            if force.any():
+                add_nodal(total, block.nodes, surface_load(block.shape, X, force))
+            pressure = self.pressure[0][rows, None] + self.pressure[1][block.nodes]
+            if pressure.any() and block.shape.cell in ("triangle", "quadrilateral"):
+                add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
+        return total
 
 
 def outward_signs(mesh: Mesh, block: Block) -> Array:

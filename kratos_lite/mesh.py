@@ -17,7 +17,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
+WhereElements: TypeAlias = "str | int | ArrayLike | None"
+"""Elements by part name, by property id, by element rows, or all."""
 
+SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
+"""Names of the sides of the bounding box: axis and end."""
 NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
 
 
@@ -150,16 +154,28 @@ class Mesh:
     # ---- parts -----------------------------------------------------------------------------
 
     def part(self, name: str) -> Part:
-        """Return a part by its full name, or by its last word when that is unique."""
+        """Return a part by its full name, or by its last word when that is unique.
+
+        ``x- x+ y- y+ z- z+`` mean the nodes on the sides of the bounding box where the mesh
+        has no part of that name.
+        """
         if name in self.parts:
             return self.parts[name]
+        if name in SIDES and self.n_nodes:
+            return Part(nodes=self._side(*SIDES[name]))
         ends = [full for full in self.parts if full.rsplit(".", 1)[-1] == name]
         if len(ends) == 1:
             return self.parts[ends[0]]
         if ends:
             raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
         have = ", ".join(self.parts) or "none"
-        raise MeshError(f"there is no part {name!r}; the parts are {have}.{nearest(name, self.parts)}")
+        raise MeshError(f"there is no part {name!r}; the parts are {have} and the sides x- … z+.{nearest(name, self.parts)}")
+
+    def _side(self, axis: int, end: int) -> Ints:
+        x = self.points[:, axis]
+        low, high = float(x.min()), float(x.max())
+        goal = high if end else low
+        return np.flatnonzero(np.abs(x - goal) <= 1e-6 * float(np.ptp(self.points, axis=0).max()))
 
     def nodes(self, where: Where) -> Ints:
         """Return the node rows of a part, of a predicate on the points, or of an array of rows.
@@ -181,6 +197,44 @@ class Mesh:
         if len(rows) and (rows[0] < 0 or rows[-1] >= self.n_nodes):
             raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows[0]} … {rows[-1]}")
         return rows
+
+    def used_nodes(self) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the nodes that belong to an element."""
+        used = np.zeros(self.n_nodes, dtype=bool)
+        for block in self.blocks:
+            used[block.nodes] = True
+        return used
+
+    def elements(self, where: WhereElements = None) -> Ints:
+        """Return the element rows of a part, of a property id, of an array of rows, or of all.
+
+        A part without elements of its own gives the elements that have all their nodes in it.
+        """
+        if where is None:
+            return np.arange(self.n_elements)
+        if isinstance(where, (int, np.integer)) and not isinstance(where, bool):
+            ids = np.concatenate([NO_ROWS, *(block.properties for block in self.blocks)])
+            rows = np.flatnonzero(ids == where)
+            if not len(rows):
+                raise MeshError(f"no element has property {where}; the properties are {np.unique(ids).tolist()}")
+            return rows
+        if isinstance(where, str):
+            part = self.part(where)
+            rows = part.elements if len(part.elements) else self._elements_among(part.nodes)
+            if not len(rows):
+                raise MeshError(f"part {where!r} has no elements")
+            return rows
+        rows = np.asarray(where)
+        if rows.dtype.kind not in "iu" or rows.ndim != 1:
+            raise MeshError("elements are chosen by part name, property id or an array of integer rows")
+        if len(rows) and (rows.min() < 0 or rows.max() >= self.n_elements):
+            raise MeshError(f"element rows must lie in 0 … {self.n_elements - 1}; got {rows.min()} … {rows.max()}")
+        return rows.astype(np.int64)
+
+    def _elements_among(self, nodes: Ints) -> Ints:
+        inside = np.zeros(self.n_nodes, dtype=bool)
+        inside[nodes] = True
+        return np.flatnonzero(np.concatenate([np.zeros(0, bool), *(inside[b.nodes].all(axis=1) for b in self.blocks)]))
 
     # ---- faces -----------------------------------------------------------------------------
 

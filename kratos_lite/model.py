@@ -12,10 +12,10 @@ from kratos_lite import checks
 from kratos_lite.assembly import Progress
 from kratos_lite.batches import Batch
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Load
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Mesh, Where
+from kratos_lite.mesh import Block, Mesh, Where, WhereElements
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.result import Result
 from kratos_lite.statics import solve_static
@@ -65,33 +65,19 @@ class Model:
 
     # ---- what the model is made of -----------------------------------------------------------
 
-    def _elements(self, where: str | int | ArrayLike | None) -> NDArray[np.int64]:
-        """Return element rows of a part, of a property id, of an array of rows, or of all."""
-        if where is None:
-            return np.arange(self.mesh.n_elements)
-        if isinstance(where, str):
-            rows = self.mesh.part(where).elements
-            if not len(rows):
-                raise MeshError(f"part {where!r} has no elements")
-            return rows
-        if isinstance(where, (int, np.integer)):
-            ids = np.concatenate([np.zeros(0), *(block.properties for block in self.mesh.blocks)])
-            return np.flatnonzero(ids == where)
-        return np.asarray(where, dtype=np.int64)
-
-    def assign(self, material: LinearMaterial, where: str | int | ArrayLike | None = None) -> None:
+    def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
         """Give elements a material: all, those of a part, of a property id, or of given rows."""
         if not isinstance(material, LinearMaterial):
             raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
-        rows = self._elements(where)
+        rows = self.mesh.elements(where)
         self._materials.append(material)
         self._material_of[rows] = len(self._materials) - 1
 
-    def use_rule(self, rule: Rule | int, where: str | int | ArrayLike | None = None) -> None:
+    def use_rule(self, rule: Rule | int, where: WhereElements = None) -> None:
         """Replace the quadrature rule of elements by a Rule or an INTEGRATION_ORDER 1 … 5."""
         number = len(self._rules)
         self._rules[number] = rule
-        self._rule_of[self._elements(where)] = number
+        self._rule_of[self.mesh.elements(where)] = number
 
     def fix(self, where: Where, axes: str = "xyz", value: ArrayLike = 0.0, *, override: bool = False) -> None:
         """Prescribe the displacement of nodes.
@@ -149,14 +135,14 @@ class Model:
             raise InputError(f"the initial displacement must be finite with shape {self.mesh.points.shape}")
         self.initial_displacement = u0
 
-    def add_prestress(self, stress: ArrayLike, where: str | int | ArrayLike | None = None) -> None:
+    def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
         """Add a stress (6,) or (m, 6) in Pa that elements carry before they are strained."""
         s = np.asarray(stress, dtype=float)
         if s.shape[-1:] != (6,) or not np.isfinite(s).all():
             raise InputError(f"a prestress has six finite components xx yy zz xy yz zx; got {stress}")
         if self.prestress is None:
             self.prestress = np.zeros((self.mesh.n_elements, 6))
-        self.prestress[self._elements(where)] += s
+        self.prestress[self.mesh.elements(where)] += s
 
     # ---- batches -------------------------------------------------------------------------------
 
@@ -206,6 +192,18 @@ class Model:
 
     # ---- solving -------------------------------------------------------------------------------
 
+    def check_geometry(self) -> list[str]:
+        """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
+
+        Raises
+        ------
+        MeshError, InputError
+            With every element that is wrong.
+        """
+        checks.check_points(self.mesh)
+        checks.check_repeated_nodes(self.mesh)
+        return checks.check_jacobians(self.mesh, [self._element_class(block) for block in self.mesh.blocks])
+
     def check(self) -> list[str]:
         """Check the model as `solve` does, without solving; return the warnings.
 
@@ -214,13 +212,14 @@ class Model:
         MeshError, ModelError, InputError
             With every element or part that is wrong.
         """
-        mesh, batches = self.mesh, self.batches()
-        checks.check_points(mesh)
-        checks.check_repeated_nodes(mesh)
-        used = np.zeros(mesh.n_nodes, dtype=bool)
-        for batch in batches:
-            used[batch.nodes] = True
-        warnings = checks.check_jacobians(mesh, batches)
+        return self.checked_batches()[1]
+
+    def checked_batches(self) -> tuple[list[Batch], list[str]]:
+        """Return the batches and the warnings of a model that passes all checks of `check`."""
+        mesh = self.mesh
+        warnings = self.check_geometry()
+        batches = self.batches()
+        used = mesh.used_nodes()
         warnings += checks.check_rules(batches)
         warnings += checks.check_coincident(mesh, used)
         warnings += checks.check_scales(mesh, batches)
@@ -228,8 +227,8 @@ class Model:
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
-        checks.check_supports(mesh, batches, self.supports)
-        return warnings
+        checks.check_supports(mesh, self.supports)
+        return batches, warnings
 
     def solve(
         self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None

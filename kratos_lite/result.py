@@ -206,6 +206,10 @@ class Result:
                     largest, row = float(mises.max()), int(batch.rows[chunk][int(mises.argmax())])
         return energy, largest, row
 
+    def totals(self) -> tuple[float, float, int]:
+        """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, its element row."""
+        return self._totals
+
     def energy(self) -> float:
         """Return the strain energy ½ ∫ ε:C:ε dV in J."""
         return self._totals[0]

@@ -49,8 +49,7 @@ def solve_static(
     solvers.choose(solver, 0)
     phase = Phases()
     with phase("check"):
-        warnings = model.check()
-        batches = model.batches()
+        batches, warnings = model.checked_batches()
     with phase("load"):
         loads = external_loads(model, batches)
         forces = loads - initial_loads(model, batches)

@@ -136,6 +136,10 @@ class KinematicLinear:
         flat = np.swapaxes(self.X, -1, -2) @ dN.transpose(1, 0, 2).reshape(n, 3 * g)
         return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
 
+    def determinants(self, dN: Array) -> Array:
+        """Return det J for tabulated dN (g, n, 3) as (..., g)."""
+        return determinant(self._jacobian(dN))
+
     def J(self, xi: ArrayLike) -> Array:
         """Return the Jacobian dX_i/dxi_j at one point xi (3,) as (..., 3, 3)."""
         return self._jacobian(self.dN(xi)[None])[..., 0, :, :]

@@ -77,7 +77,7 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
             if earlier != value:
                 source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
             elif at != line:
-                files.note(source, start, f"{name.decode('ascii')} of node {node} is repeated from line {at}")
+                source.note(start, f"{name.decode('ascii')} of node {node} is repeated from line {at}")
         for name in set(run.columns[1]) & VECTORS:
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")

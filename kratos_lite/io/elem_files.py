@@ -66,7 +66,7 @@ class ElemFiles:
         file = self._find(ending)
         if file is not None:
             try:
-                self.sources[ending] = source = Source(file, self.problems)
+                self.sources[ending] = source = Source(file, self.problems, self.notes)
             except InputError as error:
                 self.problems.add(str(error))
             else:
@@ -84,10 +84,6 @@ class ElemFiles:
         else:
             self.notes.append(Note(0, f"there is no file {plain}"))
         return None
-
-    def note(self, source: Source, start: int, text: str) -> None:
-        """Note something odd at an offset of a file."""
-        self.notes.append(Note(int(source.lines([start])[0]), f"{source.name}: {text}"))
 
     def no_node(self, node: int) -> str:
         """Return the message for a node id that no node has."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import Problems, nearest
+from kratos_lite.io.document import Note
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
 from kratos_lite.mesh import Floats, Ints
 
@@ -100,12 +101,13 @@ class Source:
     Parameters
     ----------
     path : the file, plain or gzipped.
-    problems : collects what is wrong.
+    problems, notes : collect what is wrong and what is odd.
     """
 
-    def __init__(self, path: Path, problems: Problems) -> None:
+    def __init__(self, path: Path, problems: Problems, notes: list[Note]) -> None:
         self.name = str(path)
         self.problems = problems
+        self.notes = notes
         self.data = blank_comments(read_bytes(path))
 
     @cached_property
@@ -121,6 +123,10 @@ class Source:
         line = int(self.lines([start])[0])
         column = start - (int(self._line_ends[line - 2]) if line > 1 else -1)
         self.problems.add(f"{self.name}:{line}:{column}: {message}")
+
+    def note(self, start: int, text: str) -> None:
+        """Note something odd at an offset."""
+        self.notes.append(Note(int(self.lines([start])[0]), f"{self.name}: {text}"))
 
     def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.
@@ -148,7 +154,7 @@ class Source:
     ) -> None:
         """Ask the exact reader of single tokens about the doubtful ones."""
         tokens = text.split() if doubtful.any() else []
-        for i in np.flatnonzero(doubtful):
+        for i in np.flatnonzero(doubtful).tolist():
             try:
                 read(tokens[i])
             except ValueError as reason:
@@ -170,7 +176,9 @@ class Source:
             elif run.starts:
                 run.head = opened.head if opened else ()
                 runs.append(run)
-            elif opened and (close := CLOSE.match(self.data, position)):
+            elif close := CLOSE.match(self.data, position):
+                if not opened:  # GiD templates wrote the end of a list even where they left out its beginning
+                    self.note(position, "'])' closes no list; ignored")
                 opened, after = None, self._skip(close.end())
             else:
                 after, stay = self._explain(position, forms, opened)
@@ -200,7 +208,7 @@ class Source:
         place = max(end for end, _ in ends)
         wanted = list(dict.fromkeys(name for end, names in ends if end == place for name in names))
         found = _FOUND.match(self.data, place)
-        word = found.group().decode("ascii", "backslashreplace")[:60] if found else ""
+        word = found.group()[:60] if found else b""
         if place == start and not opened:
             self.add(place, _unknown(word, forms))
         else:
@@ -217,8 +225,8 @@ class Source:
             if not found:
                 return place, [many] if many else [name]
             place = found.end()
-            # After "[1, 2," another value is the likelier wish than the "]" that would also do.
-            many = name if pattern.pattern in _MANY and found.group().rstrip().endswith(b",") else ""
+            # After "[" and "[1, 2," a value is the likelier wish than the "]" that would also do.
+            many = name if pattern.pattern in _MANY and found.group().rstrip()[-1:] in b"," else ""
         return place, ["the end of the statement"]
 
     def _opened_at(self, opened: Run | None) -> str:
@@ -228,24 +236,30 @@ class Source:
 _MANY = tuple(WORDS[word][0] for word in ("<ids>", "<reals>", "<rows>"))
 
 
-def _unknown(word: str, forms: Sequence[Form]) -> str:
-    if word in HOME:
-        hint = f" {word} statements of other kinds belong in {HOME[word]}."
-    elif word == ",":
+def _unknown(word: bytes, forms: Sequence[Form]) -> str:
+    text = word.decode("ascii", "replace")
+    if text in HOME:
+        hint = f" {text} statements of other kinds belong in {HOME[text]}."
+    elif text == ",":
         hint = " A decimal comma? Write 1.0."
     else:
-        hint = nearest(word, KEYWORDS)
-    return f"unknown statement {word!r}; expected {' or '.join(map(str, forms))}.{hint}"
+        hint = nearest(text, KEYWORDS)
+    return f"unknown statement {_quoted(word)}; expected {' or '.join(map(str, forms))}.{hint}"
 
 
-def _unexpected(word: str, wanted: Sequence[str]) -> str:
+def _unexpected(word: bytes, wanted: Sequence[str]) -> str:
     if not word:
         return f"the file ends inside a statement; expected {' or '.join(wanted)}"
-    for kind, read in (("an id", integer), ("an integer", integer), ("a number", real)):
-        if kind in wanted and (word[0].isalnum() or word[0] in "+-."):
+    for kind, read in (("an id", integer), ("a number", real)):
+        if kind in wanted and re.match(rb"[\w.+-]", word):
             try:
-                read(word.encode())
+                read(word)
             except ValueError as reason:
                 return str(reason)
-    hint = "; a decimal comma? write 1.0" if word == "," else ""
-    return f"found {word!r}; expected {' or '.join(wanted)}{hint}"
+    hint = "; a decimal comma? write 1.0" if word == b"," else ""
+    return f"found {_quoted(word)}; expected {' or '.join(wanted)}{hint}"
+
+
+def _quoted(word: bytes) -> str:
+    """Return the word in quotes, with escapes for what is not printable ASCII."""
+    return repr(word)[1:]

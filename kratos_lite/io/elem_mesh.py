@@ -40,9 +40,11 @@ def _nodes(files: ElemFiles) -> Mesh:
     name = files.sources[".elem"].name if ".elem" in files.sources else files.stem
     source = files.sources.get(".node")
     columns, starts = _joined(files.runs[".node"], 4)
+    before = files.problems.count
     if source is None or not starts:
-        if source is not None and not files.problems:
+        if source is not None and not before:
             source.add(0, "there are no nodes; expected NODES = NodesList([[id, x, y, z], …])")
+        files.nodes_known = False
         return Mesh(np.zeros((0, 3)), source=name)
     ids = source.integers(columns[0], starts)
     points = np.column_stack([source.reals(column, starts) for column in columns[1:]])
@@ -51,9 +53,10 @@ def _nodes(files: ElemFiles) -> Mesh:
         keep[again] = False
         line = source.lines([starts[first]])[0]
         if np.array_equal(points[first], points[again]):
-            files.note(source, starts[again], f"node {ids[again]} is repeated from line {line}")
+            source.note(starts[again], f"node {ids[again]} is repeated from line {line}")
         else:
             source.add(starts[again], twice(f"node {ids[again]}", line, " with other coordinates"))
+    files.nodes_known &= files.problems.count == before
     return Mesh(points[keep], node_ids=ids[keep], source=name)
 
 
@@ -94,16 +97,19 @@ def _connect(
 
     widths = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
-    for i in np.flatnonzero(widths != width):
+    for i in np.flatnonzero(widths != width).tolist():
         add(i, f"has {widths[i]} nodes; expected {width}")
     if (widths != width).any():
         return
+    before = files.problems.count
     nodes = source.integers(bodies, np.repeat(starts, width)).reshape(-1, width)
+    if files.problems.count > before:
+        return
     block.nodes = mesh.node_rows(nodes).astype(np.int32)
     ordered = np.sort(nodes, axis=1)
-    for i in np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1)):
+    for i in np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1)).tolist():
         add(i, f"names a node twice; expected {width} different nodes")
-    for i, k in np.argwhere(block.nodes < 0) if files.nodes_known else ():
+    for i, k in np.argwhere(block.nodes < 0).tolist() if files.nodes_known else ():
         add(i, f"refers to a missing node: {files.no_node(nodes[i, k])}")
 
 

@@ -1,0 +1,141 @@
+"""The command line: ``kratos-lite solve | info | check | convert``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from kratos_lite import __version__
+
+EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog="kratos-lite",
+        description="Finite elements for solids: from an input file to displacements, reactions and stresses.",
+    )
+    parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_solve(commands)
+    _add(
+        commands,
+        "info",
+        "describe a file without solving it",
+        "kratos-lite info beam.mdpa",
+    ).add_argument("input", help=INPUT)
+    _add(
+        commands,
+        "check",
+        "report every problem of a file, or of the elements and materials in a Python file",
+        "kratos-lite check beam.mdpa\n  kratos-lite check my_element.py",
+    ).add_argument("input", help="an input file, or a .py file that defines elements or materials")
+    convert = _add(
+        commands,
+        "convert",
+        "convert a model file to another format",
+        "kratos-lite convert beam.elem beam.mdpa\n  kratos-lite convert beam.mdpa beam.vtu",
+    )
+    convert.add_argument("input", help=INPUT)
+    convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, by its ending")
+    return parser
+
+
+INPUT = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
+SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
+  kratos-lite solve ProjectParameters.json --json result.json
+  kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
+      --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
+
+
+def _add(commands: object, name: str, text: str, example: str) -> argparse.ArgumentParser:
+    add = commands.add_parser  # type: ignore[attr-defined]
+    command: argparse.ArgumentParser = add(
+        name,
+        help=text,
+        description=text[0].upper() + text[1:] + ".",
+        epilog=f"examples:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument("--lenient", action="store_true", help="accept .mdpa rows that are broken over lines")
+    command.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    return command
+
+
+def _add_solve(commands: object) -> None:
+    solve = _add(commands, "solve", "solve a static linear model and print a summary", SOLVE_EXAMPLES)
+    solve.add_argument("input", help=INPUT)
+    out = solve.add_argument_group("output")
+    out.add_argument("-o", "--output", metavar="OUT.vtu", help="results for ParaView (or a format of meshio)")
+    out.add_argument("--json", metavar="OUT.json", help="summary, displacements and reactions by node id")
+    out.add_argument("--picture", metavar="OUT.png", help="picture of the deformed body")
+    given = solve.add_argument_group(
+        "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
+    )
+    repeat = {"action": "append", "default": []}
+    given.add_argument(
+        "--material",
+        metavar="[PART:][LAW:]E=…,nu=…",
+        help="constants in SI units; replaces the materials of the file",
+        **repeat,  # type: ignore[arg-type]
+    )
+    for option, meta, text in (
+        ("--fix", "PART:xyz[=VALUE]", "prescribe displacements in m along the axes named, 0 if no value is given"),
+        ("--gravity", "X,Y,Z", "acceleration in m/s²"),
+        ("--traction", "PART:X,Y,Z", "force per area in Pa"),
+        ("--pressure", "PART:P", "pressure in Pa, positive into the body"),
+        ("--point-load", "PART:X,Y,Z", "force in N on each node of the part"),
+    ):
+        given.add_argument(option, metavar=meta, help=text, **repeat)  # type: ignore[arg-type]
+    how = solve.add_argument_group("solver")
+    how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
+    how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
+    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code: 0, 1 for a defect of ours, 2 for bad input, 130 for Ctrl-C."""
+    options = build_parser().parse_args(_join_negative(sys.argv[1:] if arguments is None else arguments))
+    from kratos_lite.cli import commands
+    from kratos_lite.errors import KratosLiteError
+
+    try:
+        return int(getattr(commands, options.command)(options))
+    except KratosLiteError as error:
+        if options.debug:
+            raise
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted; nothing half-written is left", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except MemoryError:
+        if options.debug:
+            raise
+        print("error: not enough memory; use a coarser mesh or --solver amg", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except Exception as error:
+        if options.debug:
+            raise
+        print(
+            f"internal error: {type(error).__name__}: {error}\n"
+            "This is a defect of kratos-lite; please report it with the output of --debug.",
+            file=sys.stderr,
+        )
+        return EXIT_INTERNAL
+
+
+def _join_negative(arguments: Sequence[str]) -> list[str]:
+    """Join ``--gravity -9.81,0,0`` to one word, which argparse would take for another option."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and joined[-1] == "--gravity" and word[:1] == "-":
+            joined[-1] += "=" + word
+        else:
+            joined.append(word)
+    return joined

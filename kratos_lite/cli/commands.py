@@ -1,0 +1,161 @@
+"""What each command does."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from kratos_lite.cli.options import apply
+from kratos_lite.errors import InputError, ModelError
+
+if TYPE_CHECKING:
+    from kratos_lite.io.document import Document
+    from kratos_lite.result import Result
+
+
+class TerminalProgress:
+    """Show the phase on a terminal once the work has taken more than two seconds."""
+
+    def __init__(self) -> None:
+        self.start = self.last = perf_counter()
+        self.shown = False
+        self.wanted = sys.stderr.isatty()
+
+    def __call__(self, phase: str, share: float) -> None:
+        """Show a phase and the share of it that is done, at most five times a second."""
+        now = perf_counter()
+        if self.wanted and now - self.start > 2 and now - self.last > 0.2:
+            self.last, self.shown = now, True
+            print(f"\r{phase:<10} {share:5.0%}  {now - self.start:6.1f} s", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Wipe the line."""
+        if self.shown:
+            print("\r" + " " * 40 + "\r", end="", file=sys.stderr, flush=True)
+
+
+def solve(options: Namespace) -> int:
+    """Solve a file, write what was asked for, print the summary."""
+    start = perf_counter()
+    for path in (options.output, options.json, options.picture):
+        if path and not Path(path).parent.is_dir():
+            raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
+    solver, tolerance = options.solver or "auto", options.tolerance or 1e-10
+    project = None
+    if Path(options.input).suffix.lower() == ".json":
+        from kratos_lite.io.project import read_project
+
+        project = read_project(options.input)
+        model = project.model
+        solver = options.solver or project.solver
+        tolerance = options.tolerance or project.tolerance
+    else:
+        from kratos_lite.io.files import read
+
+        model = read(options.input, materials=not options.material, strict=not options.lenient)
+    apply(model, options)
+    read_seconds = perf_counter() - start
+    progress = TerminalProgress()
+    try:
+        result = model.solve(solver, tolerance, progress)
+    finally:
+        progress.close()
+    result.report.seconds = {"read": read_seconds, **result.report.seconds}
+    outputs = _write(result, options, project)
+    if not options.quiet:
+        print(result)
+        for path in outputs:
+            print(f"{'written':<22}{path}")
+    if project is not None:
+        for line in project.evaluate(result):
+            print(line)
+    return 0
+
+
+def _write(result: Result, options: Namespace, project: object) -> list[str]:
+    """Write the files asked for on the command line or in the run file; return their names."""
+    start = perf_counter()
+    given = getattr(project, "output", {}) or {}
+    written = []
+    for key, writer in (("output", result.save), ("json", result.save), ("picture", result.plot)):
+        path = getattr(options, key) or given.get(key)
+        if path:
+            if key == "json" and not str(path).endswith(".json"):
+                from kratos_lite.io.results import write_json
+
+                write_json(path, result)
+            else:
+                writer(path)
+            written.append(str(path))
+    if written:
+        result.report.seconds["write"] = perf_counter() - start
+    return written
+
+
+def info(options: Namespace) -> int:
+    """Describe a file."""
+    from kratos_lite.io.describe import describe
+
+    print(describe(_document(options)))
+    return 0
+
+
+def _document(options: Namespace) -> Document:
+    from kratos_lite.io.files import read_document
+
+    return read_document(options.input, strict=not options.lenient)
+
+
+def check(options: Namespace) -> int:
+    """Report every problem of a file."""
+    path = Path(options.input)
+    if path.suffix == ".py":
+        return _check_python(path)
+    if path.suffix.lower() == ".json":
+        from kratos_lite.io.project import read_project
+
+        model = read_project(path).model
+    else:
+        from kratos_lite.io.kratos import model_from
+
+        model = model_from(_document(options))
+    warnings, needs = model.check_geometry(), []
+    try:
+        warnings = model.check()
+    except ModelError as error:
+        needs.append(str(error))
+    print(f"{path}: {model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements, no errors")
+    for text in (*warnings, *model.notes):
+        print(f"note     {text}")
+    for text in needs:
+        print(f"to solve {text}")
+    return 0
+
+
+def _check_python(path: Path) -> int:
+    from kratos_lite.testing import run_file
+
+    passed = True
+    for name, findings in run_file(path):
+        bad = [finding for finding in findings if not finding.passed]
+        passed &= not bad
+        print(f"{name}: {len(findings) - len(bad)} of {len(findings)} checks passed")
+        for finding in findings:
+            print(f"  {finding}")
+    return 0 if passed else 2
+
+
+def convert(options: Namespace) -> int:
+    """Convert a file."""
+    from kratos_lite.io.files import write_document
+
+    document = _document(options)
+    lost = write_document(options.output, document)
+    mesh = document.mesh
+    print(f"{options.output}: {mesh.n_nodes} nodes, {mesh.n_elements} elements, {len(mesh.parts)} parts")
+    for text in (*lost, *document.notes):
+        print(f"note     {text}")
+    return 0

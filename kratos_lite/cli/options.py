@@ -1,0 +1,108 @@
+"""Options of the command line that describe a model: materials, supports and loads in words."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
+
+from kratos_lite.errors import InputError
+
+if TYPE_CHECKING:
+    from kratos_lite.materials import LinearMaterial
+    from kratos_lite.model import Model
+
+
+def number(text: str, option: str) -> float:
+    """Return a finite number or say which option holds what instead."""
+    from math import isfinite
+
+    try:
+        value = float(text) if "_" not in text else float("nan")
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise InputError(f"{option}: {text!r} is not a finite number such as 1.5 or 2e9")
+    return value
+
+
+def vector(text: str, option: str) -> list[float]:
+    """Return three numbers.
+
+    >>> vector("0,0,-9.81", "--gravity")
+    [0.0, 0.0, -9.81]
+    """
+    words = text.split(",")
+    if len(words) != 3:
+        raise InputError(f"{option}: three numbers X,Y,Z are needed; got {text!r}")
+    return [number(word, option) for word in words]
+
+
+def split_part(text: str, option: str, example: str) -> tuple[str, str]:
+    """Split ``PART:rest`` at the last colon."""
+    part, colon, rest = text.rpartition(":")
+    if not (part and colon and rest):
+        raise InputError(f"{option}: expected {example}; got {text!r}")
+    return part, rest
+
+
+def material(text: str) -> tuple[str | None, LinearMaterial]:
+    """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
+
+    >>> material("steel:E=210e9,nu=0.3")
+    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
+    """
+    from kratos_lite.errors import nearest
+    from kratos_lite.materials import MATERIALS
+
+    option = f"--material {text}"
+    *names, constants = text.split(":")
+    part, law = None, "Isotropic3D"
+    for name in names:
+        if name in MATERIALS:
+            law = name
+        elif part is None:
+            part = name
+        else:
+            raise InputError(f"{option}: {name!r} is no material;{nearest(name, MATERIALS)}")
+    kind: Any = MATERIALS[law]
+    known = list(kind.variables)
+    values: dict[str, float] = {}
+    for pair in constants.split(","):
+        key, equals, value = pair.partition("=")
+        field = {v: k for k, v in kind.variables.items()}.get(key.strip(), key.strip())
+        if not equals or field not in known:
+            raise InputError(f"{option}: constants of {law} are {', '.join(known)}; got {pair!r}")
+        if field in values:
+            raise InputError(f"{option}: {field} is given twice")
+        values[field] = number(value, option)
+    missing = [k for k in known if k not in values and k != "density"]
+    if missing:
+        raise InputError(f"{option}: {law} also needs {', '.join(missing)}")
+    return part, kind(**values)
+
+
+def apply(model: Model, options: Namespace) -> None:
+    """Add the materials, supports and loads of the command line to a model."""
+    from kratos_lite.loads import Gravity, PointLoad, Pressure, Traction
+
+    for text in options.material:
+        part, law = material(text)
+        where: str | int | None = part
+        if part is not None and part.isdecimal() and part not in model.mesh.parts:
+            where = int(part)
+        model.assign(law, where)
+    for text in options.fix:
+        part, rest = split_part(text, "--fix", "PART:axes or PART:axes=value")
+        axes, equals, value = rest.partition("=")
+        model.fix(part, axes, number(value, "--fix") if equals else 0.0)
+    for text in options.gravity:
+        model.add(Gravity(vector(text, "--gravity")))
+    for text in options.traction:
+        part, rest = split_part(text, "--traction", "PART:X,Y,Z")
+        model.add(Traction(part, vector(rest, "--traction")))
+    for text in options.pressure:
+        part, rest = split_part(text, "--pressure", "PART:P")
+        model.add(Pressure(part, number(rest, "--pressure")))
+    for text in options.point_load:
+        part, rest = split_part(text, "--point-load", "PART:X,Y,Z")
+        model.add(PointLoad(part, vector(rest, "--point-load")))

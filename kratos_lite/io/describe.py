@@ -1,0 +1,83 @@
+"""Describe: a document in words, for ``kratos-lite info``."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.io.document import Data, Document
+from kratos_lite.mesh import Block
+
+
+def describe(document: Document) -> str:
+    """Return a table of what a document holds, with line numbers of what will not be used."""
+    mesh = document.mesh
+    lines = [f"{'file':<12}{mesh.source}", f"{'nodes':<12}{mesh.n_nodes}"]
+    if mesh.n_nodes:
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        lines.append(f"{'extent':<12}" + " × ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high, strict=True)) + " m")
+    lines += _blocks("elements", mesh.blocks, known=True)
+    lines += _blocks("conditions", mesh.conditions)
+    lines += _blocks("geometries", document.geometries)
+    for properties in document.properties.values():
+        values = ", ".join(f"{name} {_short(value)}" for name, value in properties.values.items()) or "empty"
+        lines.append(f"{'properties':<12}{properties.id}: {values}{_at(properties.line)}")
+    for title, group in (
+        ("nodal data", document.nodal_data),
+        ("element data", document.element_data),
+        ("cond. data", document.condition_data),
+    ):
+        lines += [f"{title:<13}{_data(data)}" for data in group]
+    if document.constraints:
+        lines.append(f"{'constraints':<12} {len(document.constraints)} multi-point constraints")
+    if document.tables:
+        lines.append(f"{'tables':<12}{len(document.tables)}, not used")
+    lines += [f"{'data':<12}{name} {_short(value)}" for name, value in document.model_data.items()]
+    lines += _parts(document)
+    lines += [f"{'note':<12}{note}" for note in document.notes]
+    return "\n".join(lines)
+
+
+def _at(line: int) -> str:
+    return f" (line {line})" if line else ""
+
+
+def _short(value: Any) -> str:
+    array = np.asarray(value)
+    if array.ndim and array.dtype.kind == "f":
+        return np.array2string(array, separator=", ", formatter={"float_kind": lambda x: f"{x:g}"})
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _blocks(title: str, blocks: Sequence[Block], known: bool = False) -> Iterable[str]:
+    counts: Counter[str] = Counter()
+    for block in blocks:
+        counts[block.name] += len(block)
+    for name, count in counts.items():
+        if count:
+            remark = ""
+            if known and name not in ELEMENTS:
+                remark = ", an element that kratos_lite cannot solve"
+            elif known and ELEMENTS[name].__name__ != name:
+                remark = f", solved as {ELEMENTS[name].__name__}"
+            yield f"{title:<12}{count} {name}{remark}"
+    empty = sum(1 for count in counts.values() if not count)
+    if empty:
+        yield f"{title:<12}{empty} empty blocks of other kinds"
+
+
+def _data(data: Data) -> str:
+    fixed = int(data.fixed.sum())
+    return f"{data.variable}: {len(data.ids)} values, {fixed} fixed{_at(data.line)}"
+
+
+def _parts(document: Document) -> Iterable[str]:
+    for name, part in document.mesh.parts.items():
+        indent = "  " * name.count(".")
+        sizes = {"nodes": part.nodes, "elements": part.elements, "conditions": part.conditions}
+        words = ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
+        yield f"{'part':<12}{indent}{name.rsplit('.', 1)[-1]}: {words}"

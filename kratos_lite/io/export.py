@@ -1,0 +1,126 @@
+"""From a Model to a Document, so that it can be written as `.mdpa`."""
+
+from __future__ import annotations
+
+from dataclasses import fields as constants_of
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
+from kratos_lite.loads import Gravity
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Block, Mesh, Part
+from kratos_lite.model import Model
+from kratos_lite.shapes import Point1
+
+KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": "LinearElasticOrthotropic3DLaw"}
+
+
+def document_from(model: Model) -> Document:
+    """Return a document that means the same model to Kratos and to kratos_lite.
+
+    Every material becomes a Properties block, gravity on the whole body its VOLUME_ACCELERATION;
+    all other loads become the point loads that they put on the nodes.
+    """
+    for what, given in (("prestress", model.prestress), ("initial displacement", model.initial_displacement)):
+        if given is not None:
+            raise InputError(f"a {what} cannot be written to .mdpa")
+    mesh = model.mesh
+    gravity, others = _split_loads(model)
+    numbers, properties = _properties(model, gravity)
+    blocks, start = [], 0
+    for block in mesh.blocks:
+        rows = slice(start, start + len(block))
+        start += len(block)
+        blocks.append(Block(block.name, block.nodes, block.ids, numbers[rows], block.shape))
+    forces = np.zeros_like(mesh.points)
+    for load in others:
+        forces += load.forces(mesh, model.batches())
+    conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
+    copy = Mesh(
+        mesh.points, blocks, node_ids=mesh.node_ids, conditions=conditions, parts=_parts(mesh), source=mesh.source
+    )
+    document = Document(copy, properties, nodal_data=[*_fixed(model), *data], constraints=_links(model))
+    if mesh.conditions:
+        document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
+    return document
+
+
+def _split_loads(model: Model) -> tuple[np.ndarray[Any, Any], list[Any]]:
+    """Return the gravity that acts on the whole body and the other loads."""
+    whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and g.force.ndim == 1]
+    gravity = sum((g.force for g in whole), np.zeros(3))
+    return gravity, [load for load in model.loads if load not in whole]
+
+
+def _properties(model: Model, gravity: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], dict[int, Properties]]:
+    """Return the property id of each element, one per material, and the Properties."""
+    numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
+    found: dict[int, Properties] = {}
+    materials: list[LinearMaterial] = []
+    for batch in model.batches():
+        if batch.rule is not batch.element.rule:
+            raise InputError("a model with replaced quadrature rules cannot be written to .mdpa")
+        if batch.material not in materials:
+            materials.append(batch.material)
+        number = materials.index(batch.material) + 1
+        numbers[batch.rows] = number
+        found[number] = Properties(number, _values(batch.material, gravity))
+    return numbers, found
+
+
+def _values(material: LinearMaterial, gravity: np.ndarray[Any, Any]) -> dict[str, Any]:
+    name = type(material).__name__
+    if name not in KRATOS_LAW:
+        raise InputError(f"material {name} has no name in Kratos; .mdpa files hold {', '.join(KRATOS_LAW)}")
+    constants = [item.name for item in constants_of(material)]  # type: ignore[arg-type]
+    values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
+    values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
+    if gravity.any():
+        values["VOLUME_ACCELERATION"] = gravity
+    return values
+
+
+def _fixed(model: Model) -> list[Data]:
+    found = []
+    for axis, letter in enumerate("XYZ"):
+        rows = np.flatnonzero(model.supports.fixed[:, axis])
+        if len(rows):
+            values = model.supports.values[rows, axis]
+            ids = model.mesh.node_ids[rows]
+            found.append(Data(f"DISPLACEMENT_{letter}", ids, np.ones(len(rows), dtype=bool), values))
+    return found
+
+
+def _point_loads(mesh: Mesh, forces: np.ndarray[Any, Any], properties: int) -> tuple[list[Block], list[Data]]:
+    rows = np.flatnonzero((forces != 0).any(axis=1))
+    if not len(rows):
+        return [], []
+    ids = np.arange(1, len(rows) + 1)
+    block = Block(
+        "PointLoadCondition3D1N", rows[:, None].astype(np.int32), ids, np.full(len(rows), properties), Point1
+    )
+    free = np.zeros(len(rows), dtype=bool)
+    names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
+    return [block], [Data(n, mesh.node_ids[rows], free, forces[rows, i]) for i, n in enumerate(names)]
+
+
+def _parts(mesh: Mesh) -> dict[str, Part]:
+    """Return the parts with names that Kratos can read (``z+`` becomes ``z_plus``)."""
+    rename = {name: name.replace("+", "_plus").replace("-", "_minus") for name in mesh.parts}
+    return {
+        rename[name]: Part(nodes=part.nodes, elements=part.elements, properties=())
+        for name, part in mesh.parts.items()
+    }
+
+
+def _links(model: Model) -> list[Constraint]:
+    def dof(number: int) -> tuple[int, str]:
+        return int(model.mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
+
+    return [
+        Constraint(i, dof(link.slave), tuple(map(dof, link.masters)), link.weights, link.constant)
+        for i, link in enumerate(model.supports.links, start=1)
+    ]

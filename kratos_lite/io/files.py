@@ -1,0 +1,130 @@
+"""Files: read a model and write models, meshes and results, by the ending of the file name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kratos_lite.errors import InputError
+
+if TYPE_CHECKING:
+    from kratos_lite.io.document import Document
+    from kratos_lite.model import Model
+
+ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
+
+
+def ending(path: str | Path) -> str:
+    """Return the ending of a path in lower case, without ``.gz``.
+
+    >>> ending("beam.MDPA.gz")
+    '.mdpa'
+    """
+    suffixes = [s.lower() for s in Path(path).suffixes]
+    if suffixes and suffixes[-1] == ".gz":
+        suffixes.pop()
+    return suffixes[-1] if suffixes else ""
+
+
+def read_document(path: str | Path, *, strict: bool = True) -> Document:
+    """Return what a model file says: .mdpa, any file of an .elem set or its stem, or what meshio reads.
+
+    `strict` refuses `.mdpa` rows that do not stand on lines of their own.
+    """
+    path = Path(path)
+    kind = ending(path)
+    if kind == ".mdpa":
+        from kratos_lite.io.mdpa import read_mdpa
+
+        return read_mdpa(path, strict=strict)
+    is_stem = not path.is_file() and any(path.with_name(path.name + s).is_file() for s in (".elem", ".node"))
+    if kind in ELEM_SET or is_stem:
+        from kratos_lite.io.elem import read_elem
+
+        return read_elem(path)
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
+    from kratos_lite.io.bridge import read_meshio
+
+    return read_meshio(path)
+
+
+def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Model:
+    """Return the model that a file describes.
+
+    Parameters
+    ----------
+    path : .mdpa, any file of an .elem set or its stem, a .json run file, or any format of meshio;
+        also gzipped.
+    materials : take the materials from the file; False leaves them to the caller.
+    strict : refuse `.mdpa` rows that do not stand on lines of their own.
+
+    Raises
+    ------
+    InputError
+        With file, line and cure of everything that is wrong.
+    """
+    if ending(path) == ".json":
+        from kratos_lite.io.project import read_project
+
+        return read_project(path).model
+    from kratos_lite.io.kratos import model_from
+
+    return model_from(read_document(path, strict=strict), materials=materials)
+
+
+def write(path: str | Path, thing: Any) -> None:
+    """Write a result, a model or a mesh by the ending of `path`.
+
+    A result goes to .vtu, .json or a format of meshio; a model or a mesh to .mdpa, an .elem set,
+    .vtu or a format of meshio.
+    """
+    from kratos_lite.io.document import Document
+    from kratos_lite.mesh import Mesh
+    from kratos_lite.model import Model
+    from kratos_lite.result import Result
+
+    if isinstance(thing, Result):
+        thing.save(path)
+    elif isinstance(thing, Model):
+        from kratos_lite.io.export import document_from
+
+        write_document(path, document_from(thing))
+    elif isinstance(thing, Mesh):
+        write_document(path, Document(thing))
+    elif isinstance(thing, Document):
+        write_document(path, thing)
+    else:
+        raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
+
+
+def write_document(path: str | Path, document: Document) -> list[str]:
+    """Write a document by the ending of `path`; return notes on what the format cannot hold."""
+    kind = ending(path)
+    if kind == ".mdpa":
+        from kratos_lite.io.mdpa_write import write_mdpa
+
+        write_mdpa(path, document)
+        return []
+    if kind in ELEM_SET:
+        from kratos_lite.io.elem import write_elem
+
+        return [str(note) for note in write_elem(path, document)]
+    if kind in ("", ".json"):
+        raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
+    from kratos_lite.io.results import mesh_fields
+
+    points, cells = mesh_fields(document.mesh)
+    if kind == ".vtu":
+        from kratos_lite.io.vtu import write_vtu
+
+        write_vtu(path, document.mesh, points, cells)
+    else:
+        from kratos_lite.io.bridge import write_meshio
+
+        write_meshio(path, document.mesh, points, cells)
+    lost = ["properties", "nodal_data", "element_data", "condition_data", "constraints", "tables", "model_data"]
+    kept = [name for name in lost if getattr(document, name)]
+    return [f"{kind} files hold meshes only; left out: {', '.join(kept)}"] if kept else []

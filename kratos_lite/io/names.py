@@ -1,0 +1,67 @@
+"""Names: the shape that the name of an element or condition in a file means."""
+
+from __future__ import annotations
+
+import re
+
+from kratos_lite.shapes import (
+    FACE_SHAPES,
+    Hexahedron8,
+    Hexahedron20,
+    Hexahedron27,
+    Line2,
+    Line3,
+    Point1,
+    Pyramid5,
+    Pyramid13,
+    Shape,
+    Tetrahedron4,
+    Tetrahedron10,
+    Wedge6,
+    Wedge15,
+)
+
+SOLIDS: dict[int, type[Shape]] = {
+    4: Tetrahedron4,
+    5: Pyramid5,
+    6: Wedge6,
+    8: Hexahedron8,
+    10: Tetrahedron10,
+    13: Pyramid13,
+    15: Wedge15,
+    20: Hexahedron20,
+    27: Hexahedron27,
+}
+"""Solid shapes by their number of nodes."""
+LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
+CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
+"""Words in the names of conditions that carry loads."""
+
+
+def count(name: str) -> int | None:
+    """Return the number of nodes that a name such as ``…3D8N`` ends with."""
+    match = re.search(r"3D(\d+)N?$", name)
+    return int(match.group(1)) if match and len(match.group(1)) < 4 else None
+
+
+def element_shape(name: str) -> type[Shape] | None:
+    """Return the shape of an element name, or None for one that is no solid.
+
+    >>> element_shape("SmallDisplacementElement3D8N").__name__
+    'Hexahedron8'
+    """
+    return SOLIDS.get(count(name) or 0)
+
+
+def condition_shape(name: str) -> type[Shape] | None:
+    """Return the shape of a condition that can carry a load, or None.
+
+    >>> condition_shape("SurfaceLoadCondition3D4N").__name__
+    'Quadrilateral4'
+    """
+    nodes = count(name)
+    if nodes is None or "Contact" in name or not any(word in name for word in CARRIERS):
+        return None
+    if nodes == 1:
+        return Point1
+    return LINES.get(nodes) if "Line" in name else FACE_SHAPES.get(nodes) if nodes > 2 else None

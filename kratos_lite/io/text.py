@@ -1,0 +1,133 @@
+"""Text of input files: bytes, comments, line numbers, and strict numbers."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from kratos_lite.errors import InputError
+
+MAX_LINE = 1_000_000
+"""Longest line that is read, in bytes."""
+MAX_ID = 2**63 - 1
+_REAL = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Return a whole input file with LF line ends, unzipped if it is gzipped.
+
+    Raises
+    ------
+    InputError
+        The file is missing, a folder, unreadable, a broken gzip, or holds a NUL byte or a line
+        of more than `MAX_LINE` bytes.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; name a file in it") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if data[:2] == b"\x1f\x8b":
+        data = _unzip(path, data)
+    if data[:3] == b"\xef\xbb\xbf":
+        data = data[3:]
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if (nul := data.find(b"\0")) >= 0:
+        line, column = line_column(data, nul)
+        raise InputError(f"{path}:{line}:{column}: NUL byte; is this a text file?")
+    if len(data) > MAX_LINE and (long := _long_line(data)):
+        raise InputError(f"{path}:{long}: a line of more than {MAX_LINE} bytes; break it up")
+    return data
+
+
+def _unzip(path: Path, data: bytes) -> bytes:
+    import gzip
+    import zlib
+
+    try:
+        return gzip.decompress(data)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: broken gzip file: {error}") from None
+
+
+def _long_line(data: bytes) -> int:
+    """Return the number of the first line that is too long, or 0."""
+    start, number = 0, 1
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        if end - start > MAX_LINE:
+            return number
+        start, number = end + 1, number + 1
+    return 0
+
+
+def line_column(data: bytes, offset: int) -> tuple[int, int]:
+    r"""Return line and column, both from 1, of an offset.
+
+    >>> line_column(b"ab\ncd", 4)
+    (2, 2)
+    """
+    return data.count(b"\n", 0, offset) + 1, offset - data.rfind(b"\n", 0, offset)
+
+
+def blank_comments(data: bytes, source: str = "") -> bytes:
+    r"""Replace ``// …`` and ``/* … */`` by blanks, keeping length and line ends.
+
+    >>> blank_comments(b"a// b\nc")
+    b'a    \nc'
+    """
+    if b"/" not in data:
+        return data
+    blanked = _COMMENT.sub(_blank, data)
+    if (open_ := blanked.find(b"/*")) >= 0:
+        line, column = line_column(blanked, open_)
+        raise InputError(f"{source}:{line}:{column}: comment '/*' is never closed; add '*/'")
+    return blanked
+
+
+def _blank(match: re.Match[bytes]) -> bytes:
+    text = match.group()
+    if b"\n" not in text:
+        return b" " * len(text)
+    return b"\n".join(b" " * len(piece) for piece in text.split(b"\n"))
+
+
+def shown(token: bytes) -> str:
+    """Return a token for a message, shortened and with all bytes visible."""
+    text = token[:40].decode("utf-8", "backslashreplace")
+    return repr(text + ("…" if len(token) > 40 else ""))
+
+
+def real(token: bytes) -> float:
+    """Return a finite number; raise ValueError with the reason and the cure.
+
+    >>> real(b"1.5D+02")
+    150.0
+    """
+    if not _REAL.fullmatch(token):
+        hint = ""
+        if re.fullmatch(rb"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", token):
+            hint = f"; decimal comma? write {token.replace(b',', b'.').decode()}"
+        raise ValueError(f"{shown(token)} is not a number{hint}")
+    value = float(token.translate(bytes.maketrans(b"dD", b"ee")))
+    if value in (float("inf"), float("-inf")):
+        raise ValueError(f"{shown(token)} is too large for a number")
+    return value
+
+
+def integer(token: bytes) -> int:
+    """Return an id, 1 … 2^63 - 1; raise ValueError with the reason.
+
+    >>> integer(b"42")
+    42
+    """
+    if not token.isdigit() or len(token) > 19 or not 1 <= int(token) <= MAX_ID:
+        raise ValueError(f"{shown(token)} is not an id; ids are 1 … 2^63-1")
+    return int(token)

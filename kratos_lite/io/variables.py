@@ -1,0 +1,123 @@
+"""Variables: values of Kratos variables on nodes and conditions, and what they mean for a model.
+
+Both the data blocks of a file and the processes of a run file put values here; `apply` then
+turns them into supports and loads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.loads import ConditionLoads, Gravity
+from kratos_lite.mesh import Mesh
+from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+LOADS = {"point": "POINT_LOAD", "line": "LINE_LOAD", "triangle": "SURFACE_LOAD", "quadrilateral": "SURFACE_LOAD"}
+"""Variable that loads a condition, by its cell."""
+PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
+VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
+USED = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
+"""Components and scalars that a static linear solution uses."""
+
+
+def components(variable: str, values: ArrayLike) -> dict[str, Array]:
+    """Return a vector variable as its three components, a scalar as itself.
+
+    >>> sorted(components("POINT_LOAD", [[1.0, 2.0, 3.0]]))
+    ['POINT_LOAD_X', 'POINT_LOAD_Y', 'POINT_LOAD_Z']
+    """
+    array = np.asarray(values, dtype=float)
+    if variable in VECTORS and array.shape[-1:] == (3,):
+        return {f"{variable}_{axis}": array[..., i] for i, axis in enumerate("XYZ")}
+    return {variable: array}
+
+
+class Variables:
+    """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.nodal: dict[str, Array] = {}
+        self.fixed: dict[str, NDArray[np.bool_]] = {}
+        self.conditional: dict[str, Array] = {}
+
+    def set_nodes(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
+        """Set a scalar, component or vector variable on node rows."""
+        for name, value in components(variable, values).items():
+            field = self.nodal.setdefault(name, np.zeros(self.mesh.n_nodes))
+            field[np.asarray(rows, dtype=np.int64)] = value
+
+    def fix(self, component: str, rows: ArrayLike, fixed: ArrayLike = True) -> None:
+        """Fix (or free) a component on node rows."""
+        mask = self.fixed.setdefault(component, np.zeros(self.mesh.n_nodes, dtype=bool))
+        mask[np.asarray(rows, dtype=np.int64)] = fixed
+
+    def set_conditions(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
+        """Set a scalar, component or vector variable on condition rows."""
+        for name, value in components(variable, values).items():
+            field = self.conditional.setdefault(name, np.zeros(self.mesh.n_conditions))
+            field[np.asarray(rows, dtype=np.int64)] = value
+
+    def apply(self, model: Model) -> None:
+        """Add the supports and loads that the values mean to a model, and note those without effect."""
+        self._apply_supports(model)
+        g = self._vector(self.nodal, "VOLUME_ACCELERATION", self.mesh.n_nodes)
+        if g.any():
+            model.add(Gravity(g))
+        loads = self._condition_loads(model)
+        if loads is not None:
+            model.add(loads)
+        for name in sorted({*self.nodal, *self.conditional} - USED):
+            model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
+
+    def _apply_supports(self, model: Model) -> None:
+        for axis in "XYZ":
+            name = f"DISPLACEMENT_{axis}"
+            rows = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
+            values = self.nodal.get(name, np.zeros(self.mesh.n_nodes))
+            if len(rows):
+                model.fix(rows, axis.lower(), values[rows, None], override=True)
+        others = sorted(v for v in self.fixed if not v.startswith("DISPLACEMENT_") and self.fixed[v].any())
+        if others:
+            model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
+
+    @staticmethod
+    def _vector(fields: dict[str, Array], variable: str, count: int) -> Array:
+        zero = np.zeros(count)
+        return np.stack([fields.get(f"{variable}_{axis}", zero) for axis in "XYZ"], axis=1)
+
+    def _condition_loads(self, model: Model) -> ConditionLoads | None:
+        mesh = self.mesh
+        force = np.zeros((mesh.n_conditions, 3))
+        nodal_force = np.zeros((mesh.n_nodes, 3))
+        carried: set[str] = set()
+        start = 0
+        for block in mesh.conditions:
+            rows = slice(start, start + len(block))
+            start += len(block)
+            if block.shape is None or not len(block):
+                continue
+            variable = LOADS[block.shape.cell]
+            carried.add(variable)
+            force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
+            nodal_force[block.nodes] = self._vector(self.nodal, variable, mesh.n_nodes)[block.nodes]
+        self._note_idle(model, carried)
+        zero, nodal_zero = np.zeros(mesh.n_conditions), np.zeros(mesh.n_nodes)
+        positive, negative = PRESSURES
+        pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
+        nodal_pressure = self.nodal.get(positive, nodal_zero) - self.nodal.get(negative, nodal_zero)
+        if not (force.any() or nodal_force.any() or pressure.any() or nodal_pressure.any()):
+            return None
+        return ConditionLoads((force, nodal_force), (pressure, nodal_pressure))
+
+    def _note_idle(self, model: Model, carried: set[str]) -> None:
+        """Note load values that no condition carries."""
+        faces = "SURFACE_LOAD" in carried
+        for name in sorted({*self.nodal, *self.conditional}):
+            values = [f[name] for f in (self.nodal, self.conditional) if name in f]
+            load = name.rsplit("_", 1)[0] if name not in PRESSURES else "SURFACE_LOAD"
+            idle = load in LOADS.values() and load not in carried if name not in PRESSURES else not faces
+            if idle and any(v.any() for v in values):
+                model.notes.append(f"{name} has no effect: no condition of the file carries it")
