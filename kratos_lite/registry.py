@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Generic, TypeVar
 
 from kratos_lite.errors import InputError, nearest
@@ -52,3 +53,19 @@ class Registry(Generic[T]):
     def aliases(self, name: str) -> list[str]:
         """Return the other names under which `name` is found."""
         return [alias for alias, target in self._aliases.items() if target == name]
+
+    @contextmanager
+    def temporary(self) -> Iterator[None]:
+        """Forget, on leaving, whatever was registered or replaced inside the ``with`` block.
+
+        >>> colours = Registry[int]("colour")
+        >>> with colours.temporary():
+        ...     colours.add("red", 1)
+        >>> "red" in colours
+        False
+        """
+        items, aliases = dict(self._items), dict(self._aliases)
+        try:
+            yield
+        finally:
+            self._items, self._aliases = items, aliases

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -257,16 +257,12 @@ class Result:
 
     def save(self, path: str | Path) -> None:
         """Write the result to a file by its ending: .vtu, .json, or a format of meshio."""
-        _writer("kratos_lite.io.results", "write_result")(path, self)
+        from kratos_lite.io.results import write_result
+
+        write_result(path, self)
 
     def plot(self, path: str | Path, values: str = "VON_MISES_STRESS") -> None:
-        """Write a picture of the deformed body coloured by a nodal field."""
-        _writer("kratos_lite.io.results", "plot_result")(path, self, values)
+        """Write a picture (.png) of the deformed body coloured by a nodal field."""
+        from kratos_lite.io.results import plot_result
 
-
-def _writer(module: str, name: str) -> Callable[..., None]:
-    """Return a function of a floor above, found only when it is wanted."""
-    from importlib import import_module
-
-    found: Callable[..., None] = getattr(import_module(module), name)
-    return found
+        plot_result(path, self, values)

@@ -25,7 +25,7 @@ Progress = Callable[[str, float], None]
 
 DENSE_LIMIT = 600
 """Up to this many unknowns a full matrix needs no sparse library at all."""
-DIRECT_LIMIT = 15_000
+DIRECT_LIMIT = 10_000
 """Up to this many unknowns factorising is the fastest sparse way."""
 FALLBACK_LIMIT = 150_000
 """Up to this many unknowns a factorisation is tried when the iteration fails."""

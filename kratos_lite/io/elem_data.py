@@ -59,6 +59,7 @@ def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
 
 
 def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]:
+    """Return the nodes that ``Fix`` or ``.init`` statements name, with their values."""
     found: dict[str, Values] = {}
     for run in files.runs[ending]:
         if run.form not in (FIX, INIT):
@@ -68,7 +69,7 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
         for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
             source.add(run.starts[i], files.no_node(ids[i]))
         values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
-        lines = source.lines(run.starts).tolist()
+        lines, repeated = source.lines(run.starts).tolist(), []
         for node, name, value, line, start in zip(
             ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
         ):
@@ -77,8 +78,10 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
             if earlier != value:
                 source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
             elif at != line:
-                source.note(start, f"{name.decode('ascii')} of node {node} is repeated from line {at}")
-        for name in set(run.columns[1]) & VECTORS:
+                repeated.append(start)
+        if repeated:
+            source.note(repeated[0], f"{len(repeated)} statements repeat earlier ones, from here on")
+        for name in sorted(set(run.columns[1]) & VECTORS):
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")
             source.add(start, f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z")

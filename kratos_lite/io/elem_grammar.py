@@ -39,8 +39,7 @@ KEYWORDS = ("NODES", "ELEMENTS", "CONDITIONS", "PROPERTIES", "ElementsGroup")
 HOME = {"NODES": ".node, .cond or .init", "ELEMENTS": ".elem", "CONDITIONS": ".cond", "PROPERTIES": ".prop"}
 
 _KEY = "|".join(KEYWORDS).encode()
-_NEXT_STATEMENT = re.compile(rb"[\n;]\s*(?=(?:%b)\b)" % _KEY)
-_NEXT_ROW = re.compile(rb"[\n\]]\s*(?:,\s*)?(?=\[\s*\d+\s*,|\]\s*\)|(?:%b)\b)" % _KEY)
+_NEXT_STATEMENT = re.compile(rb"(?<=[\s;])(?:%b)\b" % _KEY)
 _BLANKS = re.compile(rb"[\s;]*")
 _EXPONENTS = bytes.maketrans(b"dD", b"ee")
 _FOUND = re.compile(rb"[\w.+-]+|[^\s]")
@@ -69,6 +68,14 @@ class Form:
         """Match one statement, with the ``;`` after it."""
         ending = rb"" if self.text.startswith(("[", "]")) or self.row else rb"[\s;]*"
         return re.compile(b"".join(_word(word)[0] for word in self.text.split()) + ending).match
+
+    @cached_property
+    def resume(self) -> re.Pattern[bytes]:
+        """Where to go on after a broken row: at the next row, the end of the list, or another statement."""
+        # An inner list must not pass for the next row: "[1, [2, …" is one row, "[2, …" is none.
+        count = 4 if "<ids>" in self.text else 3
+        row = b"".join(_word(word)[0] for word in self.text.split()[:count])
+        return re.compile(rb"%b|\]\s*\)|%b" % (row, _NEXT_STATEMENT.pattern))
 
     def __str__(self) -> str:
         return self.text.replace(" ", "").replace("=", " = ").replace(",", ", ") + (
@@ -108,7 +115,7 @@ class Source:
         self.name = str(path)
         self.problems = problems
         self.notes = notes
-        self.data = blank_comments(read_bytes(path))
+        self.data = blank_comments(read_bytes(path), self.name)
 
     @cached_property
     def _line_ends(self) -> NDArray[np.int64]:
@@ -213,8 +220,8 @@ class Source:
             self.add(place, _unknown(word, forms))
         else:
             self.add(place, _unexpected(word, wanted) + self._opened_at(opened))
-        resume = (_NEXT_ROW if opened else _NEXT_STATEMENT).search(self.data, start)
-        after = resume.end() if resume else len(self.data)
+        resume = (choices[0].resume if opened else _NEXT_STATEMENT).search(self.data, start + 1)
+        after = resume.start() if resume else len(self.data)
         return after, bool(opened and resume) and self.data[after : after + 1] in (b"[", b"]")
 
     def _walk(self, form: Form, place: int) -> tuple[int, list[str]]:

@@ -93,12 +93,12 @@ def _connect(
     source = files.sources[kind.ending]
 
     def add(cell: int, message: str) -> None:
-        source.add(starts[cell], f"{kind.word} {block.ids[cell]} ({block.name}) {message}")
+        source.add(starts[cell], f"{kind.word} {block.ids[cell]} ({block.name}){message}")
 
     widths = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
     for i in np.flatnonzero(widths != width).tolist():
-        add(i, f"has {widths[i]} nodes; expected {width}")
+        add(i, f" has {widths[i]} nodes; expected {width}")
     if (widths != width).any():
         return
     before = files.problems.count
@@ -107,10 +107,10 @@ def _connect(
         return
     block.nodes = mesh.node_rows(nodes).astype(np.int32)
     ordered = np.sort(nodes, axis=1)
-    for i in np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1)).tolist():
-        add(i, f"names a node twice; expected {width} different nodes")
+    for i, k in np.argwhere(ordered[:, 1:] == ordered[:, :-1]).tolist():
+        add(i, f" names node {ordered[i, k]} twice; its nodes must differ")
     for i, k in np.argwhere(block.nodes < 0).tolist() if files.nodes_known else ():
-        add(i, f"refers to a missing node: {files.no_node(nodes[i, k])}")
+        add(i, f": {files.no_node(nodes[i, k])}")
 
 
 def _note_unused(files: ElemFiles, mesh: Mesh) -> None:

@@ -36,6 +36,8 @@ SOLIDS: dict[int, type[Shape]] = {
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
 CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
 """Words in the names of conditions that carry loads."""
+THIN = ("Shell", "Membrane", "Truss", "Beam", "Cable", "Spring", "Plate")
+"""Words in the names of elements that are no solids."""
 
 
 def count(name: str) -> int | None:
@@ -50,7 +52,7 @@ def element_shape(name: str) -> type[Shape] | None:
     >>> element_shape("SmallDisplacementElement3D8N").__name__
     'Hexahedron8'
     """
-    return SOLIDS.get(count(name) or 0)
+    return None if any(word in name for word in THIN) else SOLIDS.get(count(name) or 0)
 
 
 def condition_shape(name: str) -> type[Shape] | None:

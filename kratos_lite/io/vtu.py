@@ -61,6 +61,8 @@ def write_vtu(
     >>> mesh = Mesh(Tetrahedron4.nodes, [tetra])
     >>> write_vtu(getfixture("tmp_path") / "one.vtu", mesh, {"TEMPERATURE": np.ones(4)})
     """
+    if Path(path).suffix.lower() == ".gz":
+        raise InputError(f"{path}: ParaView reads no gzipped file; write it as .vtu")
     blocks = [block for block in mesh.blocks if block.shape is not None]
     keep = np.repeat([block.shape is not None for block in mesh.blocks], [len(b) for b in mesh.blocks])
     groups = {

@@ -41,18 +41,22 @@ def volume(shape, X):
     return w @ np.linalg.det(np.einsum("ai,pad->pid", X, shape.dN(xi)))
 
 
-@pytest.fixture
-def mesh():
-    """One curved cell of every kind, in a row, and in between a block of an unknown kind."""
+def row_of_cells(names):
+    """Return one curved cell of every kind, in a row, and in between a block of an unknown kind."""
     points, blocks, first = [], [], 0
-    for e, name in enumerate(SOLIDS):
+    for e, name in enumerate(names):
         shape = SHAPES[name]
         nodes = np.arange(first, first + len(shape.nodes), dtype=np.int32)[None]
         blocks.append(Block(name, nodes, np.array([e + 1]), np.array([1]), shape))
-        points.append(curved(shape) + [3 * e, 0, 0])
+        points.append(curved(shape) + np.array([3 * e, 0, 0]))
         first += len(shape.nodes)
     strange = Block("Spring", np.array([[0, 1]], dtype=np.int32), np.array([99]), np.array([1]), None)
     return Mesh(np.vstack(points), [*blocks[:2], strange, *blocks[2:]])
+
+
+@pytest.fixture
+def mesh():
+    return row_of_cells(SOLIDS)
 
 
 def read(path):
@@ -79,21 +83,41 @@ def test_vtk_finds_every_cell_and_point(mesh, tmp_path):
     np.testing.assert_array_equal(points, mesh.points)
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+def vtk_cell(grid, e, pcoords, weights):
+    """Return the points that VTK interpolates in cell e, and the volume by its own derivatives."""
+    cell = grid.GetCell(e)
+    nodes = np.array([cell.GetPoints().GetPoint(i) for i in range(cell.GetNumberOfPoints())])
+    values, slopes, points, total = np.zeros(len(nodes)), np.zeros(3 * len(nodes)), [], 0.0
+    for p, w in zip(pcoords, weights, strict=True):
+        cell.InterpolateFunctions(p, values)
+        cell.InterpolateDerivs(p, slopes)
+        points.append(values @ nodes)
+        total += w * np.linalg.det(slopes.reshape(3, -1) @ nodes)
+    return np.array(points), total
+
+
+@pytest.mark.parametrize("name", [name for name in SOLIDS if name != "Pyramid13"])
 def test_vtk_interpolates_and_measures_the_same_curved_cell(mesh, tmp_path, name):
     write_vtu(tmp_path / "all.vtu", mesh)
-    grid = read(tmp_path / "all.vtu")
-    cell, shape = grid.GetCell(SOLIDS.index(name)), SHAPES[name]
-    X = curved(shape) + [3 * SOLIDS.index(name), 0, 0]
+    e, shape = SOLIDS.index(name), SHAPES[name]
     xi, _, pcoords, weights = gauss(shape.cell)
-    nodes = np.array([cell.GetPoints().GetPoint(i) for i in range(cell.GetNumberOfPoints())])
-    values, slopes, total = np.zeros(len(nodes)), np.zeros(3 * len(nodes)), 0.0
-    for point, p, w in zip(shape.N(xi) @ X, pcoords, weights, strict=True):
-        cell.InterpolateFunctions(p, values)
-        np.testing.assert_allclose(values @ nodes, point, atol=1e-13)
-        cell.InterpolateDerivs(p, slopes)
-        total += w * np.linalg.det(slopes.reshape(3, -1) @ nodes)
+    points, total = vtk_cell(read(tmp_path / "all.vtu"), e, pcoords, weights)
+    X = curved(shape) + np.array([3 * e, 0, 0])
+    np.testing.assert_allclose(points, shape.N(xi) @ X, atol=1e-13)
     assert total == pytest.approx(volume(shape, X), rel=1e-12)
+
+
+def test_vtk_knows_the_quadratic_pyramid_with_straight_edges_and_nearly_the_curved_one(tmp_path):
+    # VTK interpolates this cell by other functions, which agree with the rational ones on affine cells.
+    shape = SHAPES["Pyramid13"]
+    straight = shape.nodes @ np.array([[1, 0.2, 0.1], [0, 1.1, 0.3], [0.2, 0, 0.9]])
+    xi, _, pcoords, weights = gauss(shape.cell)
+    for X, far, off in ((straight, 1e-13, 1e-12), (curved(shape), 0.02, 1e-4)):
+        block = Block("P", np.arange(13, dtype=np.int32)[None], np.array([1]), np.array([1]), shape)
+        write_vtu(tmp_path / "p.vtu", Mesh(X, [block]))
+        points, total = vtk_cell(read(tmp_path / "p.vtu"), 0, pcoords, weights)
+        np.testing.assert_allclose(points, shape.N(xi) @ X, atol=far)
+        assert total == pytest.approx(volume(shape, X), rel=off)
 
 
 def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path):
@@ -111,8 +135,8 @@ def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path)
     grid = read(tmp_path / "all.vtu")
     found = arrays(grid.GetPointData())
     assert list(found) == list(nodal)
-    for name in nodal:
-        np.testing.assert_array_equal(found[name], nodal[name].reshape(found[name].shape))
+    for name, values in nodal.items():
+        np.testing.assert_array_equal(found[name], values.reshape(found[name].shape))
     assert [a.dtype.str for a in found.values()] == ["<f8", "<i8", "<f8", "<i4", "<f8"]
     known = np.arange(m) != 2  # the third block has no shape
     for name, values in arrays(grid.GetCellData()).items():
@@ -122,14 +146,16 @@ def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path)
     assert [shift.GetComponentName(i) for i in range(3)] == ["X", "Y", "Z"]
 
 
-def test_meshio_reads_the_same_file(mesh, tmp_path):
+def test_meshio_reads_the_same_file(tmp_path):
     meshio = pytest.importorskip("meshio")
-    write_vtu(tmp_path / "all.vtu", mesh, {"U": mesh.points**2}, {"E": np.arange(10.0)})
+    names = [name for name in SOLIDS if name not in {"Wedge15", "Pyramid13"}]  # meshio 5.3.5 fails on these
+    mesh = row_of_cells(names)
+    write_vtu(tmp_path / "all.vtu", mesh, {"U": mesh.points**2}, {"E": np.arange(8.0)})
     found = meshio.read(tmp_path / "all.vtu")
     np.testing.assert_array_equal(found.points, mesh.points)
     np.testing.assert_array_equal(found.point_data["U"], mesh.points**2)
-    np.testing.assert_array_equal(np.concatenate(found.cell_data["E"]), [0, 1, 3, 4, 5, 6, 7, 8, 9])
-    for cells, name in zip(found.cells, SOLIDS, strict=True):
+    np.testing.assert_array_equal(np.concatenate(found.cell_data["E"]), [0, 1, 3, 4, 5, 6, 7])
+    for cells, name in zip(found.cells, names, strict=True):
         block = next(b for b in mesh.blocks if b.name == name)
         np.testing.assert_array_equal(cells.data, block.nodes[:, list(SHAPES[name].to_vtk)])
 

@@ -1,0 +1,232 @@
+"""Rows of numbers in an `.mdpa` block: a vectorised reader, and an exact one that finds what is wrong.
+
+The fast reader gives up on anything unusual; only the exact reader decides what is an error.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.io.mdpa_scan import Source, Span
+from kratos_lite.io.text import MAX_ID, integer, real, shown
+
+BLANKS = b" \t\n\v\f"
+DIGITS = b"0123456789"
+FORTRAN = bytes.maketrans(b"dD", b"ee")
+TRUTH = {b"1": 1, b"true": 1, b"True": 1, b"0": 0, b"false": 0, b"False": 0}
+"""Words for true and false."""
+Words = list[re.Match[bytes]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a row holds.
+
+    Attributes
+    ----------
+    word : what a row describes, e.g. ``element``.
+    kinds : one letter a column: i id, p property id (may be 0), b true or false, r real.
+    counted : what stands after the first `head` columns, e.g. ``nodes``.
+    head : number of leading columns that are not counted in messages.
+    needs : who asks for the width, e.g. ``KinematicLinear3D8N needs 8``.
+    alone : each row stands on its own line, also where strict reading allows several.
+    """
+
+    word: str
+    kinds: str
+    counted: str = "values"
+    head: int = 1
+    needs: str = ""
+    alone: bool = False
+
+
+@dataclass(eq=False)
+class Rows:
+    """Columns of a block: ints (m, a), reals (m, b) and the line (m,) of each row."""
+
+    ints: NDArray[np.int64]
+    reals: NDArray[np.float64]
+    lines: NDArray[np.int32]
+
+
+def read_rows(source: Source, span: Span, layout: Layout) -> Rows:
+    """Return the rows in a piece of the text; what is wrong goes to the problems of the source."""
+    return _fast(source, span, layout) or _exact(source, span, layout)
+
+
+def width_of_first_line(source: Source, span: Span) -> int:
+    """Return the number of words on the first line that has any, or 0."""
+    first = next(source.words(span), None)
+    if first is None:
+        return 0
+    end = source.data.find(b"\n", first.start(), span[1])
+    return len(source.data[first.start() : end if end >= 0 else span[1]].split())
+
+
+def _fast(source: Source, span: Span, layout: Layout) -> Rows | None:
+    """Return the rows if every token is plain and every line is whole, else None."""
+    text, kinds = source.data[span[0] : span[1]], layout.kinds
+    k, is_plain = len(kinds), not set(kinds) - set("ip")
+    if text.translate(None, BLANKS + DIGITS + (b"" if is_plain else b"+-.eEdD")):
+        return None
+    codes = np.frombuffer(text, dtype=np.uint8)
+    inside = np.zeros(len(codes) + 2, dtype=np.int8)
+    np.greater(codes, 32, out=inside[1:-1], casting="unsafe")
+    step = np.diff(inside)
+    starts = np.flatnonzero(step == 1)
+    if not len(starts):
+        return _rows(np.zeros((0, k), dtype=np.int64), np.zeros((0, k)), np.zeros(0, dtype=np.int32), kinds)
+    if len(starts) % k or not _lines_are_whole(source, codes, starts, span, layout):
+        return None
+    values = _values(text, np.int64 if is_plain else np.float64)
+    if values is None or len(values) != len(starts):
+        return None
+    table, lines = values.reshape(-1, k), source.lines(starts[::k] + span[0])
+    if is_plain:
+        ids = table[:, [c for c, kind in enumerate(kinds) if kind == "i"]]
+        if table.max() == MAX_ID or ids.min() < 1:
+            return None
+        return Rows(table, np.zeros((len(table), 0)), lines)
+    ends = np.flatnonzero(step == -1)
+    ints = np.zeros(table.shape, dtype=np.int64)
+    for column, kind in enumerate(kinds):
+        if kind != "r":
+            plain = _digits(codes, starts[column::k], ends[column::k])
+            if plain is None or (kind == "b" and plain.max() > 1) or (kind == "i" and plain.min() < 1):
+                return None
+            ints[:, column] = plain
+    rows = _rows(ints, table, lines, kinds)
+    return rows if np.isfinite(rows.reals).all() else None
+
+
+def _rows(
+    ints: NDArray[np.int64], reals: NDArray[np.float64], lines: NDArray[np.int32], kinds: str
+) -> Rows:
+    """Return the integer and the real columns of tables (m, k) that hold each kind in its place."""
+    is_real = np.array([kind == "r" for kind in kinds], dtype=bool)
+    return Rows(ints[:, ~is_real], np.ascontiguousarray(reals[:, is_real]), lines)
+
+
+def _lines_are_whole(
+    source: Source, codes: NDArray[np.uint8], starts: NDArray[np.int64], span: Span, layout: Layout
+) -> bool:
+    """Return whether each line holds whole rows; note where it holds several."""
+    if not source.strict:
+        return True
+    k = len(layout.kinds)
+    bounds = np.concatenate([[0], np.searchsorted(starts, np.flatnonzero(codes == 10)), [len(starts)]])
+    counts = np.diff(bounds)
+    if (counts > k).any():
+        if layout.alone or (counts % k).any():
+            return False
+        if k > 1:
+            source.note(f"several rows on one line: {layout.word}s", span[0] + int(starts[bounds[np.argmax(counts > k)]]))
+        return True
+    return bool(((counts == 0) | (counts == k)).all())
+
+
+def _values(text: bytes, dtype: type[np.int64] | type[np.float64]) -> NDArray[np.int64] | NDArray[np.float64] | None:
+    """Return the numbers of a text; None where one is malformed."""
+    with warnings.catch_warnings():
+        # numpy warns, where it should fail, about text that is not a number.
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text if dtype is np.int64 else text.translate(FORTRAN), dtype=dtype, sep=" ")
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def _digits(
+    codes: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64]
+) -> NDArray[np.int64] | None:
+    """Return tokens as integers, or None if one has other characters than digits or more than 18."""
+    longest = int((ends - starts).max())
+    if longest > 18:
+        return None
+    values = np.zeros(len(starts), dtype=np.int64)
+    for place in range(longest):
+        at = starts + place
+        more = at < ends
+        digit = codes[np.minimum(at, len(codes) - 1)].astype(np.int64) - 48
+        if ((digit < 0) | (digit > 9))[more].any():
+            return None
+        values = np.where(more, 10 * values + digit, values)
+    return values
+
+
+def _exact(source: Source, span: Span, layout: Layout) -> Rows:
+    """Return the rows token by token, and note each that is wrong."""
+    kinds = layout.kinds
+    k = len(kinds)
+    ints: list[list[int]] = []
+    reals: list[list[float]] = []
+    offsets: list[int] = []
+    for words in _groups(source, span, k):
+        if len(words) % k or (layout.alone and source.strict and len(words) > k):
+            _refuse_width(source, words, layout)
+            continue
+        if len(words) > k > 1:
+            source.note(f"several rows on one line: {layout.word}s", words[0].start())
+        for first in range(0, len(words), k):
+            row = _row(source, words[first : first + k], layout)
+            if row is not None:
+                ints.append([int(v) for v, kind in zip(row, kinds, strict=True) if kind != "r"])
+                reals.append([v for v, kind in zip(row, kinds, strict=True) if kind == "r"])
+                offsets.append(words[first].start())
+    m, r = len(offsets), kinds.count("r")
+    lines = source.lines(np.array(offsets, dtype=np.int64))
+    return Rows(np.array(ints, dtype=np.int64).reshape(m, k - r), np.array(reals).reshape(m, r), lines)
+
+
+def _groups(source: Source, span: Span, k: int) -> Iterator[Words]:
+    """Return the words line by line, or k by k where line ends carry no meaning."""
+    group: Words = []
+    end = 0
+    for word in source.words(span):
+        is_new = b"\n" in source.data[end : word.start()] if source.strict else len(group) == k
+        if group and is_new:
+            yield group
+            group = []
+        group.append(word)
+        end = word.end()
+    if group:
+        yield group
+
+
+def _row(source: Source, words: Words, layout: Layout) -> list[float] | None:
+    values: list[float] = []
+    for word, kind in zip(words, layout.kinds, strict=True):
+        try:
+            values.append(_number(word.group(), kind))
+        except ValueError as error:
+            name = "" if word is words[0] else f"{layout.word} {words[0].group()[:20].decode('ascii', 'replace')}: "
+            source.problem(f"{name}{error}", word.start())
+            return None
+    return values
+
+
+def _number(token: bytes, kind: str) -> float:
+    if kind == "r":
+        return real(token)
+    if kind == "b":
+        if token not in TRUTH:
+            raise ValueError(f"{shown(token)} is neither true nor false; write 1 or 0")
+        return TRUTH[token]
+    return 0 if kind == "p" and token == b"0" else integer(token)
+
+
+def _refuse_width(source: Source, words: Words, layout: Layout) -> None:
+    k, name = len(layout.kinds), words[0].group()[:20].decode("ascii", "replace")
+    found = f"{layout.word} {name} has {len(words) - layout.head} {layout.counted}"
+    hint = "; a row must stand whole on one line (strict=False reads rows over line ends)" if source.strict else ""
+    if len(words) % k == 0:
+        hint = f"; {len(words) // k} rows on one line? Write one a line, or read with strict=False"
+        if layout.word == "node" and len(words) == 2 * k:
+            hint = "; two nodes on one line? Write one a line, or read with strict=False"
+    source.problem(f"{found}; {layout.needs or f'expected {k - layout.head}'}{hint}", words[0].start())

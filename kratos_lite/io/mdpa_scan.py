@@ -1,0 +1,236 @@
+"""The blocks of an `.mdpa` file: a tree of ``Begin … End`` frames over its text, and its notes and problems."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.errors import InputError, Problems, nearest
+from kratos_lite.io.document import Note
+from kratos_lite.io.text import shown
+
+Span = tuple[int, int]
+MAX_DEPTH = 64
+"""Deepest nesting of blocks."""
+WORD = re.compile(rb"[^ \t\n\v\f]+")
+NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_:.\-]*")
+
+LISTS = tuple(f"SubModelPart{kind}" for kind in (
+    "Nodes", "Elements", "Conditions", "Geometries", "Constraints", "Properties", "Tables",
+))  # fmt: skip
+"""Blocks of ids inside a SubModelPart."""
+MESH_BLOCKS = ("MeshData", "MeshNodes", "MeshElements", "MeshConditions")
+ARGUMENTS = {
+    "Properties": 1, "Table": 3, "Elements": 1, "Conditions": 1, "Geometries": 1, "Constraints": 1, "NodalData": 1,
+    "ElementalData": 1, "ConditionalData": 1, "SubModelPart": 1, "Mesh": 1,
+}  # fmt: skip
+"""Words that follow the name of a block."""
+TOP = (*ARGUMENTS, "ModelPartData", "Nodes")
+"""Blocks that are read at the top level."""
+READ = {*TOP, *LISTS, "SubModelPartData"} - {"Mesh"}
+"""Blocks that are read; others are skipped as a whole."""
+INSIDE = {"Properties": ("Table",), "SubModelPart": ("SubModelPart", "SubModelPartData", *LISTS)}
+"""Blocks that may stand inside another one."""
+
+
+@dataclass(eq=False)
+class Frame:
+    """One block: its words after ``Begin``, its own text in pieces, and the blocks inside it."""
+
+    name: str
+    offset: int
+    arguments: list[str] = field(default_factory=list)
+    spans: list[Span] = field(default_factory=list)
+    children: list[Frame] = field(default_factory=list)
+
+    @property
+    def title(self) -> str:
+        """The block as its first line says it."""
+        return " ".join(["Begin", self.name, *self.arguments])
+
+
+@dataclass(eq=False)
+class Source:
+    """The text of a file without comments, with line numbers, problems and notes."""
+
+    name: str
+    data: bytes
+    strict: bool = True
+
+    def __post_init__(self) -> None:
+        self.problems = Problems(self.name)
+        self.notes: list[Note] = []
+
+    @cached_property
+    def newlines(self) -> NDArray[np.int64]:
+        """Offsets of the line ends."""
+        return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == 10)
+
+    def line(self, offset: int) -> int:
+        """Return the line, from 1, of an offset."""
+        return int(np.searchsorted(self.newlines, offset)) + 1
+
+    def lines(self, offsets: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Return the lines, from 1, of increasing offsets."""
+        return (np.searchsorted(self.newlines, offsets) + 1).astype(np.int32)
+
+    def problem(self, text: str, offset: int) -> None:
+        """Note what is wrong at an offset."""
+        self.problems.add(text, self.line(offset), offset - self.data.rfind(b"\n", 0, offset))
+
+    def fail(self, text: str, offset: int) -> InputError:
+        """Return the error with all problems up to this one, after which reading makes no sense."""
+        self.problems.add(text, self.line(offset), offset - self.data.rfind(b"\n", 0, offset))
+        try:
+            self.problems.raise_if_any()
+        except InputError as error:
+            return error
+        raise AssertionError
+
+    def note(self, text: str, offset: int) -> None:
+        """Note what was kept without use, skipped or found odd."""
+        self.notes.append(Note(self.line(offset), text))
+
+    def words(self, span: Span) -> Iterator[re.Match[bytes]]:
+        """Return the words in a piece of the text."""
+        return WORD.finditer(self.data, *span)
+
+    def is_blank(self, span: Span) -> bool:
+        """Return whether a piece of the text holds no word."""
+        return WORD.search(self.data, *span) is None
+
+
+def scan(source: Source) -> Frame:
+    """Return the root of the tree of blocks.
+
+    Raises
+    ------
+    InputError
+        Blocks are not closed, closed by another name, not allowed where they stand, or nested too deep.
+    """
+    root = Frame("", 0)
+    stack, cursor = [root], 0
+    for offset in _statements(source.data):
+        if offset < cursor:
+            continue
+        stack[-1].spans.append((cursor, offset))
+        if source.data.startswith(b"B", offset):
+            frame, cursor = _open(source, offset, stack)
+            stack[-1].children.append(frame)
+            stack.append(frame)
+        else:
+            cursor = _close(source, offset, stack)
+    stack[-1].spans.append((cursor, len(source.data)))
+    if len(stack) > 1:
+        top = stack[-1]
+        raise source.fail(
+            f"the file ends inside {top.title!r} of line {source.line(top.offset)}; 'End {top.name}' is missing",
+            len(source.data.rstrip()),
+        )
+    _refuse_stray_words(source, root)
+    source.problems.raise_if_any()
+    return root
+
+
+def _statements(data: bytes) -> list[int]:
+    """Return the offsets of the words Begin and End."""
+    found = []
+    for word in (b"Begin", b"End"):
+        at = data.find(word)
+        while at >= 0:
+            after = at + len(word)
+            if (at == 0 or data[at - 1] in b" \t\n\v\f") and data[after : after + 1] in b" \t\n\v\f":
+                found.append(at)
+            at = data.find(word, after)
+    return sorted(found)
+
+
+def _open(source: Source, offset: int, stack: list[Frame]) -> tuple[Frame, int]:
+    """Return the block that begins at an offset, and the end of its header."""
+    if len(stack) > MAX_DEPTH:
+        raise source.fail(f"blocks are nested more than {MAX_DEPTH} deep; is an 'End' missing?", offset)
+    name, cursor = _word(source, offset + 5, "Begin")
+    outer = stack[-1]
+    frame = Frame(name, offset)
+    _check_place(source, frame, stack)
+    if _is_skipped([*stack[1:], frame]):
+        return frame, cursor
+    for _ in range(ARGUMENTS.get(name, 0) - (name == "Table" and outer.name == "Properties")):
+        word, cursor = _word(source, cursor, frame.title)
+        frame.arguments.append(word)
+    while name == "Constraints" and (match := WORD.search(source.data, cursor)):
+        if not NAME.fullmatch(match.group()) or match.group() in (b"Begin", b"End"):
+            break
+        frame.arguments.append(match.group().decode())
+        cursor = match.end()
+    return frame, cursor
+
+
+def _is_skipped(frames: list[Frame]) -> bool:
+    """Return whether the innermost of nested blocks stands in one that is not read."""
+    return any(frame.name not in READ for frame in frames)
+
+
+def _check_place(source: Source, frame: Frame, stack: list[Frame]) -> None:
+    """Refuse a block that may not stand inside the block that is open."""
+    outer, name, offset = stack[-1], frame.name, frame.offset
+    if len(stack) == 1:
+        if name in (*LISTS, "SubModelPartData", *MESH_BLOCKS):
+            raise source.fail(f"'Begin {name}' stands outside the block that it belongs to", offset)
+        proper = {known.lower(): known for known in TOP}.get(name.lower(), name)
+        if proper != name:
+            raise source.fail(f"unknown block {name!r}; capitals matter: write 'Begin {proper}'", offset)
+        return
+    if name in INSIDE.get(outer.name, ()) or _is_skipped(stack[1:]):
+        return
+    if outer.name == "SubModelPart" and name not in TOP:
+        return
+    raise source.fail(
+        f"'Begin {name}' inside {outer.title!r} of line {source.line(outer.offset)}; "
+        f"is 'End {outer.name}' missing before it?",
+        offset,
+    )
+
+
+def _close(source: Source, offset: int, stack: list[Frame]) -> int:
+    """Take the closed block from the stack and return the end of the statement."""
+    name, cursor = _word(source, offset + 3, "End")
+    if len(stack) == 1:
+        raise source.fail(f"'End {name}' closes nothing; is 'Begin {name}' missing?", offset)
+    frame = stack.pop()
+    if frame.name != name:
+        raise source.fail(
+            f"'End {name}' closes {frame.title!r} of line {source.line(frame.offset)}; expected 'End {frame.name}'",
+            offset,
+        )
+    return cursor
+
+
+def _word(source: Source, at: int, after: str) -> tuple[str, int]:
+    """Return the next word, which must be a name or a number, and its end."""
+    match = WORD.search(source.data, at)
+    if match is None or match.group() in (b"Begin", b"End"):
+        found = f"found {shown(match.group())}" if match else "the file ends"
+        raise source.fail(f"a word is missing after {after!r}; {found}", match.start() if match else at - 1)
+    try:
+        return match.group().decode("ascii"), match.end()
+    except UnicodeDecodeError:
+        raise source.fail(f"{shown(match.group())} after {after!r} is no name; use plain letters", match.start()) from None
+
+
+def _refuse_stray_words(source: Source, root: Frame) -> None:
+    """Note words that stand between the blocks of the file or of a SubModelPart."""
+    for span in root.spans:
+        for match in source.words(span):
+            word = match.group()
+            hint = nearest(word.decode("ascii", "replace").capitalize(), ("Begin", "End"))
+            source.problem(f"{shown(word)} stands outside any block; expected 'Begin <block>'.{hint}", match.start())
+            break
+    for frame in root.children:
+        if frame.name == "SubModelPart":
+            _refuse_stray_words(source, frame)

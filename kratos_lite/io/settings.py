@@ -1,0 +1,151 @@
+"""Settings: a JSON object that is asked for keys by type and answers mistakes with their place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.strict_json import Object, read_json
+
+REQUIRED: Any = object()
+"""Default of a key that must be given."""
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a JSON value is a number; true and false are none."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+class Settings:
+    """A JSON object with the file and the keys that lead to it.
+
+    Parameters
+    ----------
+    values : the object.
+    source : name of the file, for messages.
+    path : keys that lead here, for messages, such as ``solver_settings``.
+
+    Examples
+    --------
+    >>> from kratos_lite.io.strict_json import parse_json
+    >>> Settings(parse_json('{"type": "amg"}'), "run.json").text("type")
+    'amg'
+    """
+
+    def __init__(self, values: Object, source: str, path: str = "") -> None:
+        self.values, self.source, self.path = values, source, path
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def name(self, key: str) -> str:
+        """Return a key with the keys that lead to it."""
+        return f"{self.path}.{key}" if self.path else key
+
+    def error(self, key: str, message: str) -> InputError:
+        """Return an error at the place of a key, or of the object where it is missing."""
+        place = self.values.places.get(key) or next(iter(self.values.places.values()), None)
+        where = ":".join([self.source, *map(str, place or ())])
+        return InputError(f"{where}: {message}")
+
+    def get(self, key: str, default: Any = REQUIRED) -> Any:
+        """Return a value of any type."""
+        if key in self.values:
+            return self.values[key]
+        if default is REQUIRED:
+            raise self.error(key, f"key {self.name(key)!r} is missing")
+        return default
+
+    def _typed(self, key: str, default: Any, fits: bool, kind: str) -> Any:
+        if key in self.values and not fits:
+            raise self.error(key, f"{self.name(key)} must be {kind}; got {shown(self.values[key])}")
+        return self.get(key, default)
+
+    def text(self, key: str, default: Any = REQUIRED) -> str:
+        """Return a string."""
+        value = self._typed(key, default, isinstance(self.values.get(key), str), "a string")
+        return str(value)
+
+    def number(self, key: str, default: Any = REQUIRED) -> float:
+        """Return a number."""
+        return float(self._typed(key, default, is_number(self.values.get(key)), "a number"))
+
+    def integer(self, key: str, default: Any = REQUIRED) -> int:
+        """Return an integer."""
+        value = self.values.get(key)
+        return int(self._typed(key, default, is_number(value) and isinstance(value, int), "an integer"))
+
+    def flag(self, key: str, default: Any = REQUIRED) -> bool:
+        """Return true or false."""
+        return bool(self._typed(key, default, isinstance(self.values.get(key), bool), "true or false"))
+
+    def vector(self, key: str) -> list[float]:
+        """Return three numbers."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
+        return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of three numbers")]
+
+    def texts(self, key: str) -> list[str]:
+        """Return a list of strings; an empty one where the key is missing."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(isinstance(v, str) for v in value)
+        return list(self._typed(key, [], fits, "a list of strings"))
+
+    def section(self, key: str, required: bool = False) -> Settings:
+        """Return an inner object; an empty one where the key is missing, unless it is required."""
+        default = REQUIRED if required else Object()
+        value = self._typed(key, default, isinstance(self.values.get(key), Object), "an object {…}")
+        return Settings(value, self.source, self.name(key))
+
+    def sections(self, key: str) -> list[Settings]:
+        """Return a list of inner objects."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(isinstance(v, Object) for v in value)
+        entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
+        return [Settings(entry, self.source, f"{self.name(key)}[{i}]") for i, entry in enumerate(entries)]
+
+    def unknown(self, known: Iterable[str]) -> list[str]:
+        """Return the keys that are not among the known ones."""
+        return [key for key in self.values if key not in set(known)]
+
+    def check_keys(self, known: Iterable[str]) -> None:
+        """Raise InputError at the first key that is not among the known ones."""
+        known = list(known)
+        for key in self.unknown(known):
+            raise self.error(key, self.unknown_key(key, known))
+
+    def unknown_key(self, key: str, known: Iterable[str]) -> str:
+        """Return the message about an unknown key."""
+        known = list(known)
+        return f"unknown key {self.name(key)!r};{nearest(key, known)} The keys are {', '.join(known)}"
+
+
+def shown(value: Any) -> str:
+    """Return a JSON value for a message, shortened."""
+    text = "null" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def read_settings(path: str | Path) -> Settings:
+    """Return the object that a JSON file holds; see `read_json` for the errors."""
+    value = read_json(path)
+    if not isinstance(value, Object):
+        raise InputError(f"{path}:1:1: an object {{…}} is expected; got {type(value).__name__}")
+    return Settings(value, str(path))
+
+
+def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
+    """Return the path of a file named in a run file; raise ValueError if it leaves the folder.
+
+    >>> inside(Path("case"), "mesh/beam.mdpa").as_posix()
+    'case/mesh/beam.mdpa'
+    """
+    relative = Path(name.replace("\\", "/"))
+    leaves = relative.is_absolute() or ".." in relative.parts or (len(name) > 1 and name[1] == ":")
+    if leaves and not allow_outside:
+        raise ValueError(
+            f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
+        )
+    return folder / relative

@@ -1,0 +1,73 @@
+"""Conformance kit: checks that any shape, rule, element or material of your own must pass.
+
+Each ``check_…`` function returns one `Finding` per check, whatever the subject does;
+`assert_conforms` raises one readable error instead, for use in a test.
+
+Examples
+--------
+>>> from kratos_lite import KinematicLinear3D10N
+>>> assert_conforms(KinematicLinear3D10N)
+"""
+
+from __future__ import annotations
+
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.errors import InputError
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.shapes import Shape
+from kratos_lite.testing.elements import check_element
+from kratos_lite.testing.files import run_file
+from kratos_lite.testing.materials import check_material
+from kratos_lite.testing.report import ConformanceError, Finding, failures, report
+from kratos_lite.testing.rules import check_rule
+from kratos_lite.testing.shapes import check_shape
+
+__all__ = [
+    "ConformanceError",
+    "Finding",
+    "assert_conforms",
+    "check",
+    "check_element",
+    "check_material",
+    "check_rule",
+    "check_shape",
+    "failures",
+    "report",
+    "run_file",
+]
+
+
+def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tuple[str, list[Finding]]:
+    """Return the name and the findings of an element class, a shape class or a material instance.
+
+    Raises
+    ------
+    InputError
+        If the subject is none of these.
+    """
+    if isinstance(subject, LinearMaterial):
+        return type(subject).__name__, check_material(subject)
+    if isinstance(subject, type) and issubclass(subject, KinematicLinear):
+        return subject.__name__, check_element(subject)
+    if isinstance(subject, type) and issubclass(subject, Shape):
+        return subject.__name__, check_shape(subject)
+    raise InputError(f"check an element class, a shape class or a material instance; got {subject!r}")
+
+
+def assert_conforms(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> None:
+    """Raise ConformanceError with every failed check unless the subject passes all that can run.
+
+    Parameters
+    ----------
+    subject : element class, shape class or material instance.
+
+    Raises
+    ------
+    ConformanceError
+        With the text of `report`: each failed check, what it measured and where.
+    InputError
+        If the subject is none of these.
+    """
+    name, findings = check(subject)
+    if failures(findings):
+        raise ConformanceError(report(name, findings))

@@ -1,0 +1,266 @@
+"""Checks of one element: its matrices and loads against theory, on the ideal and on distorted cells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.quadrature import Rule
+from kratos_lite.shapes import Shape
+from kratos_lite.supports import rigid_modes
+from kratos_lite.testing import patches
+from kratos_lite.testing.cells import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
+from kratos_lite.testing.report import Finding, Measured, difference, run, worst
+from kratos_lite.testing.rules import VOLUME, check_rule
+from kratos_lite.testing.shapes import check_shape
+
+Element = type[KinematicLinear]
+
+
+def check_element(element: Element) -> list[Finding]:
+    """Check an element: its shape, its rules, the element alone, and patches of it.
+
+    Parameters
+    ----------
+    element : the class.
+
+    Returns
+    -------
+    list of Finding; those of the rules are named ``rule …`` and ``mass rule …``.
+
+    Notes
+    -----
+    Source of the set of checks: Irons' patch test; MacNeal & Harder, Finite Elements in Analysis
+    and Design 1 (1985) 3-20.
+
+    Examples
+    --------
+    >>> from kratos_lite import KinematicLinear3D6N
+    >>> findings = check_element(KinematicLinear3D6N)
+    >>> [finding.check for finding in findings if not finding.passed]
+    ['mid edges', 'quadratic patch']
+    """
+    found = run((definition,), element)
+    if not found[0].passed:
+        return found
+    found += check_shape(element.shape)
+    for name, rule in (("rule", element.rule), ("mass rule", element.mass_rule)):
+        found += [replace(f, check=f"{name} {f.check}") for f in check_rule(element.shape.cell, rule)]
+    return found + run(SINGLE, element) + run(patches.CHECKS, element)
+
+
+def definition(element: Element) -> Measured:
+    """Check that the class states a solid shape, a rule and a mass rule."""
+    shape, problems = getattr(element, "shape", None), []
+    if not (isinstance(shape, type) and issubclass(shape, Shape)):
+        problems.append(
+            "states no shape: write a Shape with cell, nodes, corners, degree, N and dN, and shape = it"
+        )
+    elif getattr(shape, "nodes", np.zeros((0, 0))).shape[1:] != (3,) or shape.cell not in VOLUME:
+        problems.append(
+            f"has the shape {shape.__name__}, which is not a solid: it needs nodes (n, 3) and a known cell"
+        )
+    for name in ("rule", "mass_rule"):
+        if not isinstance(getattr(element, name, None), Rule):
+            problems.append(f"states no {name}: write for example {name} = hexahedron(degree=3)")
+    why = "; ".join(problems) or "states a shape, a rule and a mass rule"
+    return Measured(len(problems), 0, f"{element.__name__} {why}")
+
+
+# ---- checks ------------------------------------------------------------------------------------
+
+
+def functions(element: Element) -> Measured:
+    """Check that N and dN of the element are those of its shape: assembly takes them from there."""
+    xi = element.shape.nodes[: element.shape.corners].mean(axis=0) * 0.9
+    errors = {
+        name: difference(getattr(element, name)(xi), getattr(element.shape, name)(xi)) for name in ("N", "dN")
+    }
+    error, name = worst(errors)
+    return Measured(
+        error, 1e-14, f"{name} of the element against that of its shape, of which matrices are made"
+    )
+
+
+def volume(element: Element) -> Measured:
+    """Check that the volume of a sheared cell is det A times that of the reference cell."""
+    X, exact = affine(element)
+    found = float(element(X).volume())
+    return Measured(
+        abs(found / exact - 1), 1e-14, f"volume of a sheared cell is {found:.15g}; exact is {exact:.15g}"
+    )
+
+
+def strain_operator(element: Element) -> Measured:
+    """Check that B u and strain(u) of a linear field are its strain at the Gauss points of a distorted cell."""
+    X = distorted(element)
+    u, exact = linear_field(X)
+    cell = element(X)
+    by_B = np.array([cell.B(xi) @ u.ravel() for xi in element.rule.points])
+    miss = np.maximum(np.abs(by_B - exact), np.abs(cell.strain(u) - exact))
+    g, row = np.unravel_index(int(np.argmax(miss)), miss.shape)
+    text = f"strain {voigt.NAMES[row]} at Gauss point {g}: B u gives {by_B[g, row]:.6g}, strain(u) "
+    text += f"{cell.strain(u)[g, row]:.6g}; exact is {exact[row]:.6g} (shear is engineering strain)"
+    return Measured(float(miss[g, row]), 1e-13, text)
+
+
+def stiffness(element: Element) -> Measured:
+    """Check K = Σ B^T C B γ det J, summed by hand; one cell, a batch and the order by axis agree."""
+    X, n = distorted(element), len(element.shape.nodes)
+    cell, batch = element(X), element(np.stack([X, affine(element)[0]]))
+    errors = {}
+    for name, C in (("isotropic", C_ISOTROPIC), ("general", anisotropic())):
+        B, det = (np.array([f(xi) for xi in element.rule.points]) for f in (cell.B, cell.detJ))
+        hand = np.einsum("gki,kl,glj,g->ij", B, C, B, det * element.rule.weights, optimize=True)
+        by_axis = cell.stiffness_by_axis(C).transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
+        errors[f"stiffness(C) of {name} C against Σ B^T C B γ det J"] = difference(cell.stiffness(C), hand)
+        errors[f"stiffness_by_axis(C) of {name} C against Σ B^T C B γ det J"] = difference(by_axis, hand)
+        errors[f"stiffness(C) of a batch, {name} C, against one cell"] = difference(
+            batch.stiffness(C)[0], hand
+        )
+    return Measured(worst(errors)[0], 1e-14, worst(errors)[1])
+
+
+def symmetry(element: Element) -> Measured:
+    """Check K = K^T."""
+    cell = element(distorted(element))
+    K = {"an isotropic": cell.stiffness(C_ISOTROPIC), "a general": cell.stiffness(anisotropic())}
+    error, name = worst({name: difference(k, k.T) for name, k in K.items()})
+    return Measured(error, 1e-15, f"K of {name} C against its transpose on a distorted cell")
+
+
+def rank(element: Element) -> Measured:
+    """Check that K has exactly six eigenvalues that are zero or less (below 1e-9 of the largest)."""
+    counts = []
+    for X in (element.shape.nodes, distorted(element)):
+        values = np.linalg.eigvalsh(element(X).stiffness(C_ISOTROPIC))
+        counts.append(int((~(values >= 1e-9 * values[-1])).sum()))
+    text = (
+        f"{counts[0]} zero-energy modes on the reference cell, {counts[1]} on a distorted one; expected are "
+    )
+    text += "the 6 rigid ones; more are spurious modes of too few Gauss points"
+    return Measured(max(abs(count - 6) for count in counts), 0, text)
+
+
+def rigid_motions(element: Element) -> Measured:
+    """Check that six rigid motions need no force: K r = 0."""
+    errors = {}
+    for name, X in (("the reference", element.shape.nodes), ("a distorted", distorted(element))):
+        K, R = element(X).stiffness(C_ISOTROPIC), rigid_modes(X)
+        miss = np.abs(K @ R).max(axis=0) / (np.abs(K).max() * np.abs(R).max(axis=0))
+        mode = int(np.argmax(miss))
+        kind = "translation along" if mode < 3 else "rotation about"
+        errors[f"|K r| / |K| |r| of {name} cell is largest for the {kind} {'xyz'[mode % 3]}"] = float(
+            miss[mode]
+        )
+    return Measured(worst(errors)[0], 1e-13, worst(errors)[1])
+
+
+def frame_invariance(element: Element) -> Measured:
+    """Check that a rotated cell has the rotated K."""
+    X = distorted(element)
+    Q, _ = np.linalg.qr(np.random.default_rng(17).uniform(-1, 1, (3, 3)))
+    Q *= np.sign(np.linalg.det(Q))
+    T = np.kron(np.eye(len(X)), Q)
+    K, turned = (element(Y).stiffness(C_ISOTROPIC) for Y in (X, X @ Q.T))
+    return Measured(difference(turned, T @ K @ T.T), 1e-14, "K of a rotated cell against the rotated K")
+
+
+def numbering_invariance(element: Element) -> Measured:
+    """Check that a cell whose nodes are listed from another corner has the same K, reordered."""
+    X, _ = affine(element)
+    K = element(X).stiffness(C_ISOTROPIC)
+    errors = {}
+    for order in rotations(element.shape):
+        dofs = (3 * order[:, None] + np.arange(3)).ravel()
+        turned = element(X[order]).stiffness(C_ISOTROPIC)
+        errors[tuple(order.tolist())] = difference(turned, K[np.ix_(dofs, dofs)])
+    error, listed = worst(errors)
+    return Measured(
+        error, 1e-14, f"K with its nodes listed as {listed}, a rotation of the cell, against K reordered"
+    )
+
+
+def length_scaling(element: Element) -> Measured:
+    """Check K(s X) = s K for s = 1e-9 … 1e9: no absolute tolerance hides in the element."""
+    X = distorted(element)
+    K = element(X).stiffness(C_ISOTROPIC)
+    errors = {
+        k: difference(element(10.0**k * X).stiffness(C_ISOTROPIC), 10.0**k * K) for k in range(-9, 10, 3)
+    }
+    error, k = worst(errors)
+    return Measured(error, 1e-13, f"K of the cell scaled by 1e{k} against 1e{k} K")
+
+
+def offset(element: Element) -> Measured:
+    """Check that far from the origin K loses no more digits than the coordinates themselves."""
+    X, eps = distorted(element), np.finfo(float).eps
+    K = element(X).stiffness(C_ISOTROPIC)
+    loss = [difference(element(X + c).stiffness(C_ISOTROPIC), K) / (eps * c) for c in (1e3, 1e6)]
+    return Measured(
+        max(loss), 20, "error of K at a distance c from the origin, in units of the rounding of c"
+    )
+
+
+def internal_load(element: Element) -> Measured:
+    """Check ∫ B^T σ(u) dV = K u."""
+    X, C = distorted(element), anisotropic()
+    u = np.random.default_rng(19).uniform(-1, 1, X.shape)
+    cell = element(X)
+    error = difference(cell.internal_load(cell.stress(C, u)).ravel(), cell.stiffness(C) @ u.ravel())
+    return Measured(error, 1e-13, "internal_load(stress(C, u)) against stiffness(C) u")
+
+
+def body_force(element: Element) -> Measured:
+    """Check that a constant body force adds up to V b and has no moment about the centroid."""
+    X, V = affine(element)
+    b = np.array([1.0, -2.0, 3.0])
+    centre = element(X).gauss_points().T @ element(X).dV / V
+    f = element(X).body_force(b)
+    force = difference(f.sum(axis=0), V * b)
+    moment = float(np.abs(np.cross(X - centre, f).sum(axis=0)).max() / (V * np.abs(b).max()))
+    nodal = difference(element(X).body_force(np.tile(b, (len(X), 1))), f)
+    text = f"total against V b: {force:.3g}; moment: {moment:.3g}; nodal b against constant b: "
+    return Measured(float(np.max([force, moment, nodal])), 1e-13, text + f"{nodal:.3g}")
+
+
+def mass_total(element: Element) -> Measured:
+    """Check that consistent and lumped mass add up to density × volume on a sheared cell."""
+    X, V = affine(element)
+    cell, rho = element(X), 3.0
+    totals = [float(cell.mass(rho)[::3, ::3].sum()), float(cell.lumped_mass(rho).sum())]
+    error = float(np.max(np.abs(np.array(totals) / (rho * V) - 1)))
+    text = f"consistent mass {totals[0]:.15g}, lumped mass {totals[1]:.15g}; exact is {rho * V:.15g}"
+    return Measured(error, 1e-13, text)
+
+
+def consistent_mass(element: Element) -> Measured:
+    """Check that the consistent mass matrix is positive definite (eigenvalues above 1e-6 of the largest)."""
+    counts = []
+    for X in (element.shape.nodes, distorted(element)):
+        values = np.linalg.eigvalsh(element(X).mass(1.0))
+        counts.append(int((~(values > 1e-6 * values[-1])).sum()))
+    text = (
+        f"{counts[0]} eigenvalues of the mass matrix are not positive on the reference cell, {counts[1]} on "
+    )
+    text += f"a distorted one; a mass_rule of more than {len(element.mass_rule)} points helps"
+    return Measured(max(counts), 0, text)
+
+
+def lumped_mass(element: Element) -> Measured:
+    """Check that each node has a positive mass."""
+    masses = np.concatenate([element(X).lumped_mass(1.0) for X in (element.shape.nodes, distorted(element))])
+    bad = int((~(masses > 1e-9 * np.abs(masses).max())).sum())
+    return Measured(
+        bad, 0, f"nodes without a positive mass; the smallest is {masses.min():.3g} kg of 1 kg/m³"
+    )
+
+
+SINGLE = (
+    functions, volume, strain_operator, stiffness, symmetry, rank, rigid_motions, frame_invariance,
+    numbering_invariance, length_scaling, offset, internal_load, body_force, mass_total, consistent_mass,
+    lumped_mass,
+)  # fmt: skip

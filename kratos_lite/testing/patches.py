@@ -1,0 +1,194 @@
+"""Patch tests: several cells of one element must reproduce simple exact solutions together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import voigt
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.surface import area_vectors
+from kratos_lite.generate import SPLITS, box, raise_order
+from kratos_lite.materials import Isotropic3D
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.shapes import Shape
+from kratos_lite.testing.report import Measured
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Element = type[KinematicLinear]
+
+MATERIAL = Isotropic3D(E=1e6, nu=0.25)
+
+
+def patch(
+    shape: type[Shape],
+    cells: tuple[int, int, int],
+    size: tuple[float, float, float] = (1, 1, 1),
+    move: float = 0.0,
+) -> tuple[Array, Ints]:
+    """Return points (n, 3) and nodes (m, k) of a box that begins at the origin, cut into cells of one shape.
+
+    `move` is how far the corners inside are moved at most, along each axis (seeded).
+    """
+    mesh = box(size, cells, "KinematicLinear3D8N")
+    points, bricks = mesh.points.copy(), mesh.blocks[0].nodes.astype(np.int64)
+    inner = ((points > 0) & (points < size)).all(axis=1)
+    points[inner] += np.random.default_rng(3).uniform(-move, move, (int(inner.sum()), 3))
+    split = np.array(SPLITS[shape.cell])
+    if split.max() == 8:
+        bricks = np.column_stack([bricks, np.arange(len(bricks)) + len(points)])
+        points = np.vstack([points, points[bricks[:, :8]].mean(axis=1)])
+    return raise_order(points, bricks[:, split].reshape(-1, split.shape[1]), shape)
+
+
+def unbuildable(shape: type[Shape]) -> str:
+    """Return why no patch of a shape can be made, or an empty text."""
+    if shape.cell not in SPLITS:
+        return f"no box can be cut into cells {shape.cell!r}"
+    points, nodes = patch(shape, (1, 1, 1))
+    H = np.column_stack([shape.nodes, np.ones(len(shape.nodes))])
+    X = points[nodes[0]]
+    if np.abs(H @ np.linalg.lstsq(H, X, rcond=None)[0] - X).max() > 1e-12:
+        return "the nodes of the shape are not its corners and the middles of its edges, faces and cell"
+    return ""
+
+
+def assemble(element: Element, points: Array, nodes: Ints) -> Array:
+    """Return the stiffness matrix of a patch as a full array (3n, 3n)."""
+    K = np.zeros((3 * len(points), 3 * len(points)))
+    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+    np.add.at(K, (dofs[:, :, None], dofs[:, None, :]), element(points[nodes]).stiffness(MATERIAL.C))
+    return K
+
+
+def solve(K: Array, fixed: NDArray[np.bool_], u: Array, f: Array) -> Array:
+    """Return u (n, 3) with K u = f where `fixed` (n, 3) is False; elsewhere it keeps its values."""
+    free, known = ~fixed.ravel(), u.ravel() * fixed.ravel()
+    known[free] = np.linalg.solve(K[np.ix_(free, free)], (f.ravel() - K @ known)[free])
+    return known.reshape(u.shape)
+
+
+def on_box(points: Array) -> NDArray[np.bool_]:
+    """Return for each component whether its node lies on the boundary of the unit cube."""
+    outer = ((points == 0) | (points == 1)).any(axis=1)
+    return np.repeat(outer[:, None], 3, axis=1)
+
+
+def errors(cells: KinematicLinear, u: Array, exact: Array, stress: Array) -> tuple[float, float]:
+    """Return the largest errors of u (m, k, 3) and of its stress at the Gauss points, relative, two-sided."""
+    found = cells.stress(MATERIAL.C, u)
+    return (
+        float(np.abs(u - exact).max() / np.abs(exact).max()),
+        float(np.abs(found - stress).max() / np.abs(stress).max()),
+    )
+
+
+def linear_patch(element: Element) -> Measured | str:
+    """Run Irons' patch test with shear: 27 bricks, inner corners moved, u linear on the boundary.
+
+    Source of the field: MacNeal & Harder, Finite Elements in Analysis and Design 1 (1985) 3-20.
+    """
+    if why := unbuildable(element.shape):
+        return why
+    points, nodes = patch(element.shape, (3, 3, 3), move=0.08)
+    exact = 0.5e-3 * points @ (np.ones((3, 3)) + np.eye(3))
+    stress = np.array([2000.0, 2000, 2000, 400, 400, 400])
+    u = solve(assemble(element, points, nodes), on_box(points), exact, np.zeros_like(exact))
+    of_u, of_stress = errors(element(points[nodes]), u[nodes], exact[nodes], stress)
+    text = f"u in a distorted patch is off by {of_u:.3g} (limit 1e-13), the stress by {of_stress:.3g} (1e-12)"
+    return Measured(np.maximum(10 * of_u, of_stress), 1e-12, text)
+
+
+def quadratic_patch(element: Element) -> Measured | str:
+    """Check a random quadratic u under the body force that holds it in balance, on sheared cells."""
+    if element.shape.degree < 2:
+        return f"{element.shape.__name__} spans no quadratics"
+    if why := unbuildable(element.shape):
+        return why
+    points, nodes = patch(element.shape, (2, 2, 2))
+    fixed = on_box(points)
+    rng = np.random.default_rng(23)
+    points = points @ (np.eye(3) + rng.uniform(-0.3, 0.3, (3, 3)))
+    H = rng.uniform(-1, 1, (3, 3, 3))  # u_i = H_ijk x_j x_k / 2, so that u_i,jk = H_ijk
+    H += H.swapaxes(1, 2)
+    exact = np.einsum("ijk,nj,nk->ni", H, points, points) / 2
+    lam, mu = MATERIAL.lame
+    b = -(lam + mu) * np.einsum("jji->i", H) - mu * np.einsum("ijj->i", H)
+    cells, f = element(points[nodes]), np.zeros_like(points)
+    np.add.at(f, nodes, cells.body_force(b))
+    u = solve(assemble(element, points, nodes), fixed, exact, f)
+    gradient = np.einsum("ijk,mgk->mgij", H, cells.gauss_points())
+    stress = MATERIAL.stress(voigt.symmetric_gradient(gradient))
+    of_u, of_stress = errors(cells, u[nodes], exact[nodes], stress)
+    text = f"quadratic u: u is off by {of_u:.3g} (limit 1e-13), the stress by {of_stress:.3g} (1e-12)"
+    return Measured(np.maximum(10 * of_u, of_stress), 1e-12, text)
+
+
+def shared_faces(element: Element) -> Measured | str:
+    """Check that two bricks of cells share whole faces: corners and all further nodes, outward everywhere."""
+    shape = element.shape
+    if why := unbuildable(shape):
+        return why
+    points, nodes = patch(shape, (2, 1, 1), (2, 1, 1))
+    n = len(nodes)
+    block = Block(element.__name__, nodes.astype(np.int32), np.arange(n), np.zeros(n, dtype=np.int64), shape)
+    area = flux = 0.0
+    for face in Mesh(points, [block]).boundary:
+        assert face.shape is not None
+        X = points[face.nodes]
+        vectors = area_vectors(face.shape, X).sum(axis=1)
+        area += float(np.linalg.norm(vectors, axis=1).sum())
+        flux += float((vectors * X.mean(axis=1)).sum())  # ∮ x · n dA = 3 V where all normals point outward
+    rings = [[a for a in face if a < shape.corners] for face in shape.faces]
+    whole = {tuple(sorted(cell[list(face)])) for cell in nodes for face in shape.faces}
+    corners = {tuple(sorted(cell[ring])) for cell in nodes for ring in rings}
+    torn = len(whole) - len(corners)
+    text = f"the boundary of a 2x1x1 box has the area {area:.6g} (10) and ∮ x · n dA = {flux:.6g} (6); "
+    text += f"{torn} faces share corners but not all nodes"
+    return Measured(np.max([abs(area - 10), abs(flux - 6), torn]), 1e-12, text)
+
+
+def bend(element: Element, bricks: tuple[int, int, int]) -> tuple[float, float, float]:
+    """Bend a 2x1x1 bar by turning its ends; return strain energy / exact - 1, errors of u and of stress.
+
+    Only what the ends need is held: u_x, and three components against rigid motion.  The exact
+    solution is u = κ (x z, -ν y z, (ν (y² - z²) - x²) / 2), stress σ_xx = E κ z.
+    """
+    points, nodes = patch(element.shape, bricks, (2, 1, 1))
+    points = points - [1, 0.5, 0.5]
+    x, y, z = points.T
+    nu, E = MATERIAL.nu, MATERIAL.E
+    exact = np.column_stack([x * z, -nu * y * z, (nu * (y**2 - z**2) - x**2) / 2])
+    fixed = np.zeros(points.shape, dtype=bool)
+    fixed[np.abs(x) == 1, 0] = True
+    edge = (x == -1) & (z == -0.5)
+    fixed[edge & (y == -0.5), 1:] = True
+    fixed[edge & (y == 0.5), 2] = True
+    K = assemble(element, points, nodes)
+    u = solve(K, fixed, exact, np.zeros_like(points))
+    cells = element(points[nodes])
+    stress = np.zeros((len(nodes), len(element.rule), 6))
+    stress[..., 0] = E * cells.gauss_points()[..., 2]
+    energy = 0.5 * float(u.ravel() @ K @ u.ravel())
+    return energy / (E * 2 / 24) - 1, *errors(cells, u[nodes], exact[nodes], stress)
+
+
+def bending(element: Element) -> Measured | str:
+    """Check that pure bending is exact for quadratic shapes, too stiff but converging for linear ones."""
+    if why := unbuildable(element.shape):
+        return why
+    coarse, of_u, of_stress = bend(element, (2, 1, 1))
+    if element.shape.degree >= 2:
+        text = f"pure bending of two bricks: u is off by {of_u:.3g}, the stress by {of_stress:.3g}"
+        return Measured(np.maximum(of_u, of_stress), 1e-12, text)
+    fine = bend(element, (4, 2, 2))[0]
+    text = f"energy of pure bending / exact - 1 is {coarse:.3g} with 2x1x1 bricks, {fine:.3g} with 4x2x2; "
+    if min(coarse, fine) < -1e-12:
+        return Measured(-min(coarse, fine), 1e-12, text + "below 0 the element is softer than any exact one")
+    return Measured(
+        fine / coarse, 0.5, text + "measured is their ratio, which falls with the square of the cell size"
+    )
+
+
+CHECKS = (shared_faces, linear_patch, quadratic_patch, bending)

@@ -1,0 +1,151 @@
+"""Findings: what each check measured, and the text that tells a student what to mend."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.errors import MAX_PROBLEMS, KratosLiteError
+
+S = TypeVar("S")
+T = TypeVar("T")
+
+
+class ConformanceError(KratosLiteError):
+    """An element, a shape or a material does not do what theory demands."""
+
+
+class Measured(NamedTuple):
+    """What a check measured, the largest value that passes, and where it was measured."""
+
+    value: float
+    limit: float
+    detail: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The result of one check.
+
+    Attributes
+    ----------
+    check : short name, such as ``derivatives``.
+    passed : whether `measured` ≤ `limit`; False for a check that was not run.
+    measured, limit : numbers; relative errors or counts, as `detail` says.
+    detail : where the largest error is, or why the check was not run.
+    skipped : True if the check was not run: then nothing is known, good or bad.
+    """
+
+    check: str
+    passed: bool
+    measured: float
+    limit: float
+    detail: str
+    skipped: bool = False
+
+    def __str__(self) -> str:
+        if self.skipped:
+            return f"{self.check}: not run: {self.detail}"
+        sign = "≤" if self.passed else "exceeds"
+        return f"{self.check}: {self.measured:.3g} {sign} {self.limit:.3g}: {self.detail}"
+
+
+def failures(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the findings of checks that were run and did not pass.
+
+    >>> failures([Finding("rank", True, 0, 0, ""), Finding("patch", False, 1, 0, "why", skipped=True)])
+    []
+    """
+    return [finding for finding in findings if not finding.passed and not finding.skipped]
+
+
+def report(name: str, findings: list[Finding]) -> str:
+    """Return the text that counts all findings of `name` and shows the failures.
+
+    >>> print(report("Wedge6", [Finding("kronecker", True, 0.0, 1e-14, "")]))
+    Wedge6 conforms: 1 check passed
+    """
+    bad, skipped = failures(findings), sum(finding.skipped for finding in findings)
+    run = len(findings) - skipped
+    aside = f", {skipped} not run" if skipped else ""
+    if not bad:
+        return f"{name} conforms: {run} check{'s' * (run != 1)} passed{aside}"
+    lines = [f"{name} does not conform: {len(bad)} of {run} checks failed{aside}"]
+    lines += [f"  {finding}" for finding in bad[:MAX_PROBLEMS]]
+    if len(bad) > MAX_PROBLEMS:
+        lines.append(f"  … and {len(bad) - MAX_PROBLEMS} more")
+    return "\n".join(lines)
+
+
+def run(checks: Iterable[Callable[[S], Measured | str]], subject: S) -> list[Finding]:
+    """Run checks on a subject; each returns what it measured, or a text that says why it cannot run.
+
+    Whatever the subject raises becomes a failed finding, for a kit that stops at the first bug
+    would not show the second.
+    """
+    return [_run_one(check, subject) for check in checks]
+
+
+def _run_one(check: Callable[[S], Measured | str], subject: S) -> Finding:
+    name = check.__name__.replace("_", " ")
+    try:
+        with np.errstate(all="ignore"):  # a result that is not finite fails its check anyway
+            result = check(subject)
+    except Exception as error:
+        return Finding(name, False, math.inf, 0.0, f"raises {describe(error)}")
+    if isinstance(result, str):
+        return Finding(name, False, math.nan, math.nan, result, skipped=True)
+    value, limit = float(result.value), float(result.limit)
+    return Finding(name, value <= limit, value, limit, result.detail)
+
+
+def describe(error: Exception) -> str:
+    """Return an error as one text with the line of the student's file that raised it, if one did."""
+    ours, numpys = Path(__file__).parents[1], Path(np.__file__).parent
+    theirs = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not {ours, numpys} & set(Path(frame.filename).parents)
+    ]
+    where = f" at {Path(theirs[-1].filename).name}:{theirs[-1].lineno}" if theirs else ""
+    kind = "" if isinstance(error, ConformanceError) else f"{type(error).__name__}: "
+    return f"{kind}{error}{where}"
+
+
+def difference(found: ArrayLike, expected: ArrayLike) -> float:
+    """Return max |found - expected| / max |expected|, two-sided; infinite where the sizes differ.
+
+    >>> difference([1.0, 2.0], [1.0, 4.0])
+    0.5
+    """
+    a, b = np.asarray(found, dtype=float), np.asarray(expected, dtype=float)
+    if a.shape != b.shape:
+        raise ConformanceError(f"a result has shape {a.shape}; expected {b.shape}")
+    return float(np.abs(a - b).max(initial=0.0) / np.abs(b).max(initial=1e-300))
+
+
+def worst(errors: Mapping[T, float]) -> tuple[float, T]:
+    """Return the largest error and what it belongs to; one that is not a number counts as largest.
+
+    >>> worst({"K": 0.1, "M": float("nan"), "f": 0.2})
+    (nan, 'M')
+    """
+    names = list(errors)
+    i = int(np.argmax([errors[name] for name in names]))
+    return float(errors[names[i]]), names[i]
+
+
+def at(xi: ArrayLike) -> str:
+    """Return a point as text.
+
+    >>> at([0.25, -1.0, 0.5])
+    '(0.25, -1, 0.5)'
+    """
+    return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(xi, dtype=float).tolist()) + ")"

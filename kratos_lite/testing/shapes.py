@@ -1,0 +1,224 @@
+"""Checks of shapes: N and dN against each other and against theory, edges, faces and node orders."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.testing.report import ConformanceError, Finding, Measured, at, run, worst
+from kratos_lite.testing.rules import exponents, monomial
+
+Array = NDArray[np.float64]
+
+
+def check_shape(shape: type[Shape]) -> list[Finding]:
+    """Check a shape: its functions, their derivatives, its edges, faces and node orders.
+
+    Parameters
+    ----------
+    shape : the class; it is evaluated point by point, so that only the check ``broadcasting``
+        fails if N or dN take one point at a time.
+
+    Returns
+    -------
+    list of Finding
+
+    Examples
+    --------
+    >>> from kratos_lite.shapes import Wedge15
+    >>> all(finding.passed for finding in check_shape(Wedge15))
+    True
+    """
+    return run(CHECKS, shape)
+
+
+def inside(shape: type[Shape], count: int) -> Array:
+    """Return seeded points inside a cell, with two digits so that messages show them exactly.
+
+    They lie at no symmetric place: there a derivative with two coordinates mixed up looks right.
+    """
+    corners = shape.nodes[: shape.corners]
+    share = np.random.default_rng(7).dirichlet(np.ones(len(corners)), count)
+    return np.asarray((share @ corners).round(2))
+
+
+def values(shape: type[Shape], points: Array) -> Array:
+    """Return N at points (p, d) as (p, n), evaluated one by one."""
+    return _table(shape, "N", points, shape.nodes.shape[:1])
+
+
+def gradients(shape: type[Shape], points: Array) -> Array:
+    """Return dN at points (p, d) as (p, n, d), evaluated one by one."""
+    return _table(shape, "dN", points, shape.nodes.shape)
+
+
+def _table(shape: type[Shape], function: str, points: Array, expected: tuple[int, ...]) -> Array:
+    rows = [np.asarray(getattr(shape, function)(xi), dtype=float) for xi in points]
+    for row, xi in zip(rows, points, strict=True):
+        if row.shape != expected:
+            raise ConformanceError(f"{function} at xi = {at(xi)} has shape {row.shape}; expected {expected}")
+    return np.array(rows)
+
+
+def derivatives(shape: type[Shape]) -> Measured | str:
+    """Check that dN equals the differences of N, sixth order, at unsymmetric points."""
+    points, d, h = inside(shape, 12), shape.nodes.shape[1], 1e-3
+    if d == 0:
+        return "a point has no direction to differentiate in"
+    given, numeric = gradients(shape, points), np.zeros((len(points), *shape.nodes.shape))
+    for j in range(d):
+        for k, factor in ((1, 45), (2, -9), (3, 1)):
+            step = k * h * np.eye(d)[j]
+            change = values(shape, points + step) - values(shape, points - step)
+            numeric[..., j] += factor * change / (60 * h)
+    miss, limit = np.abs(given - numeric), 1e-9
+    p, a, j = (int(i) for i in np.unravel_index(int(np.argmax(miss)), miss.shape))
+    text = f"dN[{a}] / d {'rst'[j]} at xi = {at(points[p])}: "
+    text += f"dN gives {given[p, a, j]:.6g}, differences of N give {numeric[p, a, j]:.6g}"
+    bad = [
+        f"dN[{b}] / d {'rst'[k]}" for b, k in np.argwhere(~(miss.max(axis=0) <= limit)) if (b, k) != (a, j)
+    ]
+    if bad:
+        text += f"; also {', '.join(bad[:6])}" + (f" and {len(bad) - 6} more" if len(bad) > 6 else "")
+    return Measured(float(miss[p, a, j]), limit, text)
+
+
+def broadcasting(shape: type[Shape]) -> Measured:
+    """Check that N and dN of points (2, 3, d) give (2, 3, n) and (2, 3, n, d), the same as one by one."""
+    points = inside(shape, 6)
+    many = points.reshape(2, 3, -1)
+    errors: dict[str, float] = {}
+    for name, table in (("N", values), ("dN", gradients)):
+        expected = table(shape, points)
+        found = np.asarray(getattr(shape, name)(many), dtype=float)
+        wanted = (2, 3, *expected.shape[1:])
+        if found.shape != wanted:
+            raise ConformanceError(
+                f"{name} of points {many.shape} has shape {found.shape}; expected {wanted}"
+            )
+        errors[name] = float(np.abs(found - expected.reshape(wanted)).max(initial=0.0))
+    error, name = worst(errors)
+    return Measured(error, 1e-14, f"{name} of points {many.shape} against that of single points")
+
+
+def kronecker(shape: type[Shape]) -> Measured:
+    """Check that N_a is 1 at its own node and 0 at the others."""
+    N = values(shape, shape.nodes)
+    miss = np.abs(N - np.eye(len(N)))
+    b, a = np.unravel_index(int(np.argmax(miss)), miss.shape)
+    text = f"N[{a}] at node {b} {at(shape.nodes[b])} is {N[b, a]:.6g}; expected {float(a == b):g}"
+    return Measured(float(miss[b, a]), 4e-15, text)
+
+
+def partition_of_unity(shape: type[Shape]) -> Measured:
+    """Check that the functions sum to 1 and their derivatives to 0."""
+    points = np.vstack([inside(shape, 40), shape.nodes])
+    functions = np.abs(values(shape, points).sum(axis=1) - 1)
+    slopes = np.abs(gradients(shape, points).sum(axis=1)).max(axis=1, initial=0.0)
+    miss = np.maximum(functions, slopes)
+    p = int(np.argmax(miss))
+    text = f"at xi = {at(points[p])}: sum N = 1 is off by {functions[p]:.3g}, sum dN = 0 by {slopes[p]:.3g}"
+    return Measured(float(miss[p]), 4e-15, text)
+
+
+def reproduction(shape: type[Shape]) -> Measured:
+    """Check that polynomials up to the degree of the shape come back from nodal values, with their slopes."""
+    points, d = inside(shape, 40), shape.nodes.shape[1]
+    N, dN = values(shape, points), gradients(shape, points)
+    errors: dict[str, float] = {}
+    for e in exponents(d, shape.degree):
+        power = np.array(e, dtype=int)
+        nodal = np.prod(shape.nodes**power, axis=1)
+        miss = np.abs(N @ nodal - np.prod(points**power, axis=1))
+        for j in range(d):
+            lower = power - (np.arange(d) == j)
+            slope = power[j] * np.prod(points ** lower.clip(min=0), axis=1)
+            miss = np.maximum(miss, np.abs(dN[..., j] @ nodal - slope))
+        p = int(np.argmax(miss))
+        errors[f"{monomial(e)} is off most at xi = {at(points[p])}"] = float(miss[p])
+    error, text = worst(errors)
+    return Measured(error, 4e-15, f"{text} (degree claimed: {shape.degree})")
+
+
+def bounded(shape: type[Shape]) -> Measured | str:
+    """Check that N is continuous and dN bounded at and beside every node, such as the apex of a pyramid."""
+    (n, d), h, usual = shape.nodes.shape, 1e-8, np.abs(gradients(shape, inside(shape, 40))).max(initial=0.0)
+    if d == 0:
+        return "a point has no neighbourhood"
+    targets = inside(shape, 8)
+    near = (shape.nodes[:, None] + h * (targets - shape.nodes[:, None])).reshape(-1, d)
+    jump = np.abs(values(shape, near).reshape(n, -1, n) - values(shape, shape.nodes)[:, None]).max()
+    points = np.vstack([shape.nodes, near])
+    slopes = np.abs(gradients(shape, points)).max(axis=(1, 2))
+    p = int(np.argmax(slopes))
+    text = f"beside the nodes N changes by {jump:.3g} over {h:g}, and dN reaches {slopes[p]:.3g} at xi = "
+    text += f"{at(points[p])}; inside it reaches {usual:.3g}; the ratio is measured"
+    return Measured(float(np.maximum(slopes[p], jump / h) / usual), 1000.0, text)
+
+
+def mid_edges(shape: type[Shape]) -> Measured | str:
+    """Check that node corners + e lies in the middle of edge e."""
+    c = shape.corners
+    if not shape.edges or len(shape.nodes) < c + len(shape.edges):
+        return "the shape has no mid-edge nodes"
+    ends = np.array(shape.edges)
+    miss = np.abs(shape.nodes[c : c + len(ends)] - shape.nodes[ends].mean(axis=1)).max(axis=1)
+    e = int(np.argmax(miss))
+    i, j = shape.edges[e]
+    return Measured(float(miss[e]), 1e-15, f"node {c + e} should lie in the middle of the edge {i}-{j}")
+
+
+def faces(shape: type[Shape]) -> Measured | str:
+    """Check that faces are outward, closed (each edge once in each direction) and list all their nodes."""
+    if shape.nodes.shape[1] < 3:
+        return "only solids have faces"
+    problems = [] if shape.faces else ["the shape lists no faces"]
+    directed: dict[tuple[int, int], int] = {}
+    centre = shape.nodes[: shape.corners].mean(axis=0)
+    for f, face in enumerate(shape.faces):
+        problems += [f"face {f} {face} {why}" for why in _face_problems(shape, face, centre)]
+        ring = [a for a in face if a < shape.corners]
+        for edge in zip(ring, ring[1:] + ring[:1], strict=True):
+            directed[edge] = directed.get(edge, 0) + 1
+    open_ = [e for e, count in directed.items() if count != 1 or directed.get((e[1], e[0]), 0) != 1]
+    if open_:
+        problems.append(f"edge {open_[0]} is not used once in each direction by two faces")
+    return Measured(len(problems), 0, problems[0] if problems else "problems found in the faces")
+
+
+def _face_problems(shape: type[Shape], face: tuple[int, ...], centre: Array) -> list[str]:
+    if len(face) not in FACE_SHAPES or len(face) < 3:
+        return [f"has {len(face)} nodes; faces have 3, 4, 6, 8 or 9"]
+    kind, X = FACE_SHAPES[len(face)], shape.nodes[list(face)]
+    c = kind.corners
+    normal = sum(np.cross(X[i], X[(i + 1) % c]) for i in range(c))
+    problems = []
+    if not (X[:c].mean(axis=0) - centre) @ normal > 0:
+        problems.append("has its nodes clockwise from outside; write them counter-clockwise")
+    on_plane = np.abs((shape.nodes - X[0]) @ normal) < 1e-9
+    if set(np.flatnonzero(on_plane).tolist()) != set(face):
+        problems.append(f"should list the nodes {np.flatnonzero(on_plane).tolist()}, which lie on it")
+    linear = FACE_SHAPES[c]
+    if np.abs(np.array([linear.N(xi) for xi in kind.nodes]) @ X[:c] - X).max() > 1e-12:
+        problems.append("has its mid-edge nodes out of order")
+    return problems
+
+
+def node_orders(shape: type[Shape]) -> Measured:
+    """Check that the orders for VTK and Gmsh are permutations of the nodes that keep corners corners."""
+    n, c = len(shape.nodes), shape.corners
+    wrong = [
+        name
+        for name, order in (("to_vtk", shape.to_vtk), ("to_gmsh", shape.to_gmsh))
+        if sorted(order) != list(range(n)) or sorted(order[:c]) != list(range(c))
+    ]
+    return Measured(
+        len(wrong), 0, f"not a permutation of {n} nodes, corners first: {', '.join(wrong) or 'none'}"
+    )
+
+
+CHECKS = (
+    derivatives, broadcasting, kronecker, partition_of_unity, reproduction, bounded, mid_edges, faces,
+    node_orders,
+)  # fmt: skip
