@@ -1,4 +1,4 @@
-"""Checks of a model before it is solved: geometry, names of free rigid modes, numbers.
+"""Checks of a model before it is solved: geometry, rules, numbers.
 
 Each check either raises one clear error or returns warnings for the report.
 """
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from kratos_lite.batches import Batch
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import tabulate
-from kratos_lite.errors import MAX_PROBLEMS, MeshError, ModelError
+from kratos_lite.errors import MAX_PROBLEMS, MeshError
+from kratos_lite.loads import Gravity, Load
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.quadrature import Rule
-from kratos_lite.supports import Supports, rigid_modes
+from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,6 +33,24 @@ def check_points(mesh: Mesh) -> None:
         raise MeshError(
             f"node {mesh.node_ids[bad[0]]} has coordinates {mesh.points[bad[0]]}; they must be finite"
         )
+
+
+def check_blocks(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> None:
+    """Raise MeshError if a block is not shaped as its kind needs or names a node that is not there."""
+    for block, kind in zip(mesh.blocks, kinds, strict=True):
+        nodes, m, k = np.asarray(block.nodes), len(block.ids), len(kind.nodes)
+        if nodes.shape != (m, k) or nodes.dtype.kind not in "iu" or np.shape(block.properties) != (m,):
+            raise MeshError(
+                f"block {block.name}: nodes must be whole numbers of shape ({m}, {k}) and properties of "
+                f"shape ({m},), as there are {m} ids; got {nodes.dtype} {nodes.shape} and {np.shape(block.properties)}"
+            )
+        bad = np.flatnonzero(((nodes < 0) | (nodes >= mesh.n_nodes)).any(axis=1))
+        if len(bad):
+            row = nodes[bad[0]]
+            raise MeshError(
+                f"{mesh.place(block, int(bad[0]))} uses node rows {row.tolist()}; "
+                f"rows are 0 … {mesh.n_nodes - 1}"
+            )
 
 
 def check_repeated_nodes(mesh: Mesh) -> None:
@@ -78,8 +97,9 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
         more = f"\n… and {count - len(problems)} more" if count > len(problems) else ""
         raise MeshError("\n".join(problems) + more)
     notes = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
-    fold = f"{folded} elements have det J slightly < 0 at a node: they are badly shaped there and less accurate"
-    return [*notes, fold] if folded else notes
+    if folded:
+        notes.append(f"{folded} elements have det J slightly < 0 at a node: badly shaped, so less accurate")
+    return notes
 
 
 def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
@@ -114,123 +134,6 @@ def check_rules(batches: Sequence[Batch]) -> list[str]:
         for element, rule in found
         if (n := spurious_modes(element, rule)) > 0
     ]
-
-
-def components(n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> Ints:
-    """Return for each node the smallest node row of its connected part (itself where unconnected)."""
-    labels = np.arange(n_nodes)
-    while True:
-        before = labels.copy()
-        for nodes in connectivity:
-            smallest = labels[nodes].min(axis=1)
-            np.minimum.at(labels, nodes.ravel(), np.repeat(smallest, nodes.shape[1]))
-        labels = labels[labels]
-        if (labels == before).all():
-            return labels
-
-
-def check_supports(mesh: Mesh, supports: Supports) -> None:
-    """Raise ModelError that names the rigid modes which the supports leave free, part by part."""
-    labels = components(mesh.n_nodes, [block.nodes for block in mesh.blocks if len(block)])
-    used = mesh.used_nodes()
-    roots = np.unique(labels[used])
-    index = np.full(mesh.n_nodes, -1)
-    index[roots] = np.arange(len(roots))
-    part = np.where(used, index[labels], -1)
-    row, dof, weight = supports.rows_of_constraints()
-    known = part[dof // 3] >= 0
-    row, dof, weight = row[known], dof[known], weight[known]
-    problems = []
-    for group in _linked_groups(len(roots), part, supports):
-        modes = _free_modes(mesh, part, group, row, dof, weight)
-        problems += _name_modes(mesh, part, group, modes)
-    if problems:
-        shown = "; ".join(problems[:MAX_PROBLEMS])
-        raise ModelError(f"the supports leave rigid motions free: {shown}. Fix more nodes or components")
-
-
-def _linked_groups(n_parts: int, part: Ints, supports: Supports) -> list[list[int]]:
-    """Return the parts in groups that multi-point constraints tie together."""
-    group = list(range(n_parts))
-    for link in supports.links:
-        ends = {int(part[d // 3]) for d in (link.slave, *link.masters)} - {-1}
-        names = {group[p] for p in ends}
-        if len(names) > 1:
-            group = [min(names) if g in names else g for g in group]
-    return [[p for p in range(n_parts) if group[p] == g] for g in sorted(set(group))]
-
-
-def _free_modes(
-    mesh: Mesh, part: Ints, group: list[int], row: Ints, dof: Ints, weight: Array
-) -> list[tuple[Array, Array, float]]:
-    """Return centre, free modes (6, k) and size of each part of a group.
-
-    A rotation is scaled with the size of its part, so that all modes move points about as far.
-    """
-    columns, frames = [], []
-    rows = np.unique(row[np.isin(part[dof // 3], group)])
-    local = np.searchsorted(rows, row).clip(max=max(len(rows) - 1, 0))
-    for p in group:
-        nodes = np.flatnonzero(part == p)
-        X = mesh.points[nodes]
-        centre, size = X.mean(axis=0), max(float(np.ptp(X, axis=0).max()), np.finfo(float).tiny)
-        mine = part[dof // 3] == p
-        R = rigid_modes(mesh.points[dof[mine] // 3], centre).reshape(-1, 3, 6)
-        R = R[np.arange(len(R)), dof[mine] % 3] / np.array([1, 1, 1, size, size, size])
-        gram = np.zeros((len(rows), 6))
-        np.add.at(gram, local[mine], R * weight[mine, None])
-        columns.append(gram)
-        frames.append((centre, size))
-    C = np.hstack(columns)
-    values, vectors = np.linalg.eigh(C.T @ C)
-    free = vectors[:, values <= 1e-10 * max(float(values.max()), 1e-300)]
-    if not len(rows):
-        free = np.eye(C.shape[1])
-    return [(centre, free[6 * i : 6 * i + 6], size) for i, (centre, size) in enumerate(frames)]
-
-
-def _name_modes(
-    mesh: Mesh, part: Ints, group: list[int], modes: list[tuple[Array, Array, float]]
-) -> list[str]:
-    """Return one sentence for each part that can still move."""
-    named = []
-    for p, (_, free, _) in zip(group, modes, strict=True):
-        words = _motions(free)
-        if words:
-            nodes = np.flatnonzero(part == p)
-            if len(modes) == 1 and len(np.unique(part[part >= 0])) == 1:
-                who = f"the body ({len(nodes)} nodes)"
-            else:
-                who = f"the part of node {mesh.node_ids[nodes[0]]} ({len(nodes)} nodes)"
-            named.append(f"{who} can still move: {words}")
-    return named
-
-
-def _motions(free: Array) -> str:
-    """Name the span of free modes (6, k): translations and rotations, by axis where they are along one."""
-    if not free.size or np.abs(free).max() < 1e-9:
-        return ""
-    U, values, _ = np.linalg.svd(free, full_matrices=False)
-    span = U[:, values > 1e-6]
-    rotation = np.linalg.svd(span[3:])
-    turning = rotation[1] > 1e-6 if span.shape[1] else np.zeros(0, dtype=bool)
-    n_turn = int(turning.sum())
-    still = span @ rotation[2].T[:, n_turn:]
-    words = []
-    if still.shape[1]:
-        words.append("translation " + _axes(still[:3]))
-    if n_turn:
-        words.append("rotation about " + _axes(rotation[0][:, :n_turn]))
-    return "; ".join(words)
-
-
-def _axes(directions: Array) -> str:
-    """Name a span of directions (3, k): by letters if it is spanned by axes, else by vectors."""
-    Q, _ = np.linalg.qr(directions)
-    inside = (Q**2).sum(axis=1) > 1 - 1e-6
-    if inside.sum() == Q.shape[1]:
-        return ", ".join(letter for letter, yes in zip("xyz", inside, strict=True) if yes)
-    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q / np.abs(q).max()) + ")" for q in Q.T)
 
 
 def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
@@ -271,9 +174,32 @@ def check_scales(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
             "element; move it to the origin"
         )
     stiff = [float(np.abs(batch.material.C).max()) for batch in batches]
+    names = ", ".join(sorted({b.element.__name__ for b in batches if _is_near_half(b.material.C)}))
+    if names.replace("KinematicLinear3D10N", ""):
+        warnings.append(
+            f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); "
+            "KinematicLinear3D10N is least affected"
+        )
     if stiff and max(stiff) > 1e10 * min(stiff):
         warnings.append(f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits")
     return warnings
+
+
+def check_loads(
+    loads: Sequence[Load], batches: Sequence[Batch], forces: Array, supports: Supports
+) -> list[str]:
+    """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
+    warnings = []
+    if any(isinstance(load, Gravity) for load in loads) and all(b.material.density == 0 for b in batches):
+        warnings.append("gravity acts on no mass: every material has density 0; give density in kg/m³")
+    elif forces.any() and not forces[~supports.fixed].any() and not supports.values.any():
+        warnings.append("all loads act on fixed components, so nothing moves")
+    return warnings
+
+
+def _is_near_half(C: Array) -> bool:
+    """Return whether the bulk modulus is above 50 shear moduli (ν > 0.49 if isotropic)."""
+    return bool(C[:3, :3].sum() / 9 > 50 * C[[3, 4, 5], [3, 4, 5]].mean())
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array) -> tuple[float, float]:
@@ -290,14 +216,14 @@ def equilibrium(points: Array, loads: Array, reactions: Array) -> tuple[float, f
 
 
 __all__ = [
+    "check_blocks",
     "check_coincident",
     "check_jacobians",
+    "check_loads",
     "check_points",
     "check_repeated_nodes",
     "check_rules",
     "check_scales",
-    "check_supports",
-    "components",
     "equilibrium",
     "spurious_modes",
 ]

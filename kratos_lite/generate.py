@@ -8,6 +8,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.arguments import finite
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh, Part
@@ -94,13 +95,16 @@ def _parents(shape: type[Shape]) -> list[tuple[int, ...]]:
 
 
 def _cells(cells: Sequence[int]) -> tuple[int, int, int]:
-    counts = tuple(int(n) for n in cells)
-    if len(counts) != 3 or min(counts) < 1 or counts != tuple(cells):
+    counts = finite(cells, "cells")
+    if counts.shape != (3,) or (counts < 1).any() or (counts != counts.round()).any():
         raise InputError(f"cells must be three whole numbers ≥ 1; got {cells}")
-    return counts  # type: ignore[return-value]
+    i, j, k = counts.astype(int).tolist()
+    return i, j, k
 
 
 def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, type[Shape]]:
+    if not isinstance(element, str):
+        raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
     kind = ELEMENTS[element]
     shape = kind.shape
     if shape.cell not in SPLITS:
@@ -139,8 +143,8 @@ def box(
     >>> mesh.n_nodes, mesh.n_elements, len(mesh.nodes("z+"))
     (81, 8, 21)
     """
-    lengths, corner = np.asarray(size, dtype=float), np.asarray(origin, dtype=float)
-    if lengths.shape != (3,) or corner.shape != (3,) or not (np.isfinite(lengths) & (lengths > 0)).all():
+    lengths, corner = finite(size, "size"), finite(origin, "origin")
+    if lengths.shape != (3,) or corner.shape != (3,) or (lengths <= 0).any():
         raise InputError(f"size must be three lengths > 0 m and origin three numbers; got {size}, {origin}")
     unit, nodes, name, shape = _unit_mesh(cells, element)
     parts = {}
@@ -172,7 +176,8 @@ def annulus(
     >>> wheel.n_elements, sorted(wheel.parts)
     (24, ['inner', 'outer', 'z+', 'z-'])
     """
-    if not (0 < inner < outer < np.inf and 0 < width < np.inf):
+    sizes = finite([inner, outer, width], "inner, outer and width")
+    if sizes.shape != (3,) or not (0 < sizes[0] < sizes[1] and sizes[2] > 0):
         raise InputError(f"an annulus needs 0 < inner < outer and width > 0; got {inner}, {outer}, {width}")
     if _cells(cells)[1] < 3:
         raise InputError(f"an annulus needs at least 3 cells around; got {cells[1]}")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.arguments import finite
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
@@ -16,11 +17,9 @@ from kratos_lite.mesh import Block, Mesh, Where, WhereElements
 Array = NDArray[np.float64]
 
 
-def _finite(values: ArrayLike, what: str, shapes: str) -> Array:
-    array = np.asarray(values, dtype=float)
-    if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite; got {values}")
-    if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
+def _vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:
+    array = finite(values, what)
+    if array.ndim not in dimensions or array.shape[-1] != 3:
         raise InputError(f"{what} must be {shapes}; got shape {array.shape}")
     return array
 
@@ -38,12 +37,12 @@ class BodyForce(Load):
 
     Parameters
     ----------
-    force : (3,) float, N/m³.
+    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³.
     where : elements that carry it: part name, property id or rows; all if not given.
     """
 
     def __init__(self, force: ArrayLike, where: WhereElements = None) -> None:
-        self.force = _finite(force, "a body force", "(3,) in N/m³")
+        self.force = _vectors(force, "a body force", "(3,) or (n, 3) in N/m³", (1, 2))
         self.where = where
 
     def per_volume(self, batch: Batch) -> Array:
@@ -52,6 +51,9 @@ class BodyForce(Load):
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N."""
+        if self.force.ndim == 2 and len(self.force) != mesh.n_nodes:
+            name = type(self).__name__
+            raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
         total = np.zeros_like(mesh.points)
         mask = None
         if self.where is not None:
@@ -85,18 +87,12 @@ class Gravity(BodyForce):
     """
 
     def __init__(self, acceleration: ArrayLike, where: WhereElements = None) -> None:
-        self.force = _finite(acceleration, "gravity", "(3,) or (n, 3) in m/s²")
+        self.force = _vectors(acceleration, "gravity", "(3,) or (n, 3) in m/s²", (1, 2))
         self.where = where
 
     def per_volume(self, batch: Batch) -> Array:
         """Return density × acceleration."""
         return batch.material.density * self.force
-
-    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
-        """Return ∫ N ρ g dV as nodal forces (n, 3) in N."""
-        if self.force.ndim == 2 and len(self.force) != mesh.n_nodes:
-            raise InputError(f"nodal gravity needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
-        return super().forces(mesh, batches)
 
 
 def _faces(mesh: Mesh, where: Where, what: str) -> list[Block]:
@@ -121,7 +117,7 @@ class Traction(Load):
 
     def __init__(self, where: Where, traction: ArrayLike) -> None:
         self.where = where
-        self.traction = _finite(traction, "a traction", "(3,) in Pa")
+        self.traction = _vectors(traction, "a traction", "(3,) in Pa")
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N t dA as nodal forces (n, 3) in N."""
@@ -146,8 +142,8 @@ class Pressure(Load):
     def __init__(self, where: Where, pressure: float, normal: str = "outward") -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
-        if not np.isfinite(pressure):
-            raise InputError(f"a pressure must be finite; got {pressure}")
+        if finite(pressure, "a pressure").ndim:
+            raise InputError(f"a pressure must be one number in Pa; got {pressure}")
         self.where, self.pressure, self.normal = where, float(pressure), normal
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
@@ -173,7 +169,7 @@ class PointLoad(Load):
 
     def __init__(self, where: Where, force: ArrayLike) -> None:
         self.where = where
-        self.force = _finite(force, "a point load", "(3,) in N")
+        self.force = _vectors(force, "a point load", "(3,) in N")
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return the nodal forces (n, 3) in N."""
@@ -194,7 +190,7 @@ class NodalForces(Load):
     """
 
     def __init__(self, values: ArrayLike) -> None:
-        self.values = _finite(values, "nodal forces", "(n, 3) in N")
+        self.values = _vectors(values, "nodal forces", "(n, 3) in N", (2,))
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return a copy of the values."""

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite import checks
+from kratos_lite import checks, mobility
+from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.batches import Batch
 from kratos_lite.elements import ELEMENTS
@@ -19,7 +20,7 @@ from kratos_lite.mesh import Block, Mesh, Where, WhereElements
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.result import Result
 from kratos_lite.statics import solve_static
-from kratos_lite.supports import Link, Supports, axis_numbers
+from kratos_lite.supports import AXES, Link, Supports
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,8 @@ class Model:
     def __init__(
         self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
     ) -> None:
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
         self.mesh = mesh
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
@@ -57,11 +60,11 @@ class Model:
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}
         self._rule_of = np.full(mesh.n_elements, -1)
-        if isinstance(material, LinearMaterial):
-            self.assign(material)
-        elif material is not None:
+        if isinstance(material, Mapping):
             for where, one in material.items():
                 self.assign(one, where)
+        elif material is not None:
+            self.assign(material)
 
     # ---- what the model is made of -----------------------------------------------------------
 
@@ -75,6 +78,8 @@ class Model:
 
     def use_rule(self, rule: Rule | int, where: WhereElements = None) -> None:
         """Replace the quadrature rule of elements by a Rule or an INTEGRATION_ORDER 1 … 5."""
+        if isinstance(rule, bool) or not isinstance(rule, (int, Rule)):
+            raise InputError(f"a Rule or an INTEGRATION_ORDER 1 … 5 is needed; got {rule!r}")
         number = len(self._rules)
         self._rules[number] = rule
         self._rule_of[self.mesh.elements(where)] = number
@@ -112,15 +117,17 @@ class Model:
         """
 
         def dof(where: tuple[int, str]) -> int:
-            node, axis = where
-            if not 0 <= node < self.mesh.n_nodes or len(axis) != 1:
-                raise InputError(f"a degree of freedom is (node row, axis letter); got {where}")
-            return 3 * int(node) + axis_numbers(axis)[0]
+            node, axis = where if isinstance(where, tuple) and len(where) == 2 else (None, None)
+            known = isinstance(node, (int, np.integer)) and 0 <= node < self.mesh.n_nodes
+            if not known or axis not in tuple(AXES):
+                raise InputError(f"a degree of freedom is (node row, axis letter); got {where!r}")
+            return 3 * int(where[0]) + AXES.index(where[1])
 
-        weights = tuple(float(w) for w in masters.values())
-        if not np.isfinite([constant, *weights]).all():
-            raise InputError(f"weights and constant of a constraint must be finite; got {weights}, {constant}")
-        self.supports.link([Link(dof(slave), tuple(map(dof, masters)), weights, float(constant))])
+        if not isinstance(masters, Mapping):
+            raise InputError(f"masters must map (node row, axis letter) to a weight; got {masters!r}")
+        weights = finite(list(masters.values()), "weights of a constraint").tolist()
+        offset = float(finite(constant, "the constant of a constraint"))
+        self.supports.link([Link(dof(slave), tuple(map(dof, masters)), tuple(weights), offset)])
 
     def add(self, load: Load) -> None:
         """Add a load; loads add up."""
@@ -130,19 +137,22 @@ class Model:
 
     def activate(self, displacement: ArrayLike) -> None:
         """Make the body stress-free at a displacement u0 (n, 3) in m: strain comes from u - u0."""
-        u0 = np.asarray(displacement, dtype=float)
-        if u0.shape != self.mesh.points.shape or not np.isfinite(u0).all():
-            raise InputError(f"the initial displacement must be finite with shape {self.mesh.points.shape}")
+        u0 = finite(displacement, "the initial displacement")
+        if u0.shape != self.mesh.points.shape:
+            raise InputError(f"the initial displacement needs shape {self.mesh.points.shape}; got {u0.shape}")
         self.initial_displacement = u0
 
     def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
         """Add a stress (6,) or (m, 6) in Pa that elements carry before they are strained."""
-        s = np.asarray(stress, dtype=float)
-        if s.shape[-1:] != (6,) or not np.isfinite(s).all():
-            raise InputError(f"a prestress has six finite components xx yy zz xy yz zx; got {stress}")
+        s, rows = finite(stress, "a prestress"), self.mesh.elements(where)
+        if s.shape not in ((6,), (len(rows), 6)):
+            raise InputError(
+                f"a prestress has six components xx yy zz xy yz zx, or shape ({len(rows)}, 6); "
+                f"got shape {s.shape}"
+            )
         if self.prestress is None:
             self.prestress = np.zeros((self.mesh.n_elements, 6))
-        self.prestress[self.mesh.elements(where)] += s
+        self.prestress[rows] += s
 
     # ---- batches -------------------------------------------------------------------------------
 
@@ -177,6 +187,10 @@ class Model:
             chosen = self._rules.get(r, element.rule)
             if isinstance(chosen, int):
                 chosen = by_order(element.shape.cell, chosen)
+            if abs(chosen.weights.sum() / element.rule.weights.sum() - 1) > 1e-9:
+                raise InputError(
+                    f"{chosen} does not fit {element.__name__}: its weights miss the volume of the cell"
+                )
             stress = None if self.prestress is None else self.prestress[rows[mine]]
             nodes = block.nodes if mine.all() else block.nodes[mine]
             batches.append(Batch(element, chosen, self._materials[m], nodes, rows[mine], stress))
@@ -200,9 +214,11 @@ class Model:
         MeshError, InputError
             With every element that is wrong.
         """
+        kinds = [self._element_class(block) for block in self.mesh.blocks]
+        checks.check_blocks(self.mesh, kinds)
         checks.check_points(self.mesh)
         checks.check_repeated_nodes(self.mesh)
-        return checks.check_jacobians(self.mesh, [self._element_class(block) for block in self.mesh.blocks])
+        return checks.check_jacobians(self.mesh, kinds)
 
     def check(self) -> list[str]:
         """Check the model as `solve` does, without solving; return the warnings.
@@ -221,13 +237,14 @@ class Model:
         batches = self.batches()
         used = mesh.used_nodes()
         warnings += checks.check_rules(batches)
+        warnings += mobility.check_joints(mesh)
         warnings += checks.check_coincident(mesh, used)
         warnings += checks.check_scales(mesh, batches)
         if not used.all():
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
-        checks.check_supports(mesh, self.supports)
+        mobility.check_supports(mesh, self.supports)
         return batches, warnings
 
     def solve(

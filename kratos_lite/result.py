@@ -84,7 +84,8 @@ def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
         return np.full((len(element.nodes), len(rule)), 1 / len(rule))
     at_points = np.array([corner.N(xi) for xi in rule.points])
     at_nodes = np.array([corner.N(xi) for xi in element.nodes])
-    return np.asarray(at_nodes @ np.linalg.pinv(at_points))
+    mean = np.full((len(rule), len(rule)), 1 / len(rule))  # apart, so that few points still give constants
+    return np.asarray(at_nodes @ np.linalg.pinv(at_points) @ (np.eye(len(rule)) - mean) + mean[:1])
 
 
 class Result:

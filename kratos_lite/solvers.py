@@ -25,6 +25,8 @@ Progress = Callable[[str, float], None]
 
 DENSE_LIMIT = 600
 """Up to this many unknowns a full matrix needs no sparse library at all."""
+DENSE_MAX = 10_000
+"""Above this many degrees of freedom a full matrix is refused (it would take 0.8 GB several times)."""
 DIRECT_LIMIT = 10_000
 """Up to this many unknowns factorising is the fastest sparse way."""
 FALLBACK_LIMIT = 150_000

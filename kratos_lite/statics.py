@@ -44,8 +44,10 @@ def solve_static(
     model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
 ) -> Result:
     """Solve K u = f with the supports of a model eliminated; see `Model.solve`."""
-    if not 0 < tolerance < 1:
-        raise InputError(f"tolerance must lie between 0 and 1; got {tolerance}")
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
+        raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
     solvers.choose(solver, 0)
     phase = Phases()
     with phase("check"):
@@ -54,10 +56,13 @@ def solve_static(
         loads = external_loads(model, batches)
         forces = loads - initial_loads(model, batches)
     active, local = renumber(model, batches, forces)
+    warnings += checks.check_loads(model.loads, batches, forces, model.supports)
     points = model.mesh.points[active]
     reduced = reduction(model.supports, active)
     f = forces[active].ravel()
     method, reason = solvers.choose(solver, len(reduced.free))
+    if method == "dense" and len(f) > solvers.DENSE_MAX:
+        raise InputError(f"solver='dense' is for up to {solvers.DENSE_MAX} degrees of freedom; got {len(f)}")
     with phase("assemble"):
         K: Any
         if method == "dense":
@@ -79,6 +84,11 @@ def solve_static(
             raise SolveError(
                 f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
                 "look for very thin elements, very unlike stiffnesses or nearly free parts"
+            )
+        if force > 1e-6 and solution.method != "amg" and not model.supports.links:
+            raise SolveError(
+                f"loads and reactions miss balance by {force:.1e}: the stiffness matrix is all but singular; "
+                "look for nearly free parts, spurious modes or very unlike stiffnesses"
             )
     report = Report(
         unknowns=len(reduced.free),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.arguments import finite
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 
@@ -30,7 +31,8 @@ def axis_numbers(axes: str) -> list[int]:
     >>> axis_numbers("xz")
     [0, 2]
     """
-    if not axes or any(a not in AXES for a in axes) or len(set(axes)) != len(axes):
+    known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
+    if not known or len(set(axes)) != len(axes):
         raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
     return [AXES.index(a) for a in axes]
 
@@ -68,9 +70,7 @@ class Supports:
         prescribed twice must be given the same value, unless `override` lets the later one win.
         """
         numbers = axis_numbers(axes)
-        given = np.asarray(value, dtype=float)
-        if not np.isfinite(given).all():
-            raise InputError(f"a prescribed displacement must be finite; got {value}")
+        given = finite(value, "a prescribed displacement")
         try:
             given = np.broadcast_to(given, (len(rows), len(numbers)))
         except ValueError:

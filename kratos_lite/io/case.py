@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.settings import Settings, inside, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
 
 FOREVER = 1e30
@@ -74,29 +74,9 @@ class Case:
         if short not in mesh.parts:
             have = ", ".join([f"{self.root} (all)", *mesh.parts])
             raise settings.error(
-                key, f"there is no part {name!r};{nearest(short, mesh.parts)} The parts are {have}"
+                key, f"there is no part {name!r}.{nearest(short, mesh.parts)} The parts are {have}"
             )
         return mesh.parts[short]
-
-    def file(self, settings: Settings, key: str, ending: str = "") -> tuple[Path, str]:
-        """Return the path of the file that a key names, and a note if it stands somewhere else.
-
-        The path counts from the folder of the run file; older files count from another folder, so
-        the last word of the path is looked for beside the run file too.
-        """
-        name = settings.text(key)
-        try:
-            path = inside(self.folder, name + ending, self.outside)
-        except ValueError as error:
-            raise settings.error(key, str(error)) from None
-        beside = self.folder / path.name
-        if path.is_dir():
-            raise settings.error(key, f"{name + ending} is a folder; name a file in it")
-        if path.is_file():
-            return path, ""
-        if beside.is_file():
-            return beside, f"{name + ending} is not there; {path.name} beside the run file is read"
-        raise settings.error(key, f"{self.folder / (name + ending)}: there is no such file")
 
 
 def times_of(problem: Settings, solver: Settings) -> list[float]:
@@ -111,7 +91,9 @@ def times_of(problem: Settings, solver: Settings) -> list[float]:
     if not time < end:
         raise problem.error("end_time", f"no step is solved: end_time {end:g} must be > start_time {time:g}")
     if (end - time) / step > MAX_STEPS:
-        raise stepping.error("time_step", f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it")
+        raise stepping.error(
+            "time_step", f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"
+        )
     times = [time]
     while times[-1] < end:
         times.append(times[-1] + step)

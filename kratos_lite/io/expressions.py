@@ -183,7 +183,7 @@ class _Parser:
             return np.float64(_CONSTANTS[token])
         known = [*self.variables, *_CONSTANTS, *self.functions]
         raise ValueError(
-            f"expression {self.text!r}: {token!r} is not known;{nearest(token, known)} "
+            f"expression {self.text!r}: {token!r} is not known.{nearest(token, known)} "
             f"Known are {', '.join(known)}"
         )
 

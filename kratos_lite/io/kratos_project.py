@@ -1,24 +1,21 @@
-"""Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh, to a Project.
+"""Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh.
 
-Static linear solids in the style of 2019 and in the present one.
+Static linear solids, in the style of 2019 and in the present one.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from kratos_lite.errors import InputError, KratosLiteError, Problems, nearest
+from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case, module_of, times_of
-from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.document import Document
 from kratos_lite.io.files import read_document
-from kratos_lite.io.kratos import ELASTIC, check_elements, material_from, model_from
+from kratos_lite.io.kratos import check_elements, model_from
+from kratos_lite.io.kratos_materials import materials_of
 from kratos_lite.io.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.run_checks import CHECKS, Check
-from kratos_lite.io.settings import Settings, inside, is_number, read_settings, shown
-from kratos_lite.io.variables import Variables
+from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.model import Model
 
@@ -30,7 +27,7 @@ HARMLESS = frozenset(
     "clear_storage move_mesh_flag multi_point_constraints_used convergence_criterion max_iteration "
     "displacement_relative_tolerance displacement_absolute_tolerance residual_relative_tolerance "
     "residual_absolute_tolerance linear_solver_settings line_search block_builder "
-    "problem_domain_sub_model_part_list processes_sub_model_part_list computing_sub_model_part_name "
+    "problem_domain_sub_model_part_list processes_sub_model_part_list "
     "auxiliary_variables_list auxiliary_dofs_list auxiliary_reaction_list".split()
 )
 """Solver settings that are used here, or that cannot change a static linear solution."""
@@ -39,10 +36,6 @@ OTHER_PHYSICS = (
     "use_orthogonal_subscales", "contact_settings", "mpc_contact_settings", "computing_sub_model_part_name",
 )  # fmt: skip
 """Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
-MATERIAL_USES = ELASTIC | {
-    "DENSITY", "INTEGRATION_ORDER", "VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE", "INSITU_STRESS",
-    "PRESTRESS", "PRESTRESS_FACTOR",
-}  # fmt: skip
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
@@ -59,20 +52,15 @@ def read_kratos_project(
 
     Raises
     ------
-    InputError
+    InputError, ModelError
         With the place of what is wrong, or of what is not a static linear solid.
     """
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
-    notes = _check_root(settings) + _check_solver(solver, times)
-    source = Case(Document(_no_mesh()).mesh, "", folder, outside=allow_outside)
-    document = _read_mesh(solver, source, notes)
-    check_elements(document)
-    if not solver.flag("multi_point_constraints_used", True) and document.constraints:
-        notes.append(f"multi_point_constraints_used is false: {len(document.constraints)} constraints left out")
-        document.constraints = []
-    root = solver.text("model_part_name", "Structure")
-    moved = solver.flag("move_mesh_flag", True)
+    notes = _check_solver(solver) + _check_root(settings)
+    notes.append(f"{len(times) - 1} time step(s): supports and loads are those at t = {times[-1]:g} s")
+    document = _read_mesh(solver, folder, allow_outside, notes)
+    root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     case = Case(document.mesh, root, folder, times, moved, allow_outside)
     materials = _read_materials(solver, case, document, notes)
     actions, checks = _read_processes(settings, case, notes)
@@ -85,3 +73,102 @@ def read_kratos_project(
         model.assign(material, number)
     model.notes += notes
     return model, checks
+
+
+def _check_root(settings: Settings) -> list[str]:
+    for key in ("modelers", "stages", "orchestrator", "restart_load_file_label"):
+        if settings.values.get(key):
+            raise settings.error(key, f"{key!r} is not supported; name the mesh in model_import_settings")
+    unknown = settings.unknown(ROOT_KEYS)
+    for key in unknown:
+        if key.endswith("_process_list"):
+            raise settings.error(key, f"{key!r} belongs into the object 'processes'; Kratos ignores it here")
+    return [f"key {key!r} is not used" for key in unknown if not key.startswith("_")]
+
+
+def _check_solver(solver: Settings) -> list[str]:
+    """Refuse what is not a static solid in three dimensions; note what is treated otherwise."""
+    kind = solver.text("solver_type")
+    if kind not in ("Static", "static"):
+        raise solver.error(
+            "solver_type", f"solver_type {kind!r}: only static solutions are computed; use 'static'"
+        )
+    if solver.integer("domain_size") != 3:
+        raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
+    analysis = solver.text("analysis_type", "non_linear")
+    if analysis not in ("linear", "non_linear"):
+        raise solver.error(
+            "analysis_type", f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+        )
+    for key in OTHER_PHYSICS:
+        if solver.values.get(key):
+            raise solver.error(
+                key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
+            )
+    notes = [f"solver setting {key!r} is not used" for key in solver.unknown((*HARMLESS, *OTHER_PHYSICS))]
+    if analysis == "non_linear":
+        notes.append(
+            "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"
+        )
+    chosen = solver.section("linear_solver_settings").text("solver_type", "")
+    if chosen:
+        notes.append(f"linear solver {chosen}: kratos_lite chooses its own")
+    return notes
+
+
+def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) -> Document:
+    source = solver.section("model_import_settings", required=True)
+    kind = source.text("input_type", "mdpa")
+    if kind != "mdpa":
+        raise source.error("input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
+    path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+    document = read_document(path)
+    check_elements(document)
+    notes += [note] if note else []
+    if not solver.flag("multi_point_constraints_used", True) and document.constraints:
+        notes.append(
+            f"multi_point_constraints_used is false: {len(document.constraints)} constraints left out"
+        )
+        document.constraints = []
+    return document
+
+
+def _read_materials(
+    solver: Settings, case: Case, document: Document, notes: list[str]
+) -> dict[int, LinearMaterial] | None:
+    """Return the materials of the materials file, or None if there is none."""
+    source = solver.section("material_import_settings")
+    if not source.text("materials_filename", ""):
+        return None
+    path, note = find_file(source, "materials_filename", case.folder, outside=case.outside)
+    notes += [note] if note else []
+    return materials_of(read_settings(path), case, document, notes)
+
+
+def _read_processes(settings: Settings, case: Case, notes: list[str]) -> tuple[list[Action], list[Check]]:
+    """Return what the processes do and check; all that are unknown are reported together."""
+    actions: list[Action] = []
+    checks: list[Check] = []
+    problems = Problems(settings.source)
+    for section in (settings.section("processes"), settings.section("output_processes")):
+        # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
+        for key in sorted(section.values):
+            for entry in section.sections(key):
+                module = module_of(entry)
+                if module in PROCESSES:
+                    actions += actions_of(entry, module, case)
+                elif module in CHECKS:
+                    checks += CHECKS[module](entry.section("Parameters", required=True), case)
+                elif module.endswith("_output_process") or module in OUTPUTS:
+                    notes.append(
+                        f"{entry.path}: {module} is not run; ask kratos_lite for files with --output"
+                    )
+                else:
+                    place = entry.values.places.get("python_module") or entry.values.places["name"]
+                    known = [*PROCESSES, *CHECKS]
+                    problems.add(
+                        f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}",
+                        *place,
+                    )
+    problems.raise_if_any()
+    return actions, checks

@@ -20,7 +20,7 @@ from kratos_lite.mesh import NO_ROWS, Block, Ints
 
 
 def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
-    """Return everything that an `.mdpa` file says; blocks may stand in any order.
+    r"""Return everything that an `.mdpa` file says; blocks may stand in any order.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
     Examples
     --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
-    >>> _ = path.write_text("Begin Nodes\\n 7 0.0 0.5 1.0D+00 // top\\nEnd Nodes\\n")
+    >>> _ = path.write_text("Begin Nodes\n 7 0.0 0.5 1.0D+00 // top\nEnd Nodes\n")
     >>> document = read_mdpa(path)
     >>> document.mesh.node_ids, document.mesh.points
     (array([7]), array([[0. , 0.5, 1. ]]))
@@ -50,7 +50,7 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
             source.note(f"block {frame.name} is skipped.{nearest(frame.name, TOP)}", frame.offset)
     document = _read(source, frames)
     source.problems.raise_if_any()
-    document.notes = sorted(source.notes, key=lambda note: note.line)
+    document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
     return document
 
 
@@ -126,7 +126,8 @@ def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = Fa
         return None
     if number in found:
         source.problem(
-            f"{frame.name} {number} stands at line {found[number].line} already; give each its own id", frame.offset
+            f"{frame.name} {number} stands at line {found[number].line} already; give each its own id",
+            frame.offset,
         )
         return None
     return number

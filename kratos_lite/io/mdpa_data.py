@@ -15,6 +15,7 @@ from kratos_lite.io.text import integer, real, shown
 
 Ints = NDArray[np.int64]
 WORDS = {"NodalData": "node", "ElementalData": "element", "ConditionalData": "condition"}
+IS_FIXED = re.compile(rb"\s*([^\s\[(]+)")
 CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
 
 
@@ -80,7 +81,7 @@ def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None)
 
 def _free(source: Source, at: int, end: int) -> int:
     """Return the end of the is_fixed word, which must say that the value is free."""
-    match = re.compile(rb"\s*([^\s\[(]+)").match(source.data, at, end)
+    match = IS_FIXED.match(source.data, at, end)
     if match is None or match.group(1) not in TRUTH:
         raise ValueError("expected is_fixed, 0, before the vector")
     if TRUTH[match.group(1)]:
@@ -93,12 +94,16 @@ def _note_missing(source: Source, data: Data, word: str, known: Ints) -> None:
     missing = ~np.isin(data.ids, known)
     if (missing & data.fixed).any():
         ids = data.ids[missing & data.fixed]
-        source.problems.add(f"{data.variable} is fixed on {word} {_first(ids)}, which the file does not have", data.line)
+        source.problems.add(
+            f"{data.variable} is fixed on {word} {_first(ids)}, which the file does not have", data.line
+        )
     elif missing.any():
         text = f"{data.variable} on {word} {_first(data.ids[missing])} is ignored: the file does not have it"
         source.notes.append(Note(data.line, text))
     if len(np.unique(data.ids)) < len(data.ids):
-        source.notes.append(Note(data.line, f"{data.variable} stands twice for a {word}; the last value counts"))
+        source.notes.append(
+            Note(data.line, f"{data.variable} stands twice for a {word}; the last value counts")
+        )
 
 
 def _first(ids: Ints) -> str:
@@ -138,17 +143,18 @@ def _constraint(source: Source, frame: Frame, span: tuple[int, int]) -> tuple[Co
         raise ValueError("expected 'id constant [w1, w2, …] slave master1 master2 …'")
     number, constant = integer(match.group(1)), real(match.group(2))
     weights = tuple(real(part.strip()) for part in match.group(3).split(b","))
-    at, ids = match.end(), []
+    at = match.end()
+    ids: list[int] = []
     for _ in range(len(weights) + 1):
         word = WORD.search(source.data, at, span[1])
         if word is None:
-            raise ValueError(f"has {len(weights)} weights, but {len(ids)} node ids; expected the slave and its masters")
+            raise ValueError(f"has {len(weights)} weights, but {len(ids)} nodes; expected slave and masters")
         ids.append(integer(word.group()))
         at = word.end()
     name, slave, *masters = frame.arguments
     if len(masters) != len(weights):
         if len(masters) > 1:
-            raise ValueError(f"has {len(weights)} masters, but the header names {len(masters)} variables for them")
+            raise ValueError(f"has {len(weights)} masters, but the header names {len(masters)} variables")
         masters = (masters or [slave]) * len(weights)
     pairs = tuple(zip(ids[1:], masters, strict=True))
     line = source.line(span[0])

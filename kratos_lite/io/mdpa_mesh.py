@@ -23,7 +23,11 @@ WORDS = {"Elements": "element", "Conditions": "condition", "Geometries": "geomet
 
 def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequence[int]) -> Mesh:
     """Return the mesh of the file, without its parts; elements must use the given properties."""
+    before = source.problems.count
     mesh = _read_nodes(source, frames["Nodes"])
+    if source.problems.count > before:
+        # Every element at a broken node would be one more problem without a cause of its own.
+        source.problems.raise_if_any()
     mesh.blocks = read_blocks(source, frames["Elements"], mesh)
     mesh.conditions = read_blocks(source, frames["Conditions"], mesh)
     for word, blocks in (("element", mesh.blocks), ("condition", mesh.conditions)):
@@ -37,12 +41,16 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
     points = np.concatenate([np.zeros((0, 3)), *(t.reals for t in tables)])
     lines = np.concatenate([np.zeros(0, dtype=np.int32), *(t.lines for t in tables)])
     if not len(ids) and not source.problems:
-        raise InputError(f"{source.name}: there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed")
+        raise InputError(
+            f"{source.name}: there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
+        )
     keep = np.ones(len(ids), dtype=bool)
     for row, first in repeated(ids):
         keep[row] = False
         if (points[row] == points[first]).all():
-            source.notes.append(Note(int(lines[row]), f"node {ids[row]} stands at line {lines[first]} already"))
+            source.notes.append(
+                Note(int(lines[row]), f"node {ids[row]} stands at line {lines[first]} already, the same")
+            )
         else:
             source.problems.add(
                 f"node {ids[row]} stands at line {lines[first]} already, at {_at(points[first])}; found "
@@ -52,7 +60,6 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
     if not keep.all():
         points, ids = points[keep], ids[keep]
     return Mesh(points, node_ids=ids, source=source.name)
-
 
 
 def _at(point: NDArray[np.float64]) -> str:

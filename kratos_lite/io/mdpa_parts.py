@@ -42,7 +42,8 @@ class PartReader:
         name = frame.arguments[0]
         if not PART_NAME.fullmatch(name):
             self.source.problem(
-                f"SubModelPart {name!r} is no name; use letters, digits, '_', '-' and single dots inside", frame.offset
+                f"SubModelPart {name!r} is no name; use letters, digits, '_', '-' and single dots inside",
+                frame.offset,
             )
             return
         full = f"{parent}.{name}" if parent else name

@@ -9,6 +9,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,33 +85,43 @@ def _fast(source: Source, span: Span, layout: Layout) -> Rows | None:
         return _rows(np.zeros((0, k), dtype=np.int64), np.zeros((0, k)), np.zeros(0, dtype=np.int32), kinds)
     if len(starts) % k or not _lines_are_whole(source, codes, starts, span, layout):
         return None
-    values = _values(text, np.int64 if is_plain else np.float64)
+    values = _values(text, is_plain)
     if values is None or len(values) != len(starts):
         return None
     table, lines = values.reshape(-1, k), source.lines(starts[::k] + span[0])
-    if is_plain:
-        ids = table[:, [c for c, kind in enumerate(kinds) if kind == "i"]]
-        if table.max() == MAX_ID or ids.min() < 1:
-            return None
-        return Rows(table, np.zeros((len(table), 0)), lines)
-    ends = np.flatnonzero(step == -1)
-    ints = np.zeros(table.shape, dtype=np.int64)
-    for column, kind in enumerate(kinds):
-        if kind != "r":
-            plain = _digits(codes, starts[column::k], ends[column::k])
-            if plain is None or (kind == "b" and plain.max() > 1) or (kind == "i" and plain.min() < 1):
-                return None
-            ints[:, column] = plain
+    ints = table if is_plain else _integer_columns(codes, starts, np.flatnonzero(step == -1), kinds)
+    if ints is None or _is_odd(ints, kinds):
+        return None
     rows = _rows(ints, table, lines, kinds)
     return rows if np.isfinite(rows.reals).all() else None
 
 
-def _rows(
-    ints: NDArray[np.int64], reals: NDArray[np.float64], lines: NDArray[np.int32], kinds: str
-) -> Rows:
+def _integer_columns(
+    codes: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64], kinds: str
+) -> NDArray[np.int64] | None:
+    """Return a table (m, k) with the columns of integers filled, or None where one holds other text."""
+    k = len(kinds)
+    ints = np.zeros((len(starts) // k, k), dtype=np.int64)
+    for column, kind in enumerate(kinds):
+        if kind != "r":
+            plain = _digits(codes, starts[column::k], ends[column::k])
+            if plain is None:
+                return None
+            ints[:, column] = plain
+    return ints
+
+
+def _is_odd(ints: NDArray[np.int64], kinds: str) -> bool:
+    """Return whether an id is 0 or too large (then the largest), or a truth neither 0 nor 1."""
+    low, high = ints.min(axis=0), ints.max(axis=0)
+    limits = {"i": (1, MAX_ID - 1), "p": (0, MAX_ID - 1), "b": (0, 1), "r": (0, 0)}
+    return any(low[c] < limits[kind][0] or high[c] > limits[kind][1] for c, kind in enumerate(kinds))
+
+
+def _rows(ints: NDArray[np.int64], reals: NDArray[np.float64], lines: NDArray[np.int32], kinds: str) -> Rows:
     """Return the integer and the real columns of tables (m, k) that hold each kind in its place."""
     is_real = np.array([kind == "r" for kind in kinds], dtype=bool)
-    return Rows(ints[:, ~is_real], np.ascontiguousarray(reals[:, is_real]), lines)
+    return Rows(ints[:, ~is_real], np.ascontiguousarray(reals[:, is_real], dtype=float), lines)
 
 
 def _lines_are_whole(
@@ -126,18 +137,21 @@ def _lines_are_whole(
         if layout.alone or (counts % k).any():
             return False
         if k > 1:
-            source.note(f"several rows on one line: {layout.word}s", span[0] + int(starts[bounds[np.argmax(counts > k)]]))
+            first = int(starts[bounds[np.argmax(counts > k)]])
+            source.note(f"several rows on one line: {layout.word}s", span[0] + first)
         return True
     return bool(((counts == 0) | (counts == k)).all())
 
 
-def _values(text: bytes, dtype: type[np.int64] | type[np.float64]) -> NDArray[np.int64] | NDArray[np.float64] | None:
-    """Return the numbers of a text; None where one is malformed."""
+def _values(text: bytes, is_plain: bool) -> NDArray[Any] | None:
+    """Return the integers or the reals of a text; None where one is malformed."""
     with warnings.catch_warnings():
         # numpy warns, where it should fail, about text that is not a number.
         warnings.simplefilter("error")
         try:
-            return np.fromstring(text if dtype is np.int64 else text.translate(FORTRAN), dtype=dtype, sep=" ")
+            if is_plain:
+                return np.fromstring(text, dtype=np.int64, sep=" ")
+            return np.fromstring(text.translate(FORTRAN), dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             return None
 
@@ -167,11 +181,13 @@ def _exact(source: Source, span: Span, layout: Layout) -> Rows:
     ints: list[list[int]] = []
     reals: list[list[float]] = []
     offsets: list[int] = []
+    noted = False
     for words in _groups(source, span, k):
         if len(words) % k or (layout.alone and source.strict and len(words) > k):
             _refuse_width(source, words, layout)
             continue
-        if len(words) > k > 1:
+        if len(words) > k > 1 and not noted:
+            noted = True
             source.note(f"several rows on one line: {layout.word}s", words[0].start())
         for first in range(0, len(words), k):
             row = _row(source, words[first : first + k], layout)
@@ -205,8 +221,8 @@ def _row(source: Source, words: Words, layout: Layout) -> list[float] | None:
         try:
             values.append(_number(word.group(), kind))
         except ValueError as error:
-            name = "" if word is words[0] else f"{layout.word} {words[0].group()[:20].decode('ascii', 'replace')}: "
-            source.problem(f"{name}{error}", word.start())
+            owner = f"{layout.word} {_text(words[0])}: " if word is not words[0] else ""
+            source.problem(f"{owner}{error}", word.start())
             return None
     return values
 
@@ -221,10 +237,14 @@ def _number(token: bytes, kind: str) -> float:
     return 0 if kind == "p" and token == b"0" else integer(token)
 
 
+def _text(word: re.Match[bytes]) -> str:
+    return word.group()[:20].decode("ascii", "replace")
+
+
 def _refuse_width(source: Source, words: Words, layout: Layout) -> None:
-    k, name = len(layout.kinds), words[0].group()[:20].decode("ascii", "replace")
-    found = f"{layout.word} {name} has {len(words) - layout.head} {layout.counted}"
-    hint = "; a row must stand whole on one line (strict=False reads rows over line ends)" if source.strict else ""
+    k = len(layout.kinds)
+    found = f"{layout.word} {_text(words[0])} has {len(words) - layout.head} {layout.counted}"
+    hint = "; a row must stand whole on one line, unless strict=False" if source.strict else ""
     if len(words) % k == 0:
         hint = f"; {len(words) // k} rows on one line? Write one a line, or read with strict=False"
         if layout.word == "node" and len(words) == 2 * k:

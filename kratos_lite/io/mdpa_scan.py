@@ -1,4 +1,4 @@
-"""The blocks of an `.mdpa` file: a tree of ``Begin … End`` frames over its text, and its notes and problems."""
+"""The blocks of an `.mdpa` file, a tree of ``Begin … End`` frames, and what is wrong or odd in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.errors import InputError, Problems, nearest
+from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.document import Note
 from kratos_lite.io.text import shown
 
@@ -26,8 +26,8 @@ LISTS = tuple(f"SubModelPart{kind}" for kind in (
 """Blocks of ids inside a SubModelPart."""
 MESH_BLOCKS = ("MeshData", "MeshNodes", "MeshElements", "MeshConditions")
 ARGUMENTS = {
-    "Properties": 1, "Table": 3, "Elements": 1, "Conditions": 1, "Geometries": 1, "Constraints": 1, "NodalData": 1,
-    "ElementalData": 1, "ConditionalData": 1, "SubModelPart": 1, "Mesh": 1,
+    "Properties": 1, "Table": 3, "Elements": 1, "Conditions": 1, "Geometries": 1, "Constraints": 1,
+    "NodalData": 1, "ElementalData": 1, "ConditionalData": 1, "SubModelPart": 1, "Mesh": 1,
 }  # fmt: skip
 """Words that follow the name of a block."""
 TOP = (*ARGUMENTS, "ModelPartData", "Nodes")
@@ -129,7 +129,8 @@ def scan(source: Source) -> Frame:
     if len(stack) > 1:
         top = stack[-1]
         raise source.fail(
-            f"the file ends inside {top.title!r} of line {source.line(top.offset)}; 'End {top.name}' is missing",
+            f"the file ends inside {top.title!r} of line {source.line(top.offset)}; "
+            f"'End {top.name}' is missing",
             len(source.data.rstrip()),
         )
     _refuse_stray_words(source, root)
@@ -205,7 +206,8 @@ def _close(source: Source, offset: int, stack: list[Frame]) -> int:
     frame = stack.pop()
     if frame.name != name:
         raise source.fail(
-            f"'End {name}' closes {frame.title!r} of line {source.line(frame.offset)}; expected 'End {frame.name}'",
+            f"'End {name}' closes {frame.title!r} of line {source.line(frame.offset)}; "
+            f"expected 'End {frame.name}'",
             offset,
         )
     return cursor
@@ -220,7 +222,8 @@ def _word(source: Source, at: int, after: str) -> tuple[str, int]:
     try:
         return match.group().decode("ascii"), match.end()
     except UnicodeDecodeError:
-        raise source.fail(f"{shown(match.group())} after {after!r} is no name; use plain letters", match.start()) from None
+        text = f"{shown(match.group())} after {after!r} is no name; use plain letters"
+        raise source.fail(text, match.start()) from None
 
 
 def _refuse_stray_words(source: Source, root: Frame) -> None:
@@ -228,8 +231,10 @@ def _refuse_stray_words(source: Source, root: Frame) -> None:
     for span in root.spans:
         for match in source.words(span):
             word = match.group()
-            hint = nearest(word.decode("ascii", "replace").capitalize(), ("Begin", "End"))
-            source.problem(f"{shown(word)} stands outside any block; expected 'Begin <block>'.{hint}", match.start())
+            hint = "; capitals matter" if word.lower() in (b"begin", b"end") else ""
+            source.problem(
+                f"{shown(word)} stands outside any block; expected 'Begin <block>'{hint}", match.start()
+            )
             break
     for frame in root.children:
         if frame.name == "SubModelPart":

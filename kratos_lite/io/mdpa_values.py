@@ -19,23 +19,26 @@ from kratos_lite.materials import MATERIALS
 BRACKET = re.compile(rb"(?:\[([^\]()]*)\]\s*)?\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
 INNER = re.compile(rb"\(([^()]*)\)")
 INTEGER = re.compile(rb"[+-]?[0-9]{1,18}")
+SAMPLES = {"vector": "[3] (x, y, z)", "matrix": "[2,2] ((a, b), (c, d))"}
 NUMBERLIKE = re.compile(rb"[+\-.]*[0-9][0-9+\-.eEdDxX_,]*")
 
 VECTORS = (
-    "DISPLACEMENT VELOCITY ACCELERATION VOLUME_ACCELERATION BODY_FORCE GRAVITY SURFACE_LOAD LINE_LOAD POINT_LOAD "
-    "POINT_MOMENT FORCE ROTATION REACTION NORMAL LOCAL_AXIS_1 LOCAL_AXIS_2 LOCAL_AXIS_3 FACE_LOAD ANGULAR_VELOCITY "
-    "ANGULAR_ACCELERATION EXTERNAL_FORCE INTERNAL_FORCE MESH_VELOCITY MESH_DISPLACEMENT TORQUE INSITU_STRESS PRESTRESS"
+    "DISPLACEMENT VELOCITY ACCELERATION VOLUME_ACCELERATION BODY_FORCE GRAVITY SURFACE_LOAD LINE_LOAD "
+    "POINT_LOAD POINT_MOMENT FORCE ROTATION REACTION NORMAL LOCAL_AXIS_1 LOCAL_AXIS_2 LOCAL_AXIS_3 "
+    "FACE_LOAD ANGULAR_VELOCITY ANGULAR_ACCELERATION EXTERNAL_FORCE INTERNAL_FORCE MESH_VELOCITY "
+    "MESH_DISPLACEMENT TORQUE INSITU_STRESS PRESTRESS"
 ).split()
 REALS = (
-    "DENSITY YOUNG_MODULUS POISSON_RATIO THICKNESS RAYLEIGH_ALPHA RAYLEIGH_BETA TEMPERATURE PRESSURE AREA VISCOSITY "
-    "POSITIVE_FACE_PRESSURE NEGATIVE_FACE_PRESSURE AMBIENT_TEMPERATURE CROSS_AREA NODAL_MASS DYNAMIC_VISCOSITY "
-    "PRESTRESS_FACTOR THERMAL_EXPANSION_COEFFICIENT REFERENCE_TEMPERATURE CONDUCTIVITY SPECIFIC_HEAT WATER_PRESSURE "
-    "SHEAR_MODULUS BULK_MODULUS YIELD_STRESS FRICTION_COEFFICIENT DISTANCE HEAT_FLUX FACE_HEAT_FLUX"
+    "DENSITY YOUNG_MODULUS POISSON_RATIO THICKNESS RAYLEIGH_ALPHA RAYLEIGH_BETA TEMPERATURE PRESSURE "
+    "AREA VISCOSITY POSITIVE_FACE_PRESSURE NEGATIVE_FACE_PRESSURE AMBIENT_TEMPERATURE CROSS_AREA "
+    "NODAL_MASS DYNAMIC_VISCOSITY PRESTRESS_FACTOR THERMAL_EXPANSION_COEFFICIENT REFERENCE_TEMPERATURE "
+    "CONDUCTIVITY SPECIFIC_HEAT WATER_PRESSURE SHEAR_MODULUS BULK_MODULUS YIELD_STRESS "
+    "FRICTION_COEFFICIENT DISTANCE HEAT_FLUX FACE_HEAT_FLUX"
 ).split()
 BOOLS = "IS_RESTARTED COMPUTE_LUMPED_MASS_MATRIX COMPUTE_DYNAMIC_TANGENT CONSIDER_RAYLEIGH_DAMPING".split()
 FLAGS = (
-    "SLIP BOUNDARY ACTIVE RIGID STRUCTURE FLUID SOLID INTERFACE CONTACT MASTER SLAVE VISITED INLET OUTLET TO_ERASE "
-    "SELECTED BLOCKED MARKER INSIDE ISOLATED FREE_SURFACE MODIFIED"
+    "SLIP BOUNDARY ACTIVE RIGID STRUCTURE FLUID SOLID INTERFACE CONTACT MASTER SLAVE VISITED INLET "
+    "OUTLET TO_ERASE SELECTED BLOCKED MARKER INSIDE ISOLATED FREE_SURFACE MODIFIED"
 ).split()
 KINDS: dict[str, str] = {
     **dict.fromkeys(VECTORS, "vector"),
@@ -100,7 +103,8 @@ def _items(source: Source, span: Span) -> Iterator[tuple[str, Any, int]]:
         is_first = not source.strict or last == span[0] or b"\n" in source.data[last : word.start()]
         if not NAME.fullmatch(word.group()) or not (is_first or kind_of(name)):
             source.problem(
-                f"{shown(word.group())} is not a variable; write one variable and its value a line", word.start()
+                f"{shown(word.group())} is not a variable; write one variable and its value a line",
+                word.start(),
             )
             at = last = _line_end(source, word.start(), end)
             continue
@@ -133,9 +137,9 @@ def value_at(source: Source, at: int, end: int, kind: str | None) -> tuple[Any, 
     if data[at : at + 1] in (b"[", b"("):
         match = BRACKET.match(data, at, end)
         if match is None:
-            raise ValueError("a vector is written [3] (x, y, z), a matrix [2,2] ((a, b), (c, d)); is a ')' missing?")
+            raise ValueError(f"write {' or '.join(SAMPLES.values())}; is a ')' missing?")
         array = _array(match)
-        if kind not in (None, "vector", "matrix") or array.ndim != {"vector": 1, "matrix": 2}.get(kind or "", array.ndim):
+        if kind not in (None, ["vector", "matrix"][array.ndim - 1]):
             raise ValueError(f"expected a {kind}, found {shown(match.group())}")
         return array, match.end()
     word = WORD.search(data, at, end)
@@ -157,7 +161,9 @@ def _array(match: re.Match[bytes]) -> NDArray[np.float64]:
         stated = b"".join(size.split())
         found = ",".join(map(str, array.shape)).encode()
         if stated != found:
-            raise ValueError(f"{shown(match.group())} has size [{found.decode()}], not [{size.decode('ascii', 'replace')}]")
+            raise ValueError(
+                f"{shown(match.group())} has size [{found.decode()}], not [{shown(stated)[1:-1]}]"
+            )
     return array
 
 
@@ -168,7 +174,7 @@ def _numbers(text: bytes) -> list[float]:
 def _plain(token: bytes, kind: str | None) -> Any:
     """Return the value of a single word."""
     if kind in ("vector", "matrix"):
-        raise ValueError(f"{shown(token)} is not a {kind}; write [3] (x, y, z)" + " or [2,2] ((a, b), (c, d))" * (kind[0] == "m"))
+        raise ValueError(f"{shown(token)} is not a {kind}; write {SAMPLES[kind]}")
     if kind == "number":
         return real(token)
     if kind in ("truth", "flag"):

@@ -91,7 +91,7 @@ def _variable(settings: Settings, known: Sequence[str], kind: str) -> str:
     if name not in known:
         raise settings.error(
             "variable_name",
-            f"{name!r} is not a {kind} variable of static solids;{nearest(name, known)} "
+            f"{name!r} is not a {kind} variable of static solids.{nearest(name, known)} "
             f"Known are {', '.join(known[:5])} …",
         )
     return name
@@ -241,9 +241,7 @@ def _set(
         setter(action.component, action.rows, value)
 
 
-def _hold(
-    actions: Sequence[Action], steps: Sequence[list[int]], last: int, values: Variables
-) -> None:
+def _hold(actions: Sequence[Action], steps: Sequence[list[int]], last: int, values: Variables) -> None:
     """Fix what is fixed in the last step; a support of an earlier step is taken back after it."""
     supports = [(a, active) for a, active in zip(actions, steps, strict=True) if a.fixed and active]
     for action, active in supports:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, interval_of
 from kratos_lite.io.expressions import evaluate
-from kratos_lite.io.settings import Settings, is_number, read_settings, shown
+from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.result import Result
 
 Array = NDArray[np.float64]
@@ -128,7 +128,7 @@ def file_checks(settings: Settings, case: Case) -> Iterator[Check]:
     settings.check_keys(FILE_KEYS)
     what = f"against {settings.text('input_file_name')}"
     try:
-        path, _ = case.file(settings, "input_file_name")
+        path, _ = find_file(settings, "input_file_name", case.folder, outside=case.outside)
     except InputError as error:
         yield _idle(f"check {what} not evaluated: {error}")
         return

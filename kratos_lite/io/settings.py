@@ -119,7 +119,7 @@ class Settings:
     def unknown_key(self, key: str, known: Iterable[str]) -> str:
         """Return the message about an unknown key."""
         known = list(known)
-        return f"unknown key {self.name(key)!r};{nearest(key, known)} The keys are {', '.join(known)}"
+        return f"unknown key {self.name(key)!r}.{nearest(key, known)} The keys are {', '.join(known)}"
 
 
 def shown(value: Any) -> str:
@@ -149,3 +149,26 @@ def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
             f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
         )
     return folder / relative
+
+
+def find_file(
+    settings: Settings, key: str, folder: Path, *, outside: bool = False, ending: str = ""
+) -> tuple[Path, str]:
+    """Return the path of the file that a key names, and a note if it stands somewhere else.
+
+    The path counts from the folder of the run file; older files of Kratos count from another
+    folder, so the last word of the path is looked for beside the run file too.
+    """
+    name = settings.text(key) + ending
+    if Path(name).is_dir() or (folder / name).is_dir():
+        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
+    try:
+        path = inside(folder, name, outside)
+    except ValueError as error:
+        raise settings.error(key, f"{settings.name(key)}: {error}") from None
+    beside = folder / path.name
+    if path.is_file():
+        return path, ""
+    if beside.is_file():
+        return beside, f"{name} is not there; {path.name} beside the run file is read"
+    raise settings.error(key, f"{settings.name(key)}: there is no file {folder / name}; correct the name")

@@ -58,13 +58,12 @@ def _unzip(path: Path, data: bytes) -> bytes:
 
 def _long_line(data: bytes) -> int:
     """Return the number of the first line that is too long, or 0."""
-    start, number = 0, 1
-    while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
-        if end - start > MAX_LINE:
-            return number
-        start, number = end + 1, number + 1
+    start = 0
+    while len(data) - start > MAX_LINE:
+        end = data.rfind(b"\n", start, start + MAX_LINE + 1)
+        if end < 0:
+            return data.count(b"\n", 0, start) + 1
+        start = end + 1
     return 0
 
 
@@ -128,7 +127,8 @@ def integer(token: bytes) -> int:
     >>> integer(b"42")
     42
     """
-    # Long rows of digits are refused by their length: int() is slow on them.
-    if not token.isdigit() or len(token.lstrip(b"0")) > 19 or not 1 <= int(token.lstrip(b"0") or b"0") <= MAX_ID:
+    digits = token.lstrip(b"0")
+    # int() refuses very long rows of digits with another error, so their length is asked first.
+    if not token.isdigit() or not digits or len(digits) > 19 or int(digits) > MAX_ID:
         raise ValueError(f"{shown(token)} is not an id; ids are 1 … 2^63-1")
-    return int(token)
+    return int(digits)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from functools import cached_property
-from math import isfinite
+from sys import float_info
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from kratos_lite.errors import MaterialError
 from kratos_lite.registry import Registry
 
 Array = NDArray[np.float64]
+MAX_FLOAT = float_info.max
 
 MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
 """Every material by its class name and by the names of Kratos."""
@@ -46,7 +47,7 @@ class LinearMaterial:
                 value = getattr(self, item.name)
                 if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                     raise MaterialError(f"{self._name(item.name)} must be a number; got {value!r}")
-                if not isfinite(value):
+                if not abs(value) <= MAX_FLOAT:
                     raise MaterialError(f"{self._name(item.name)} must be finite; got {value}")
         if self.density < 0:
             raise MaterialError(

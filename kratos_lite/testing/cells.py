@@ -41,9 +41,9 @@ def distorted(element: Element) -> Array:
 
 
 def linear_field(X: Array) -> tuple[Array, Array]:
-    """Return u of a displacement gradient without symmetry, and the strain (6,)."""
+    """Return u of a translation and a displacement gradient without symmetry, and the strain (6,)."""
     G = np.random.default_rng(13).uniform(-1, 1, (3, 3))
-    return X @ G.T, voigt.symmetric_gradient(G)
+    return X @ G.T + [0.5, -0.7, 0.3], voigt.symmetric_gradient(G)
 
 
 def rotations(shape: type[Shape]) -> Array:

@@ -95,7 +95,7 @@ def volume(element: Element) -> Measured:
 
 
 def strain_operator(element: Element) -> Measured:
-    """Check that B u and strain(u) of a linear field are its strain at the Gauss points of a distorted cell."""
+    """Check that B u and strain(u) of a linear field are its strain at all points of a distorted cell."""
     X = distorted(element)
     u, exact = linear_field(X)
     cell = element(X)

@@ -19,7 +19,9 @@ def split_hexes(points: np.ndarray, hexes: np.ndarray, kind: str, order: int | N
     corners = hexes[:, split].reshape(-1, split.shape[1])
     points, nodes = raise_order(points, corners, element.shape)
     m = len(nodes)
-    block = kl.Block(kind, nodes.astype(np.int32), np.arange(1, m + 1), np.ones(m, dtype=np.int64), element.shape)
+    block = kl.Block(
+        kind, nodes.astype(np.int32), np.arange(1, m + 1), np.ones(m, dtype=np.int64), element.shape
+    )
     return kl.Mesh(points, [block])
 
 

@@ -15,7 +15,13 @@ MESHES = {4: 12, 5: 8, 6: 12, 8: 12, 10: 6, 13: 4, 15: 6, 20: 8, 27: 6}
 
 
 def trigonometry(X):
-    return np.sin(np.pi * X.T), np.cos(np.pi * X.T), X[:, 2] * (1 - X[:, 2]), np.exp(X[:, 0]), X[:, 1] * (1 - X[:, 1])
+    return (
+        np.sin(np.pi * X.T),
+        np.cos(np.pi * X.T),
+        X[:, 2] * (1 - X[:, 2]),
+        np.exp(X[:, 0]),
+        X[:, 1] * (1 - X[:, 1]),
+    )
 
 
 def displacement(X):
@@ -51,7 +57,6 @@ def body_force(X):
     )
     lam, mu = STEEL.lame
     return -(mu * laplacian + (lam + mu) * grad_div)
-
 
 
 def fine(batch, points):

@@ -66,7 +66,9 @@ def test_linear_field_on_the_seven_bricks_of_macneal_and_harder(split, nodes):
     bricks = [inner]
     for face in kl.KinematicLinear3D8N.shape.faces:
         outer, near = np.array(face), inner[list(face)]
-        bricks.append(np.concatenate([near, outer]))  # a face seen from outside is the floor of a brick that grows outward
+        bricks.append(
+            np.concatenate([near, outer])
+        )  # a face seen from outside is the floor of a brick that grows outward
     check_linear(split(points, np.array(bricks), kind(nodes)))
 
 
@@ -100,10 +102,14 @@ def test_quadratic_field_on_parallelepipeds(split, nodes):
     X = batch.at(mesh.points).gauss_points()
     strain = symmetric_gradient(gradient(X.reshape(-1, 3))).reshape(*X.shape[:2], 6)
     np.testing.assert_allclose(result.strain(), strain, rtol=0, atol=1e-11 * np.abs(strain).max())
-    np.testing.assert_allclose(result.stress(), strain @ STEEL.C, rtol=0, atol=1e-11 * np.abs(strain @ STEEL.C).max())
+    np.testing.assert_allclose(
+        result.stress(), strain @ STEEL.C, rtol=0, atol=1e-11 * np.abs(strain @ STEEL.C).max()
+    )
 
 
-@pytest.mark.parametrize(("nodes", "low", "high"), [(10, 0, 1e-13), (27, 0, 1e-13), (20, 1e-6, 1e-3), (15, 1e-6, 1e-3)])
+@pytest.mark.parametrize(
+    ("nodes", "low", "high"), [(10, 0, 1e-13), (27, 0, 1e-13), (20, 1e-6, 1e-3), (15, 1e-6, 1e-3)]
+)
 def test_quadratic_field_with_a_moved_corner_is_exact_for_complete_elements_only(warped, nodes, low, high):
     field, _, body = quadratic(np.random.default_rng(7))
     result, u = solve_patch(warped(kind(nodes), 2, amount=0.2), field, body)

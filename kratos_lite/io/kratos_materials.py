@@ -1,0 +1,124 @@
+"""The materials file of a Kratos run: materials of parts by properties id."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import KratosLiteError, ModelError
+from kratos_lite.io.case import Case
+from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.kratos import ELASTIC, material_from
+from kratos_lite.io.settings import Settings, is_number, shown
+from kratos_lite.materials import MATERIALS, LinearMaterial
+
+USED = ELASTIC | {
+    "DENSITY", "INTEGRATION_ORDER", "VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE", "INSITU_STRESS",
+    "PRESTRESS", "PRESTRESS_FACTOR",
+}  # fmt: skip
+"""Variables of a material that change a static linear solution."""
+
+
+def materials_of(
+    settings: Settings, case: Case, document: Document, notes: list[str]
+) -> dict[int, LinearMaterial]:
+    """Return the materials by properties id, and put the properties into the document.
+
+    Elements of the parts get the properties id, and the variables join those of the mesh file.
+
+    Raises
+    ------
+    InputError
+        With the place of a part without elements, an unknown law or an impossible constant.
+    ModelError
+        If elements are left without material.
+    """
+    if not settings.sections("properties"):
+        raise settings.error("properties", "the materials file needs a list of 'properties'")
+    found: dict[int, LinearMaterial] = {}
+    for entry in settings.sections("properties"):
+        entry.check_keys(("model_part_name", "properties_id", "Material"))
+        number = entry.integer("properties_id")
+        _assign(entry, case, document, number)
+        found[number] = _material(entry, document.properties[number], notes)
+    _complete(found, document)
+    return found
+
+
+def _assign(entry: Settings, case: Case, document: Document, number: int) -> None:
+    """Give the elements of the part their properties id."""
+    rows = case.part(entry).elements
+    if not len(rows):
+        have = [name for name, part in case.mesh.parts.items() if len(part.elements)]
+        raise entry.error(
+            "model_part_name",
+            f"part {entry.text('model_part_name')!r} has no elements to carry a material; "
+            f"parts with elements are {', '.join([case.root + ' (all)', *have])}",
+        )
+    mask = np.zeros(case.mesh.n_elements, dtype=bool)
+    mask[rows] = True
+    start = 0
+    for block in case.mesh.blocks:
+        block.properties = np.where(mask[start : start + len(block)], number, block.properties)
+        start += len(block)
+    document.properties.setdefault(number, Properties(number))
+
+
+def _material(entry: Settings, properties: Properties, notes: list[str]) -> LinearMaterial:
+    part = entry.text("model_part_name")
+    body = entry.section("Material", required=True)
+    law = body.section("constitutive_law", required=True)
+    name = law.text("name").rsplit(".", 1)[-1]
+    if name not in MATERIALS:
+        raise law.error(
+            "name",
+            f"part {part}: {name!r} is not a linear elastic law that kratos_lite has; "
+            "use LinearElastic3DLaw, or solve this part with Kratos",
+        )
+    variables = body.section("Variables")
+    values: dict[str, Any] = {key.rsplit(".", 1)[-1]: _number(variables, key) for key in variables.values}
+    idle = sorted(values.keys() - USED)
+    if idle:
+        notes.append(f"material of {part}: {', '.join(idle)} not used by {name}")
+    if body.section("Tables").values:
+        notes.append(f"material of {part}: Tables are not used by {name}")
+    for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):
+        if body.values[key]:
+            raise body.error(key, f"part {part}: {key!r} in a material is not supported; leave it out")
+    properties.values |= values
+    try:
+        material = material_from({**properties.values, "CONSTITUTIVE_LAW": name})
+    except KratosLiteError as error:
+        named = [key for key in variables.values if key in str(error)]
+        raise variables.error(named[0] if named else "", f"part {part}: {error}") from None
+    assert material is not None
+    return material
+
+
+def _number(variables: Settings, key: str) -> Any:
+    """Return a variable: a number for elastic constants, else whatever it is."""
+    value = variables.values[key]
+    if key.rsplit(".", 1)[-1] in ELASTIC | {"DENSITY"}:
+        return variables.number(key)
+    if key in USED and not (is_number(value) or (isinstance(value, list) and all(map(is_number, value)))):
+        raise variables.error(key, f"{key} must be a number or a list of numbers; got {shown(value)}")
+    return value
+
+
+def _complete(found: dict[int, LinearMaterial], document: Document) -> None:
+    """Take materials that only the mesh file has; name the elements that have none at all."""
+    mesh = document.mesh
+    for block in mesh.blocks:
+        for number in map(int, np.unique(block.properties)):
+            if number in found:
+                continue
+            given = document.properties.get(number)
+            material = material_from(given.values) if given else None
+            if material is None:
+                cells = np.flatnonzero(block.properties == number)
+                raise ModelError(
+                    f"{mesh.place(block, int(cells[0]))} has no material (property {number}, {len(cells)} "
+                    f"elements of this kind); name its part in the materials file"
+                )
+            found[number] = material

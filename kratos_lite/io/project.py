@@ -1,0 +1,221 @@
+"""Run files in JSON: our own small ones, and ``ProjectParameters.json`` of Kratos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from kratos_lite.errors import InputError, KratosLiteError, Problems
+from kratos_lite.io.files import ending, read_document
+from kratos_lite.io.kratos import model_from
+from kratos_lite.io.run_checks import Check
+from kratos_lite.io.settings import Settings, find_file, inside, read_settings, shown
+from kratos_lite.io.strict_json import Object
+from kratos_lite.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.model import Model
+from kratos_lite.result import Result
+
+SOLVERS = ("auto", "dense", "direct", "amg")
+OUTPUTS = ("output", "json", "picture")
+LOADS: dict[str, Callable[[str, Any], Load]] = {
+    "traction": Traction,
+    "pressure": Pressure,
+    "point_load": PointLoad,
+}
+KEYS = ("model", "material", "fix", "gravity", *LOADS, "solver", "tolerance", *OUTPUTS)
+
+
+@dataclass
+class Project:
+    """A model with what its run file says about solving, output and expected values.
+
+    Attributes
+    ----------
+    model : the model; ``model.notes`` tells what was not used.
+    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
+    tolerance : relative residual at which the iterative solver stops.
+    output : paths to write by the keys ``output``, ``json`` and ``picture``.
+    checks : comparisons with expected values.
+    """
+
+    model: Model
+    solver: str = "auto"
+    tolerance: float = 1e-10
+    output: dict[str, str] = field(default_factory=dict)
+    checks: list[Check] = field(default_factory=list)
+
+    def evaluate(self, result: Result) -> list[str]:
+        """Return one line for each check: passed, failed or not evaluated, with the numbers."""
+        return [check(result) for check in self.checks]
+
+
+def read_project(path: str | Path, *, allow_outside: bool = False) -> Project:
+    """Return the project of a run file: Kratos' ``ProjectParameters.json``, or our own.
+
+    Our own has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
+    for each part), `fix` (``{part: "xyz"}`` or ``{part: {"x": 0.001}}``, m), `gravity` (m/s²),
+    `traction` and `pressure` by part (Pa), `point_load` by part (N on each node), `solver`
+    (``{"type", "tolerance"}``), `tolerance`, and the files to write: `output`, `json`, `picture`.
+
+    Parameters
+    ----------
+    path : the run file; all files it names lie in its folder.
+    allow_outside : let it name files elsewhere.
+
+    Raises
+    ------
+    InputError, MeshError, ModelError
+        With file, line, column and cure of what is wrong.
+    """
+    settings, folder = read_settings(path), Path(path).parent
+    if "solver_settings" in settings or "problem_data" in settings:
+        from kratos_lite.io.kratos_project import read_kratos_project
+
+        model, checks = read_kratos_project(settings, folder, allow_outside)
+        return Project(model, checks=checks)
+    if "properties" in settings and "model" not in settings:
+        raise settings.error("properties", "this is a materials file; read the run file that names it")
+    return _read_own(settings, folder, allow_outside)
+
+
+class _Collector:
+    """Calls functions and collects the errors that they raise."""
+
+    def __init__(self) -> None:
+        self.problems = Problems()
+
+    def __call__(self, action: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return action(*arguments)
+        except KratosLiteError as error:
+            self.problems.add(str(error))
+            return None
+
+
+def _read_own(settings: Settings, folder: Path, outside: bool) -> Project:
+    collect = _Collector()
+    for key in settings.unknown(KEYS):
+        collect.problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
+    solver, tolerance = collect(_solver, settings) or ("auto", 0.0)
+    output = collect(_outputs, settings, folder, outside)
+    path = collect(_model_path, settings, folder, outside)
+    sections = {key: collect(settings.section, key) for key in ("material", "fix", *LOADS)}
+    gravity = collect(settings.vector, "gravity") if "gravity" in settings else None
+    collect.problems.raise_if_any()
+    material = sections["material"]
+    model = model_from(read_document(path), materials=not material.values or _is_by_part(material))
+    _assign(model, material, collect)
+    for part in sections["fix"].values:
+        collect(_fix, model, sections["fix"], part)
+    for key, load in LOADS.items():
+        for part in sections[key].values:
+            collect(_load, model, sections[key], part, load)
+    if gravity is not None:
+        model.add(Gravity(gravity))
+    collect.problems.raise_if_any()
+    return Project(model, solver, tolerance, output)
+
+
+def _model_path(settings: Settings, folder: Path, outside: bool) -> Path:
+    path, note = find_file(settings, "model", folder, outside=outside)
+    if note:
+        raise settings.error("model", f"model: {note}; correct the path")
+    if ending(path) == ".json":
+        raise settings.error("model", f"model must be a mesh file such as .mdpa; got {path.name}")
+    return path
+
+
+def _solver(settings: Settings) -> tuple[str, float]:
+    solver = settings.section("solver")
+    solver.check_keys(("type", "tolerance"))
+    kind = solver.text("type", "auto")
+    if kind not in SOLVERS:
+        raise solver.error("type", f"solver.type must be one of {', '.join(SOLVERS)}; got {kind!r}")
+    if "tolerance" in settings and "tolerance" in solver:
+        raise settings.error("tolerance", "tolerance is given twice, also in 'solver'; keep one")
+    owner = settings if "tolerance" in settings else solver
+    tolerance = owner.number("tolerance", 1e-10)
+    if not 0 < tolerance < 1:
+        raise owner.error("tolerance", f"tolerance must lie between 0 and 1; got {tolerance:g}")
+    return kind, tolerance
+
+
+def _outputs(settings: Settings, folder: Path, outside: bool) -> dict[str, str]:
+    found = {}
+    for key in OUTPUTS:
+        if key in settings:
+            name = settings.text(key)
+            try:
+                found[key] = str(inside(folder, name, outside))
+            except ValueError as error:
+                raise settings.error(key, f"{key}: {error}") from None
+    return found
+
+
+def _is_by_part(material: Settings) -> bool:
+    return any(isinstance(value, Object) for value in material.values.values())
+
+
+def _assign(model: Model, section: Settings, collect: _Collector) -> None:
+    if not _is_by_part(section):
+        material = collect(_material, section) if section.values else None
+        if material is not None:
+            model.assign(material)
+        return
+    for part in section.values:
+        collect(_assign_part, model, section, part)
+
+
+def _assign_part(model: Model, section: Settings, part: str) -> None:
+    _at(section, part, model.assign, _material(section.section(part)), part)
+
+
+def _material(section: Settings) -> LinearMaterial:
+    law = section.text("law", "Isotropic3D")
+    try:
+        kind = MATERIALS[law]
+    except InputError as error:
+        raise section.error("law", str(error)) from None
+    names = [item.name for item in fields(kind)]  # type: ignore[arg-type]
+    section.check_keys(["law", *names])
+    missing = [name for name in names if name not in section and name != "density"]
+    if missing:
+        raise section.error("", f"{section.path}: {law} needs {', '.join(missing)}")
+    try:
+        return kind(**{name: section.number(name) for name in names if name in section})
+    except InputError:
+        raise
+    except KratosLiteError as error:
+        raise section.error("", f"{section.path}: {error}") from None
+
+
+def _at(section: Settings, key: str, action: Callable[..., Any], *arguments: Any) -> None:
+    """Call something; give an error of the model the place of a key."""
+    try:
+        action(*arguments)
+    except KratosLiteError as error:
+        raise section.error(key, f"{section.name(key)}: {error}") from None
+
+
+def _fix(model: Model, section: Settings, part: str) -> None:
+    value = section.values[part]
+    if isinstance(value, str):
+        _at(section, part, model.fix, part, value)
+        return
+    if not isinstance(value, Object):
+        raise section.error(
+            part, f'{section.name(part)} must be axes such as "xz" or {{"x": 0.001}}; got {shown(value)}'
+        )
+    axes = section.section(part)
+    axes.check_keys(("x", "y", "z"))
+    for axis in axes.values:
+        _at(axes, axis, model.fix, part, axis, axes.number(axis))
+
+
+def _load(model: Model, section: Settings, part: str, load: Callable[[str, Any], Load]) -> None:
+    value = section.number(part) if load is Pressure else section.vector(part)
+    _at(section, part, model.mesh.part, part)
+    model.add(load(part, value))

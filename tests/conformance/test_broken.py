@@ -1,0 +1,623 @@
+"""The conformance kit rejects broken shapes, rules, elements and materials, and says by which check."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from kratos_lite.elements import (
+    ELEMENTS,
+    KinematicLinear,
+    KinematicLinear3D4N,
+    KinematicLinear3D8N,
+    KinematicLinear3D10N,
+    KinematicLinear3D13N,
+    KinematicLinear3D20N,
+)
+from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial
+from kratos_lite.quadrature import Rule, hexahedron, pyramid, tetrahedron
+from kratos_lite.shapes import SHAPES, Hexahedron8, Hexahedron20, Pyramid5, Shape, Tetrahedron4, Tetrahedron10
+from kratos_lite.testing import (
+    ConformanceError,
+    assert_conforms,
+    check_element,
+    check_material,
+    check_rule,
+    check_shape,
+    failures,
+    report,
+)
+
+MATRICES = {"stiffness", "rank", "rigid motions", "linear patch", "quadratic patch", "bending"}
+
+
+@pytest.fixture(autouse=True)
+def _clean_registries():
+    """Broken classes register themselves: forget them after each test."""
+    with ExitStack() as stack:
+        for registry in (ELEMENTS, SHAPES, MATERIALS):
+            stack.enter_context(registry.temporary())
+        yield
+
+
+def failed(findings):
+    return {finding.check: finding for finding in failures(findings)}
+
+
+def derived(parent, **changes):
+    """Return a shape like `parent` with some of its data or functions changed."""
+    return type(f"Broken{parent.__name__}", (parent,), {"nodes": parent.nodes, **changes})
+
+
+def with_functions(parent, N=None, dN=None):
+    changes = {k: staticmethod(f) for k, f in (("N", N), ("dN", dN)) if f}
+    return derived(parent, **changes)
+
+
+# ---- shapes ------------------------------------------------------------------------------------
+
+
+def test_registries_forget_what_a_test_registers():
+    before = list(SHAPES)
+    with SHAPES.temporary():
+        derived(Tetrahedron4)
+        assert "BrokenTetrahedron4" in SHAPES
+    assert list(SHAPES) == before
+
+
+def test_a_derivative_with_r_where_s_belongs_is_named():
+    def dN(xi):
+        r, s, t = np.moveaxis(np.asarray(xi, dtype=float), -1, 0)
+        out = Tetrahedron10.dN(xi)
+        out[..., 6, 1] = 4 * (1 - s - 2 * r - t)
+        return out
+
+    found = failed(check_shape(with_functions(Tetrahedron10, dN=dN)))
+    assert set(found) == {"derivatives", "partition of unity", "reproduction"}
+    detail = found["derivatives"].detail
+    assert detail.startswith("dN[6] / d s at xi = (")
+    assert "also" not in detail
+    assert 0.1 < found["derivatives"].measured < 4
+
+
+def test_wrong_derivatives_that_still_sum_to_zero_are_named_both():
+    def dN(xi):
+        out = Tetrahedron10.dN(xi)
+        wrong = 0.5 * np.asarray(xi)[..., 0]
+        out[..., 6, 1] += wrong
+        out[..., 5, 1] -= wrong
+        return out
+
+    found = failed(check_shape(with_functions(Tetrahedron10, dN=dN)))
+    assert "partition of unity" not in found
+    detail = found["derivatives"].detail
+    assert "dN[6] / d s" in detail
+    assert "dN[5] / d s" in detail
+
+
+def test_a_derivative_wrong_in_the_eighth_digit_is_found():
+    found = failed(check_shape(with_functions(Hexahedron8, dN=lambda xi: Hexahedron8.dN(xi) * (1 + 1e-7))))
+    assert set(found) == {"derivatives", "reproduction"}
+
+
+@pytest.mark.parametrize("parent", [Tetrahedron10, Hexahedron20])
+def test_functions_in_another_order_than_the_nodes_are_found(parent):
+    order = [0, 1, 3, 2, *range(4, len(parent.nodes))]
+    shape = with_functions(
+        parent, lambda xi: parent.N(xi)[..., order], lambda xi: parent.dN(xi)[..., order, :]
+    )
+    found = failed(check_shape(shape))
+    assert set(found) == {"kronecker", "reproduction"}
+    assert found["kronecker"].measured == 1
+    assert found["kronecker"].detail.startswith("N[2] at node 2")
+
+
+@pytest.mark.parametrize("parent", [Tetrahedron10, Hexahedron20])
+def test_nodes_and_functions_both_swapped_are_found_by_edges_and_faces(parent):
+    order = [0, 1, 3, 2, *range(4, len(parent.nodes))]
+    shape = derived(
+        parent,
+        nodes=parent.nodes[order],
+        N=staticmethod(lambda xi: parent.N(xi)[..., order]),
+        dN=staticmethod(lambda xi: parent.dN(xi)[..., order, :]),
+    )
+    assert set(failed(check_shape(shape))) == {"mid edges", "faces"}
+
+
+def test_an_infinite_derivative_at_the_apex_is_found():
+    def dN(xi):
+        z = np.asarray(xi, dtype=float)[..., 2]
+        out = Pyramid5.dN(xi)
+        out[..., 4, 2] = 1 + 0 / (1 - z)
+        return out
+
+    found = failed(check_shape(with_functions(Pyramid5, dN=dN)))
+    assert set(found) == {"bounded", "partition of unity"}
+    assert "xi = (0, 0, 1)" in found["bounded"].detail
+    assert np.isnan(found["bounded"].measured)
+
+
+def test_a_function_with_a_singular_slope_is_found():
+    def N(xi):
+        out = np.array(Pyramid5.N(xi))
+        out[..., 4] = np.sqrt(out[..., 4])
+        return out
+
+    assert {"derivatives", "bounded"} <= set(failed(check_shape(with_functions(Pyramid5, N))))
+
+
+def test_functions_that_take_one_point_at_a_time_fail_only_broadcasting():
+    def N(xi):
+        r, s, t = xi
+        return np.array([1 - r - s - t, r, s, t])
+
+    found = failed(check_shape(with_functions(Tetrahedron4, N)))
+    assert set(found) == {"broadcasting"}
+    assert "raises ValueError" in found["broadcasting"].detail
+    assert "at test_broken.py:" in found["broadcasting"].detail
+
+
+def test_an_exception_in_N_is_a_finding_with_its_line():
+    def N(xi):
+        raise ZeroDivisionError("by hand")
+
+    findings = check_shape(with_functions(Tetrahedron4, N))
+    found = failed(findings)
+    assert {"derivatives", "kronecker", "reproduction", "bounded"} <= set(found)
+    line = N.__code__.co_firstlineno + 1
+    assert found["kronecker"].detail == f"raises ZeroDivisionError: by hand at test_broken.py:{line}"
+    assert found["kronecker"].measured == np.inf
+
+
+def test_a_result_of_the_wrong_size_is_named():
+    found = failed(check_shape(with_functions(Tetrahedron4, lambda xi: Tetrahedron4.N(xi)[..., :3])))
+    assert "N at xi = (" in found["kronecker"].detail
+    assert "has shape (3,); expected (4,)" in found["kronecker"].detail
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_fails(value):
+    found = failed(check_shape(with_functions(Tetrahedron4, lambda xi: Tetrahedron4.N(xi) * value)))
+    assert {"derivatives", "kronecker", "partition of unity", "reproduction", "bounded"} <= set(found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "check", "text"),
+    [
+        ({"faces": ((0, 1, 2), *Tetrahedron4.faces[1:])}, "faces", "clockwise from outside"),
+        ({"faces": Tetrahedron4.faces[:3]}, "faces", "is not used once in each direction"),
+        ({"faces": ()}, "faces", "lists no faces"),
+        ({"faces": ((0, 2), *Tetrahedron4.faces[1:])}, "faces", "has 2 nodes"),
+        ({"to_vtk": (0, 1, 2, 2)}, "node orders", "to_vtk"),
+        ({"to_gmsh": (0, 1, 2)}, "node orders", "to_gmsh"),
+        ({"degree": 2}, "reproduction", "degree claimed: 2"),
+    ],
+)
+def test_wrong_data_of_a_shape_are_found(changes, check, text):
+    found = failed(check_shape(derived(Tetrahedron4, **changes)))
+    assert set(found) == {check}
+    assert text in found[check].detail
+
+
+def test_a_face_without_its_mid_edge_nodes_or_with_them_out_of_order_is_found():
+    first, *rest = Tetrahedron10.faces
+    for face, text in ((first[:3], "should list the nodes"), ((*first[:3], *first[:2:-1]), "out of order")):
+        found = failed(check_shape(derived(Tetrahedron10, faces=(face, *rest))))
+        assert set(found) == {"faces"}
+        assert text in found["faces"].detail
+
+
+# ---- rules -------------------------------------------------------------------------------------
+
+
+def rule_like(rule, points=None, weights=None, degree=None):
+    return Rule(
+        np.array(rule.points if points is None else points),
+        np.array(rule.weights if weights is None else weights),
+        rule.degree if degree is None else degree,
+        "broken",
+    )
+
+
+def five_points():
+    """Return a five-point rule of degree 2 for the pyramid: right in itself, too weak for 13 nodes."""
+    z1, z2 = 1 / 4 - np.sqrt(3 / 320), 1 / 4 + np.sqrt(3 / 20)
+    points = [[x, y, z1] for x in (-0.5, 0.5) for y in (-0.5, 0.5)] + [[0, 0, z2]]
+    return Rule(np.array(points), np.array([4 / 15] * 4 + [4 / 15]), 2, "five points")
+
+
+def truncated():
+    a, b = 0.58541020, 0.13819660
+    points = np.full((4, 3), b)
+    points[1:] += (a - b) * np.eye(3)
+    return Rule(points, np.full(4, 1 / 24), 2, "eight digits")
+
+
+def test_constants_cut_to_eight_digits_fail_the_rule():
+    found = failed(check_rule("tetrahedron", truncated()))
+    assert set(found) == {"monomials"}
+    assert 1e-10 < found["monomials"].measured < 1e-7
+    assert found["monomials"].limit == 1e-14
+
+
+def test_the_five_point_rule_is_right_in_itself():
+    assert not failures(check_rule("pyramid", five_points()))
+
+
+@pytest.mark.parametrize(
+    ("cell", "rule", "checks"),
+    [
+        (
+            "tetrahedron",
+            rule_like(tetrahedron(2), weights=tetrahedron(2).weights * 1.01),
+            {"weights", "monomials"},
+        ),
+        ("tetrahedron", rule_like(tetrahedron(2), degree=3), {"monomials"}),
+        ("hexahedron", rule_like(hexahedron(3), degree=4), {"monomials"}),
+        ("pyramid", rule_like(pyramid(3), degree=4), {"monomials"}),
+        (
+            "hexahedron",
+            rule_like(hexahedron(3), points=hexahedron(3).points * 2),
+            {"monomials", "points inside"},
+        ),
+        ("wedge", tetrahedron(2), {"weights", "monomials"}),
+    ],
+)
+def test_wrong_rules_are_found(cell, rule, checks):
+    assert set(failed(check_rule(cell, rule))) == checks
+
+
+def test_a_rule_with_sizes_that_do_not_fit_is_found():
+    assert "sizes" in failed(check_rule("hexahedron", rule_like(hexahedron(3), weights=np.ones(7))))
+    assert "sizes" in failed(check_rule("triangle", tetrahedron(2)))
+    assert "sizes" in failed(check_rule("hexahedron", rule_like(hexahedron(3), weights=np.full(8, np.nan))))
+
+
+def test_an_unknown_cell_is_a_finding():
+    assert "cell 'sphere' is not known" in failed(check_rule("sphere", tetrahedron(2)))["sizes"].detail
+
+
+# ---- elements ----------------------------------------------------------------------------------
+
+
+def from_B(parent, change):
+    """Return an element made, in all its parts, of a changed B."""
+
+    class Broken(parent):
+        def B(self, xi):
+            return change(super().B(xi))
+
+        def _by_points(self):
+            return np.stack([self.B(xi) for xi in self.rule.points], axis=-3)
+
+        def strain(self, u):
+            u = np.asarray(u)
+            return (self._by_points() @ u.reshape(*u.shape[:-2], 1, -1, 1))[..., 0]
+
+        def internal_load(self, stress):
+            f = (
+                np.swapaxes(self._by_points(), -1, -2)
+                @ np.asarray(stress)[..., None]
+                * self.dV[..., None, None]
+            )
+            return f.sum(axis=-3).reshape(self.X.shape)
+
+        def stiffness_by_axis(self, C):
+            B, n = self._by_points(), len(self.nodes)
+            K = (np.swapaxes(B, -1, -2) @ C @ B * self.dV[..., None, None]).sum(axis=-3)
+            return np.moveaxis(K.reshape(*K.shape[:-2], n, 3, n, 3), (-4, -2), (-3, -1))
+
+    return Broken
+
+
+def rows_times(factors):
+    return lambda B: B * np.array(factors, dtype=float)[:, None]
+
+
+def test_an_element_made_of_its_own_B_conforms():
+    assert not failures(check_element(from_B(KinematicLinear3D8N, lambda B: B)))
+
+
+@pytest.mark.parametrize("parent", [KinematicLinear3D8N, KinematicLinear3D10N])
+@pytest.mark.parametrize("factors", [[1, 1, 1, 0, 0, 0], [1, 1, 1, 2, 1, 1], [1, 1, 1, 0.5, 0.5, 0.5]])
+def test_wrong_shear_rows_of_B_are_found(parent, factors):
+    found = failed(check_element(from_B(parent, rows_times(factors))))
+    expected = {"strain operator", "frame invariance", "linear patch"}
+    if not any(factors[3:]):
+        expected |= {"rank", "bending"}
+    if parent is KinematicLinear3D10N:
+        expected |= {"quadratic patch"}
+    assert set(found) == expected
+    assert any(name in found["strain operator"].detail for name in ("XY", "YZ", "ZX"))
+
+
+def test_shear_rows_in_another_order_are_found():
+    element = from_B(KinematicLinear3D8N, lambda B: B[..., [0, 1, 2, 3, 5, 4], :])
+    assert set(failed(check_element(element))) == {"strain operator"}
+
+
+def test_a_B_that_does_not_belong_to_the_stiffness_is_found():
+    class Broken(KinematicLinear3D8N):
+        def B(self, xi):
+            return rows_times([1, 1, 1, 0, 0, 0])(super().B(xi))
+
+    assert set(failed(check_element(Broken))) == {"strain operator", "stiffness"}
+
+
+def test_a_wrong_derivative_is_found_in_the_element_too():
+    def dN(xi):
+        out = Tetrahedron10.dN(xi)
+        out[..., 6, 1] += 0.5 * np.asarray(xi)[..., 0]
+        return out
+
+    class Broken(KinematicLinear):
+        shape = with_functions(Tetrahedron10, dN=dN)
+        rule, mass_rule = tetrahedron(2), tetrahedron(4)
+
+    found = failed(check_element(Broken))
+    assert {"derivatives", "linear patch", "quadratic patch", "rigid motions", "strain operator"} <= set(
+        found
+    )
+
+
+def element_with(parent, **changes):
+    return type(f"Broken{parent.__name__}", (parent,), changes)
+
+
+@pytest.mark.parametrize(
+    ("parent", "rule", "checks"),
+    [
+        (KinematicLinear3D20N, hexahedron(3), {"rank", "bending"}),
+        (
+            KinematicLinear3D13N,
+            five_points(),
+            {"rank", "linear patch", "quadratic patch", "bending"},
+        ),
+        (KinematicLinear3D13N, pyramid(3), {"rank"}),
+        (
+            KinematicLinear3D10N,
+            tetrahedron(1),
+            {"rank", "linear patch", "quadratic patch", "bending", "body force"},
+        ),
+        (KinematicLinear3D8N, hexahedron(1), {"rank", "linear patch", "bending"}),
+        (KinematicLinear3D10N, truncated(), {"rule monomials", "quadratic patch", "bending", "body force"}),
+        (
+            KinematicLinear3D10N,
+            rule_like(tetrahedron(2), weights=tetrahedron(2).weights * 1.01),
+            {"rule weights", "rule monomials", "volume", "body force"},
+        ),
+    ],
+)
+def test_rules_that_are_wrong_or_too_weak_are_found(parent, rule, checks):
+    found = failed(check_element(element_with(parent, rule=rule)))
+    assert set(found) == checks
+
+
+def test_spurious_modes_are_counted():
+    found = failed(check_element(element_with(KinematicLinear3D20N, rule=hexahedron(3))))
+    assert found["rank"].measured == 6
+    assert found["rank"].detail.startswith("12 zero-energy modes on the reference cell")
+    found = failed(check_element(element_with(KinematicLinear3D13N, rule=five_points())))
+    assert found["rank"].detail.startswith("9 zero-energy modes on the reference cell, 9 on a distorted one")
+
+
+@pytest.mark.parametrize(
+    ("parent", "rule"),
+    [
+        (KinematicLinear3D4N, tetrahedron(1)),
+        (KinematicLinear3D10N, tetrahedron(2)),
+        (KinematicLinear3D20N, hexahedron(3)),
+        (KinematicLinear3D13N, pyramid(3)),
+    ],
+)
+def test_a_mass_rule_with_too_few_points_is_found(parent, rule):
+    assert "consistent mass" in failed(check_element(element_with(parent, mass_rule=rule)))
+
+
+def test_row_sums_as_lumped_mass_of_a_quadratic_element_are_found():
+    class Broken(KinematicLinear3D20N):
+        def lumped_mass(self, density):
+            return self.scalar_mass(density).sum(axis=-1)
+
+    assert set(failed(check_element(Broken))) == {"lumped mass"}
+
+
+def test_a_mass_that_is_not_all_there_is_found():
+    class Broken(KinematicLinear3D8N):
+        def lumped_mass(self, density):
+            return 0.99 * super().lumped_mass(density)
+
+    assert set(failed(check_element(Broken))) == {"mass total"}
+
+
+def test_functions_overridden_in_the_element_alone_are_found():
+    class Broken(KinematicLinear3D8N):
+        @classmethod
+        def N(cls, xi):
+            return 1.1 * super().N(xi)
+
+    found = failed(check_element(Broken))
+    assert set(found) == {"functions"}
+    assert found["functions"].detail.startswith("N of the element")
+
+
+class ChangedStiffness(KinematicLinear3D8N):
+    """Takes a change of K; `stiffness` follows `stiffness_by_axis`."""
+
+    def stiffness_by_axis(self, C):
+        return self.change(super().stiffness_by_axis(C))
+
+    def change(self, K):
+        return K
+
+
+def test_an_absolute_tolerance_is_found_by_scaling():
+    class Broken(ChangedStiffness):
+        def change(self, K):
+            return np.where(np.abs(K) < 1e-8, 0.0, K)
+
+    assert "length scaling" in failed(check_element(Broken))
+
+
+def test_an_unsymmetric_stiffness_is_found():
+    class Broken(ChangedStiffness):
+        def change(self, K):
+            K = K.copy()
+            K[..., 0, 0, 1, 1] *= 1 + 1e-9
+            return K
+
+    assert {"symmetry", "stiffness"} <= set(failed(check_element(Broken)))
+
+
+def test_a_batch_that_mixes_its_cells_is_found():
+    class Broken(ChangedStiffness):
+        def change(self, K):
+            return K[::-1] if K.ndim == 5 else K
+
+    found = failed(check_element(Broken))
+    assert "stiffness" in found
+    assert "of a batch" in found["stiffness"].detail
+
+
+def test_loads_that_are_wrong_are_found():
+    class Broken(KinematicLinear3D8N):
+        def body_force(self, b):
+            return super().body_force(b)[..., ::-1]
+
+        def internal_load(self, stress):
+            return -super().internal_load(stress)
+
+    assert set(failed(check_element(Broken))) == {"body force", "internal load"}
+
+
+def test_an_exception_in_an_element_is_a_finding():
+    class Broken(KinematicLinear3D8N):
+        def stiffness_by_axis(self, C):
+            raise RuntimeError("not written yet")
+
+    found = failed(check_element(Broken))
+    assert "raises RuntimeError: not written yet at test_broken.py:" in found["rank"].detail
+    assert "volume" not in found
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({}, "states no shape"),
+        ({"shape": "hexahedron", "nodes": None}, "states no shape"),
+        ({"shape": Hexahedron8, "rule": 8}, "states no rule"),
+        ({"shape": SHAPES["Triangle3"], "rule": tetrahedron(2)}, "which is not a solid"),
+    ],
+)
+def test_an_element_without_its_parts_is_one_finding(changes, text):
+    kind = type("Broken", (KinematicLinear,), {})
+    for name, value in changes.items():
+        setattr(kind, name, value)
+    (finding,) = check_element(kind)
+    assert finding.check == "definition"
+    assert not finding.passed
+    assert text in finding.detail
+
+
+def test_a_shape_that_no_box_is_made_of_skips_the_patches_honestly():
+    third = np.array([[1 / 3, 0.0, 0.0]])
+
+    class Tetrahedron4Plus(Shape):
+        cell, corners, degree = "tetrahedron", 4, 1
+        nodes, faces, edges = np.vstack([Tetrahedron4.nodes, third]), Tetrahedron4.faces, Tetrahedron4.edges
+        N, dN = Tetrahedron4.N, Tetrahedron4.dN
+
+    class Odd(KinematicLinear):
+        shape, rule = Tetrahedron4Plus, tetrahedron(2)
+
+    findings = {finding.check: finding for finding in check_element(Odd)}
+    for check in ("linear patch", "bending", "shared faces"):
+        assert findings[check].skipped
+        assert not findings[check].passed
+        assert "not its corners and the middles" in findings[check].detail
+
+
+def test_assert_conforms_reports_every_failure_in_one_error():
+    def dN(xi):
+        out = Tetrahedron4.dN(xi)
+        out[..., 3, 2] = 1.25
+        return out
+
+    with pytest.raises(ConformanceError) as caught:
+        assert_conforms(with_functions(Tetrahedron4, dN=dN))
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "BrokenTetrahedron4 does not conform: 3 of 8 checks failed, 1 not run"
+    assert lines[1].startswith("  derivatives: 0.25 exceeds 1e-09: dN[3] / d t at xi = (")
+    assert lines[1].endswith("): dN gives 1.25, differences of N give 1")
+    assert len(lines) == 4
+
+
+def test_a_long_report_is_cut_and_counted():
+    class Broken(KinematicLinear3D8N):
+        def __init__(self, X, rule=None):
+            raise RuntimeError("no")
+
+    findings = check_element(Broken)
+    text = report("Broken", findings * 2)
+    assert len(failures(findings * 2)) > 20
+    assert text.endswith(f"… and {len(failures(findings * 2)) - 20} more")
+
+
+# ---- materials ---------------------------------------------------------------------------------
+
+
+with MATERIALS.temporary():
+
+    @dataclass(frozen=True)
+    class Made(LinearMaterial):
+        """A material of any C that checks nothing itself."""
+
+        factor: float = 1.0
+        density: float = 0.0
+        isotropic: ClassVar[bool] = True
+
+        def check(self):
+            pass
+
+        def elasticity(self):
+            return self.factor * Isotropic3D(E=1e9, nu=0.3).elasticity()
+
+
+def changed(**methods):
+    return type("Broken", (Made,), methods)()
+
+
+def C_with(i, j, value):
+    C = Made().elasticity()
+    C[i, j] = value
+    return C
+
+
+def test_the_material_that_is_broken_below_conforms_before():
+    assert not failures(check_material(Made()))
+
+
+@pytest.mark.parametrize(
+    ("methods", "checks"),
+    [
+        ({"elasticity": lambda self: C_with(0, 1, 1e8)}, {"symmetry", "isotropy"}),
+        ({"elasticity": lambda self: C_with(3, 3, 1e8)}, {"isotropy"}),
+        ({"elasticity": lambda self: C_with(3, 3, -1e8)}, {"positive definite", "isotropy"}),
+        ({"elasticity": lambda self: -Made().elasticity()}, {"positive definite"}),
+        ({"elasticity": lambda self: 0 * Made().elasticity()}, {"positive definite"}),
+        ({"stress": lambda self, e: np.asarray(e) @ self.C * 1.001}, {"tangent"}),
+        ({"stress": lambda self, e: np.asarray(e) @ self.C + 1e3}, {"stress at rest", "isotropy"}),
+        ({"stress": lambda self, e: self.C @ np.asarray(e)}, {"broadcasting"}),
+        ({"stress": lambda self, e: np.asarray(e) @ self.C[:, [0, 1, 2, 3, 5, 4]]}, {"tangent", "isotropy"}),
+        ({"density": property(lambda self: -1.0), "__init__": lambda self: None}, {"density"}),
+    ],
+)
+def test_broken_materials_are_found(methods, checks):
+    assert set(failed(check_material(changed(**methods)))) == checks
+
+
+def test_a_C_of_the_wrong_size_is_a_finding():
+    found = failed(check_material(changed(elasticity=lambda self: np.eye(3))))
+    assert found["symmetry"].detail == "raises C must be (6, 6) and finite; its shape is (3, 3)"

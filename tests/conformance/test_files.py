@@ -1,0 +1,178 @@
+"""Checking the file of a student: what is found in it, and what is said about a file that does not run."""
+
+import pytest
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError
+from kratos_lite.materials import MATERIALS
+from kratos_lite.shapes import SHAPES
+from kratos_lite.testing import failures, run_file
+
+WEDGE = '''
+"""A wedge of one's own."""
+from __future__ import annotations
+import numpy as np
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.quadrature import wedge
+from kratos_lite.shapes import Shape
+
+
+class MyWedge(Shape):
+    """Six nodes."""
+    cell, corners, degree = "wedge", 6, 1
+    nodes = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0, 1], [0, 1, 1]], float)
+    edges = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))
+    faces = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+
+    @staticmethod
+    def N(xi):
+        r, s, t = np.moveaxis(np.asarray(xi, float), -1, 0)
+        L = np.stack([1 - r - s, r, s], axis=-1)
+        t = t[..., None]
+        return np.concatenate([L * (1 - t), L * (1 + t)], axis=-1) / 2
+
+    @staticmethod
+    def dN(xi):
+        r, s, t = np.moveaxis(np.asarray(xi, float), -1, 0)
+        L = np.stack([1 - r - s, r, s], axis=-1)
+        t = t[..., None]
+        rows = []
+        for k in (-1, 1):
+            h = (1 + k * t) / 2
+            rs = np.stack([np.concatenate([-h, h, 0 * h], -1), np.concatenate([-h, 0 * h, h], -1)], -1)
+            rows.append(np.concatenate([rs, (k * L / 2)[..., None]], axis=-1))
+        return np.concatenate(rows, axis=-2)
+
+
+class MyElement(KinematicLinear):
+    """An element of it."""
+    shape = MyWedge
+    rule = wedge(degree=2)
+'''
+
+LAW = '''
+"""Transversely isotropic elasticity."""
+from __future__ import annotations
+from dataclasses import dataclass
+import numpy as np
+from kratos_lite.materials import LinearMaterial
+
+
+@dataclass(frozen=True)
+class Transverse(LinearMaterial):
+    E_p: float
+    E_z: float
+    nu_p: float
+    nu_zp: float
+    G_z: float
+    density: float = 0.0
+
+    def compliance(self):
+        S = np.diag([1/self.E_p, 1/self.E_p, 1/self.E_z, 2*(1+self.nu_p)/self.E_p, 1/self.G_z, 1/self.G_z])
+        S[0, 1] = S[1, 0] = -self.nu_p / self.E_p
+        S[:2, 2] = S[2, :2] = -self.nu_zp / self.E_z
+        return S
+'''
+
+
+@pytest.fixture
+def checked(tmp_path):
+    def run(text, name="mine.py"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return run_file(path)
+
+    return run
+
+
+def test_an_element_is_checked_with_its_shape_and_forgotten(checked):
+    before = [list(registry) for registry in (ELEMENTS, SHAPES, MATERIALS)]
+    ((name, findings),) = checked(WEDGE)
+    assert name == "MyElement"
+    assert not failures(findings)
+    assert len(findings) == 38
+    assert [list(registry) for registry in (ELEMENTS, SHAPES, MATERIALS)] == before
+
+
+def test_a_file_that_reuses_a_name_of_the_library_does_not_replace_it(checked):
+    shipped = ELEMENTS["KinematicLinear3D6N"]
+    ((name, findings),) = checked(WEDGE.replace("MyElement", "KinematicLinear3D6N"))
+    assert name == "KinematicLinear3D6N"
+    assert not failures(findings)
+    assert ELEMENTS["KinematicLinear3D6N"] is shipped
+    assert ELEMENTS["SmallDisplacementElement3D6N"] is shipped
+
+
+def test_a_wrong_sign_in_the_file_is_named(checked):
+    ((_, findings),) = checked(WEDGE.replace("(k * L / 2)", "(-k * L / 2)"))
+    assert "/ d t at xi = (" in {f.check: f for f in failures(findings)}["derivatives"].detail
+
+
+def test_an_error_in_a_function_is_named_with_the_line_of_the_file(checked):
+    text = WEDGE.replace("return np.concatenate(rows, axis=-2)", "return np.concatenate(row, axis=-2)")
+    ((_, findings),) = checked(text)
+    line = 1 + text[: text.index("(row,")].count("\n")
+    detail = {f.check: f for f in failures(findings)}["derivatives"].detail
+    assert detail == f"raises NameError: name 'row' is not defined at mine.py:{line}"
+
+
+def test_a_shape_alone_and_an_element_with_another_rule_are_checked(checked):
+    text = (
+        WEDGE[: WEDGE.index("class MyElement")]
+        + "from kratos_lite.elements import KinematicLinear3D20N\n"
+        + "from kratos_lite.quadrature import hexahedron\n"
+        + "class Reduced(KinematicLinear3D20N):\n    rule = hexahedron(3)\n"
+    )
+    found = dict(checked(text))
+    assert list(found) == ["Reduced", "MyWedge"]
+    assert {f.check for f in failures(found["Reduced"])} == {"rank", "bending"}
+    assert not failures(found["MyWedge"])
+
+
+def test_a_material_is_checked_as_the_instance_that_the_file_makes(checked):
+    ((name, findings),) = checked(LAW + "\nslate = Transverse(9e9, 5e9, 0.2, 0.15, 2e9)\n")
+    assert name == "slate (Transverse)"
+    assert not failures(findings)
+    assert [f.check for f in findings if f.skipped] == ["isotropy"]
+
+
+def test_a_material_without_an_instance_says_how_to_make_one(checked):
+    ((name, (finding,)),) = checked(LAW)
+    assert name == "Transverse"
+    assert finding.skipped
+    assert not finding.passed
+    assert "soil = Transverse(" in finding.detail
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = (1\n", r"mine\.py:1:5: not valid Python: '\(' was never closed"),
+        ("a = 1\nb = nothing\n", r"mine\.py:2: the file stops with NameError: name 'nothing' is not defined"),
+        ("import no_such_module_here\n", r"mine\.py:1: the file stops with ModuleNotFoundError"),
+        ("import sys\nsys.exit(3)\n", r"mine\.py:2: the file stops with SystemExit: 3"),
+        (
+            "def f():\n    g()\ndef g():\n    1 / 0\nf()\n",
+            r"mine\.py:4: the file stops with ZeroDivisionError",
+        ),
+        (
+            "from kratos_lite import Isotropic3D\n\nx = Isotropic3D(E=1.0, nu=0.5)\n",
+            r"mine\.py:3: the .*nu .* must be < 0.5",
+        ),
+        ("", r"mine\.py: nothing to check; a file defines a subclass of KinematicLinear, Shape or"),
+        ("from kratos_lite import KinematicLinear3D8N\n", r"mine\.py: nothing to check"),
+    ],
+)
+def test_a_file_that_does_not_run_or_has_nothing_to_check_is_one_clear_error(checked, text, message):
+    with pytest.raises(InputError, match=message):
+        checked(text)
+
+
+def test_a_file_that_is_missing_or_not_text_is_one_clear_error(tmp_path):
+    with pytest.raises(InputError, match=r"none\.py: cannot be read \(No such file"):
+        run_file(tmp_path / "none.py")
+    with pytest.raises(InputError, match="cannot be read"):
+        run_file(tmp_path)
+    (tmp_path / "bytes.py").write_bytes(b"\x00\xff\xfe")
+    with pytest.raises(InputError, match=r"bytes\.py.*not valid Python"):
+        run_file(tmp_path / "bytes.py")

@@ -1,0 +1,89 @@
+"""Everything that is registered passes the conformance kit."""
+
+import pytest
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError
+from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
+from kratos_lite.quadrature import CELLS, rule_for
+from kratos_lite.shapes import SHAPES, Hexahedron8
+from kratos_lite.testing import (
+    assert_conforms,
+    check,
+    check_element,
+    check_material,
+    check_rule,
+    check_shape,
+    failures,
+    report,
+)
+
+ORTHOTROPIC = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.45, 0.31, 0.37, 0.7e9, 0.05e9, 0.65e9, 450.0)
+EXAMPLES = {
+    "Isotropic3D": [
+        Isotropic3D(E=210e9, nu=0.3, density=7850.0),
+        Isotropic3D(E=1.0, nu=0.0),
+        Isotropic3D(E=1e-6, nu=-0.9),
+        Isotropic3D(E=1e12, nu=0.4999),
+    ],
+    "Orthotropic3D": [ORTHOTROPIC, Orthotropic3D(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)],
+}
+LINEAR = {"KinematicLinear3D4N", "KinematicLinear3D5N", "KinematicLinear3D6N", "KinematicLinear3D8N"}
+
+
+def show(name, findings):
+    assert not failures(findings), report(name, findings)
+
+
+def skipped(findings):
+    return {finding.check for finding in findings if finding.skipped}
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_each_shape_conforms(name):
+    show(name, check_shape(SHAPES[name]))
+
+
+@pytest.mark.parametrize("degree", range(10))
+@pytest.mark.parametrize("cell", list(CELLS))
+def test_each_rule_has_the_degree_that_it_claims(cell, degree):
+    rule = rule_for(cell, degree)
+    assert rule.degree >= degree
+    findings = check_rule(cell, rule)
+    assert len(findings) == 4
+    assert not skipped(findings)
+    show(repr(rule), findings)
+
+
+@pytest.mark.parametrize("name", list(ELEMENTS))
+def test_each_element_conforms(name):
+    findings = check_element(ELEMENTS[name])
+    show(name, findings)
+    assert skipped(findings) == ({"mid edges", "quadratic patch"} if name in LINEAR else set())
+
+
+def test_there_are_nine_elements_and_seventeen_shapes():
+    assert len(ELEMENTS.values()) == 9
+    assert len(SHAPES.values()) == 17
+
+
+@pytest.mark.parametrize("name", list(MATERIALS))
+def test_each_material_conforms(name):
+    for material in EXAMPLES[name]:
+        findings = check_material(material)
+        show(f"{material}", findings)
+        assert skipped(findings) == (set() if name == "Isotropic3D" else {"isotropy"})
+
+
+@pytest.mark.parametrize("subject", [ELEMENTS["KinematicLinear3D15N"], Hexahedron8, ORTHOTROPIC])
+def test_assert_conforms_takes_elements_shapes_and_materials(subject):
+    assert_conforms(subject)
+    name, findings = check(subject)
+    count = sum(not finding.skipped for finding in findings)
+    assert report(name, findings).startswith(f"{name} conforms: {count} checks passed")
+
+
+@pytest.mark.parametrize("subject", [Isotropic3D, rule_for("line", 3), "KinematicLinear3D8N", None])
+def test_assert_conforms_refuses_anything_else(subject):
+    with pytest.raises(InputError, match="an element class, a shape class or a material instance; got"):
+        assert_conforms(subject)
