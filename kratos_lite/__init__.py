@@ -24,7 +24,14 @@ if TYPE_CHECKING:
         KinematicLinear3D20N,
         KinematicLinear3D27N,
     )
-    from kratos_lite.errors import InputError, KratosLiteError, MaterialError, MeshError, ModelError, SolveError
+    from kratos_lite.errors import (
+        InputError,
+        KratosLiteError,
+        MaterialError,
+        MeshError,
+        ModelError,
+        SolveError,
+    )
     from kratos_lite.generate import annulus, box
     from kratos_lite.io.files import read, write
     from kratos_lite.loads import BodyForce, Gravity, NodalForces, PointLoad, Pressure, Traction
@@ -53,7 +60,46 @@ _HOME = {
     "kratos_lite.shapes": "Shape",
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
-__all__ = [*sorted(_MODULE_OF), "__version__"]  # noqa: PLE0604  # made of the table above
+__all__ = [
+    "ELEMENTS",
+    "MATERIALS",
+    "Block",
+    "BodyForce",
+    "Gravity",
+    "InputError",
+    "Isotropic3D",
+    "KinematicLinear",
+    "KinematicLinear3D4N",
+    "KinematicLinear3D5N",
+    "KinematicLinear3D6N",
+    "KinematicLinear3D8N",
+    "KinematicLinear3D10N",
+    "KinematicLinear3D13N",
+    "KinematicLinear3D15N",
+    "KinematicLinear3D20N",
+    "KinematicLinear3D27N",
+    "KratosLiteError",
+    "LinearMaterial",
+    "MaterialError",
+    "Mesh",
+    "MeshError",
+    "Model",
+    "ModelError",
+    "NodalForces",
+    "Orthotropic3D",
+    "Part",
+    "PointLoad",
+    "Pressure",
+    "Result",
+    "Shape",
+    "SolveError",
+    "Traction",
+    "__version__",
+    "annulus",
+    "box",
+    "read",
+    "write",
+]
 
 
 def __getattr__(name: str) -> Any:

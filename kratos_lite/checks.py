@@ -6,7 +6,6 @@ Each check either raises one clear error or returns warnings for the report.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from kratos_lite.errors import MAX_PROBLEMS, MeshError
 from kratos_lite.loads import Gravity, Load
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
 from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
@@ -42,7 +42,8 @@ def check_blocks(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> None:
         if nodes.shape != (m, k) or nodes.dtype.kind not in "iu" or np.shape(block.properties) != (m,):
             raise MeshError(
                 f"block {block.name}: nodes must be whole numbers of shape ({m}, {k}) and properties of "
-                f"shape ({m},), as there are {m} ids; got {nodes.dtype} {nodes.shape} and {np.shape(block.properties)}"
+                f"shape ({m},), as there are {m} ids; "
+                f"got {nodes.dtype} {nodes.shape} and {np.shape(block.properties)}"
             )
         bad = np.flatnonzero(((nodes < 0) | (nodes >= mesh.n_nodes)).any(axis=1))
         if len(bad):
@@ -112,10 +113,12 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
         cure = "the element has no volume; two of its nodes may coincide"
     else:
         cure = "two of its nodes look swapped or one lies too far off"
-    return f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
+    return (
+        f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
+    )
 
 
-@lru_cache(maxsize=64)
+@remembered
 def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
     """Return how many zero-energy modes beyond the six rigid ones a rule leaves to the reference cell."""
     cell = element(element.nodes, rule)
@@ -159,7 +162,9 @@ def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
         return []
     ids = mesh.node_ids
     shown = ", ".join(f"{min(ids[a], ids[b])} and {max(ids[a], ids[b])}" for a, b in pairs[:3])
-    return [f"{len(pairs)} pairs of nodes coincide ({shown}{' …' if len(pairs) > 3 else ''}); they are not joined"]
+    return [
+        f"{len(pairs)} pairs of nodes coincide ({shown}{' …' if len(pairs) > 3 else ''}); they are not joined"
+    ]
 
 
 def check_scales(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
@@ -181,7 +186,9 @@ def check_scales(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
             "KinematicLinear3D10N is least affected"
         )
     if stiff and max(stiff) > 1e10 * min(stiff):
-        warnings.append(f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits")
+        warnings.append(
+            f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
+        )
     return warnings
 
 
@@ -202,13 +209,29 @@ def _is_near_half(C: Array) -> bool:
     return bool(C[:3, :3].sum() / 9 > 50 * C[[3, 4, 5], [3, 4, 5]].mean())
 
 
-def equilibrium(points: Array, loads: Array, reactions: Array) -> tuple[float, float]:
-    """Return |sum of forces| and |sum of moments| of loads and reactions, relative to their sizes."""
+def check_rounding(
+    noise: float, loads: Array, initial: Array, reactions: Array, supports: Supports
+) -> list[str]:
+    """Warn where rounding of the internal forces, `noise` in N per node, is not small beside the loads."""
+    size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
+    if supports.values.any() or noise <= 1e-6 * size:
+        return []
+    return [
+        f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
+        "look for nearly free parts, spurious modes or very unlike stiffnesses"
+    ]
+
+
+def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:
+    """Return |sum of forces| and |sum of moments| of loads and reactions, relative to their sizes.
+
+    Forces that are together below `noise` in N are rounding, and in balance.
+    """
     total = loads + reactions
     X = points - points.mean(axis=0)
-    size = np.abs(loads).sum() + np.abs(reactions).sum()
+    size = float(np.abs(loads).sum() + np.abs(reactions).sum())
     arm = float(np.abs(X).max(initial=0.0))
-    if size == 0:
+    if size <= noise:
         return 0.0, 0.0
     force = float(np.abs(total.sum(axis=0)).max() / size)
     moment = float(np.abs(np.cross(X, total).sum(axis=0)).max() / (size * arm)) if arm > 0 else 0.0
@@ -222,6 +245,7 @@ __all__ = [
     "check_loads",
     "check_points",
     "check_repeated_nodes",
+    "check_rounding",
     "check_rules",
     "check_scales",
     "equilibrium",

@@ -169,7 +169,9 @@ class Mesh:
         if ends:
             raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
         have = ", ".join(self.parts) or "none"
-        raise MeshError(f"there is no part {name!r}; the parts are {have} and the sides x- … z+.{nearest(name, self.parts)}")
+        raise MeshError(
+            f"there is no part {name!r}; the parts are {have} and the sides x- … z+.{nearest(name, self.parts)}"
+        )
 
     def _side(self, axis: int, end: int) -> Ints:
         x = self.points[:, axis]
@@ -216,7 +218,9 @@ class Mesh:
             ids = np.concatenate([NO_ROWS, *(block.properties for block in self.blocks)])
             rows = np.flatnonzero(ids == where)
             if not len(rows):
-                raise MeshError(f"no element has property {where}; the properties are {np.unique(ids).tolist()}")
+                raise MeshError(
+                    f"no element has property {where}; the properties are {np.unique(ids).tolist()}"
+                )
             return rows
         if isinstance(where, str):
             part = self.part(where)
@@ -228,13 +232,17 @@ class Mesh:
         if rows.dtype.kind not in "iu" or rows.ndim != 1:
             raise MeshError("elements are chosen by part name, property id or an array of integer rows")
         if len(rows) and (rows.min() < 0 or rows.max() >= self.n_elements):
-            raise MeshError(f"element rows must lie in 0 … {self.n_elements - 1}; got {rows.min()} … {rows.max()}")
+            raise MeshError(
+                f"element rows must lie in 0 … {self.n_elements - 1}; got {rows.min()} … {rows.max()}"
+            )
         return rows.astype(np.int64)
 
     def _elements_among(self, nodes: Ints) -> Ints:
         inside = np.zeros(self.n_nodes, dtype=bool)
         inside[nodes] = True
-        return np.flatnonzero(np.concatenate([np.zeros(0, bool), *(inside[b.nodes].all(axis=1) for b in self.blocks)]))
+        return np.flatnonzero(
+            np.concatenate([np.zeros(0, bool), *(inside[b.nodes].all(axis=1) for b in self.blocks)])
+        )
 
     # ---- faces -----------------------------------------------------------------------------
 
@@ -255,12 +263,12 @@ class Mesh:
         corners: list[NDArray[np.int32]] = []
         for size, groups in by_size.items():
             c = len(FACE_SHAPES[size].nodes) if size < 6 else FACE_SHAPES[size].corners
-            corners += [np.sort(np.pad(f[:, :c], ((0, 0), (0, 4 - c)), constant_values=-1)) for f, _ in groups]
+            corners += [
+                np.sort(np.pad(f[:, :c], ((0, 0), (0, 4 - c)), constant_values=-1)) for f, _ in groups
+            ]
         if not corners:
             return []
-        _, inverse, counts = np.unique(
-            np.vstack(corners), axis=0, return_inverse=True, return_counts=True
-        )
+        _, inverse, counts = np.unique(np.vstack(corners), axis=0, return_inverse=True, return_counts=True)
         single = counts[inverse.ravel()] == 1
         faces, first = [], 0
         for size, groups in by_size.items():
@@ -297,6 +305,8 @@ def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
         if len(keep):
             lines = None if block.lines is None else block.lines[keep]
             chosen.append(
-                Block(block.name, block.nodes[keep], block.ids[keep], block.properties[keep], block.shape, lines)
+                Block(
+                    block.name, block.nodes[keep], block.ids[keep], block.properties[keep], block.shape, lines
+                )
             )
     return chosen

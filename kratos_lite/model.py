@@ -274,7 +274,9 @@ class Model:
 
     def __repr__(self) -> str:
         mesh = self.mesh
-        kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block)) or "no elements"
+        kinds = (
+            ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block)) or "no elements"
+        )
         return (
             f"Model({mesh.source or 'mesh'}: {mesh.n_nodes} nodes; {kinds}; {len(mesh.parts)} parts; "
             f"{int(self.supports.fixed.sum())} fixed components; {len(self.supports.links)} constraints; "

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
 from contextlib import contextmanager
-from typing import Generic, TypeVar
+from typing import Generic, ParamSpec, TypeVar, cast
 
 from kratos_lite.errors import InputError, nearest
 
 T = TypeVar("T")
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def remembered(function: Callable[P, R]) -> Callable[P, R]:
+    """Keep the results of a function of classes, rules and numbers, so that each is made once."""
+    return cast("Callable[P, R]", lru_cache(maxsize=256)(function))
 
 
 class Registry(Generic[T]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from kratos_lite import voigt
 from kratos_lite.batches import Batch
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
 from kratos_lite.shapes import Hexahedron8, Pyramid5, Shape, Tetrahedron4, Wedge6
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
 
 
-@lru_cache(maxsize=64)
+@remembered
 def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
     """Return the matrix (n, g) from values at Gauss points to values at nodes.
 
@@ -235,7 +235,10 @@ class Result:
             ("unknowns", f"{report.unknowns}"),
             ("total load", f"{vector(report.total_load)} N"),
             ("total reaction", f"{vector(report.total_reaction)} N"),
-            ("largest displacement", f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m"),
+            (
+                "largest displacement",
+                f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m",
+            ),
             ("strain energy", f"{energy:.6e} J"),
             ("largest von Mises", f"{mises:.6e} Pa in element {mesh.element_ids[row]}"),
             ("solver", f"{report.solver}: {report.reason}"),

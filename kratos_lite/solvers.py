@@ -84,7 +84,7 @@ def backward_error(A: Any, x: Array, b: Array) -> float:
 def solve_dense(A: Array, b: Array) -> Array:
     """Solve with a full matrix."""
     try:
-        return np.linalg.solve(A, b)
+        return np.asarray(np.linalg.solve(A, b), dtype=float)
     except np.linalg.LinAlgError:
         raise SolveError("the stiffness matrix is singular: part of the body can still move") from None
 
@@ -95,11 +95,17 @@ def solve_direct(A: csr_array, b: Array, symmetric: bool = True) -> Array:
 
     options: dict[str, Any] = {"permc_spec": "COLAMD"}
     if symmetric:
-        options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+        options = {
+            "permc_spec": "MMD_AT_PLUS_A",
+            "diag_pivot_thresh": 0.0,
+            "options": {"SymmetricMode": True},
+        }
     try:
         factors = splu(A.tocsc(), **options)
     except RuntimeError as error:
-        raise SolveError(f"the stiffness matrix is singular ({error}): part of the body can still move") from None
+        raise SolveError(
+            f"the stiffness matrix is singular ({error}): part of the body can still move"
+        ) from None
     except MemoryError:
         raise SolveError(
             f"not enough memory to factorise {A.shape[0]} unknowns; use solver='amg' or a coarser mesh"

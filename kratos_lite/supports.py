@@ -78,7 +78,7 @@ class Supports:
                 f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
                 f"or have shape ({len(rows)}, {len(numbers)}); got shape {given.shape}"
             ) from None
-        at = np.ix_(rows, numbers)
+        at = np.ix_(rows, np.array(numbers))
         clash = self.fixed[at] & (self.values[at] != given)
         if clash.any() and not override:
             i, j = np.argwhere(clash)[0]

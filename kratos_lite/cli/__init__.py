@@ -59,7 +59,9 @@ def _add(commands: object, name: str, text: str, example: str) -> argparse.Argum
         epilog=f"examples:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("--lenient", action="store_true", help="accept .mdpa rows that are broken over lines")
+    command.add_argument(
+        "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
+    )
     command.add_argument("--debug", action="store_true", help="show the traceback of an error")
     return command
 
@@ -82,7 +84,11 @@ def _add_solve(commands: object) -> None:
         **repeat,  # type: ignore[arg-type]
     )
     for option, meta, text in (
-        ("--fix", "PART:xyz[=VALUE]", "prescribe displacements in m along the axes named, 0 if no value is given"),
+        (
+            "--fix",
+            "PART:xyz[=VALUE]",
+            "prescribe displacements in m along the axes named, 0 if no value is given",
+        ),
         ("--gravity", "X,Y,Z", "acceleration in m/s²"),
         ("--traction", "PART:X,Y,Z", "force per area in Pa"),
         ("--pressure", "PART:P", "pressure in Pa, positive into the body"),

@@ -29,7 +29,9 @@ class TerminalProgress:
         now = perf_counter()
         if self.wanted and now - self.start > 2 and now - self.last > 0.2:
             self.last, self.shown = now, True
-            print(f"\r{phase:<10} {share:5.0%}  {now - self.start:6.1f} s", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r{phase:<10} {share:5.0%}  {now - self.start:6.1f} s", end="", file=sys.stderr, flush=True
+            )
 
     def close(self) -> None:
         """Wipe the line."""

@@ -10,7 +10,7 @@ Source: KratosWiki, *Kinematic Linear Element*; Zienkiewicz & Taylor, vol. 1, ch
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite import voigt
 from kratos_lite.errors import MeshError
 from kratos_lite.quadrature import Rule
-from kratos_lite.registry import Registry
+from kratos_lite.registry import Registry, remembered
 from kratos_lite.shapes import Shape
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ SAME_ELEMENT = (
 """Prefixes of element names in files that are solved as KinematicLinear."""
 
 
-@lru_cache(maxsize=256)
+@remembered
 def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
     N = np.array([shape.N(xi) for xi in rule.points])
@@ -47,7 +47,7 @@ def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     return N, dN
 
 
-@lru_cache(maxsize=256)
+@remembered
 def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
     """Return whether the row sums of the mass matrix of the reference cell are all positive."""
     sums = rule.weights @ tabulate(shape, rule)[0]
@@ -205,7 +205,7 @@ class KinematicLinear:
     def stress(self, C: ArrayLike, u: ArrayLike) -> Array:
         """Return σ = C ε at the Gauss points, (..., g, 6) in Pa; C (6, 6) or (..., 6, 6) in Pa."""
         C = np.asarray(C, dtype=float)
-        return self.strain(u) @ np.swapaxes(C, -1, -2)
+        return np.asarray(self.strain(u) @ np.swapaxes(C, -1, -2))
 
     def internal_load(self, stress: ArrayLike) -> Array:
         """Return r_int = Σ B^T σ γ det J as (..., n, 3) in N, of the stress (..., g, 6) in Pa."""
@@ -221,9 +221,9 @@ class KinematicLinear:
         """
         b = np.asarray(b, dtype=float)
         if b.ndim >= 2 and b.shape[-2:] == self.nodes.shape:
-            return self.scalar_mass() @ b
+            return np.asarray(self.scalar_mass() @ b)
         share = self.dV @ tabulate(self.shape, self.rule)[0]
-        return share[..., :, None] * b[..., None, :]
+        return np.asarray(share[..., :, None] * b[..., None, :])
 
     def stiffness(self, C: ArrayLike) -> Array:
         """Return K = Σ B^T C B γ det J as (..., 3n, 3n) in N/m; C (6, 6) or (..., 6, 6) in Pa."""
@@ -256,7 +256,9 @@ class KinematicLinear:
             B[..., row, j, :] = D[..., i, :]
         B = B.reshape(*B.shape[:-2], 3 * n)
         CB = (C[..., None, :, :] if C.ndim > 2 else C) @ B * dV[..., None, None]
-        K = np.swapaxes(B.reshape(*B.shape[:-3], 6 * g, 3 * n), -1, -2) @ CB.reshape(*B.shape[:-3], 6 * g, 3 * n)
+        K = np.swapaxes(B.reshape(*B.shape[:-3], 6 * g, 3 * n), -1, -2) @ CB.reshape(
+            *B.shape[:-3], 6 * g, 3 * n
+        )
         return np.asarray(K.reshape(*K.shape[:-2], 3, n, 3, n))
 
     # ---- mass ----------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
         measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
     if t.ndim >= 2 and t.shape[-2:] == (len(shape.nodes), 3):
         return np.asarray((N.T * measure[..., None, :]) @ (N @ t))
-    return (measure @ N)[..., :, None] * t[..., None, :]
+    return np.asarray((measure @ N)[..., :, None] * t[..., None, :])
 
 
 def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:

@@ -197,6 +197,10 @@ class _Reading:
     def document(self) -> Document:
         """Return the mesh with its parts, empty properties and notes."""
         elements, conditions = self._blocks((3,)), self._blocks((2, 1, 0))
+        for block in elements if self.path.suffix.lower() == ".msh" else []:
+            if len(np.unique(np.sort(block.nodes, axis=1), axis=0)) < len(block):
+                # Gmsh 2 files repeat an element for every group it is in: it would be stiff twice.
+                raise InputError(f"{self.path}: {block.name} listed twice; save it from Gmsh as version 4.1")
         used = sorted({int(i) for block in elements for i in np.unique(block.properties)} or {1})
         for block in conditions:
             block.properties[:] = used[0]

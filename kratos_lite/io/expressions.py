@@ -116,6 +116,8 @@ class _Parser:
         value = self.sum(depth)
         if not self.take("if"):
             return value
+        if depth and not self.python:
+            raise ValueError(f"expression {self.text!r}: Kratos takes one 'if' at the outermost level only")
         left = self.sum(depth)
         sign = self.take(*_COMPARE)
         if not sign:

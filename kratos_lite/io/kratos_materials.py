@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import KratosLiteError, ModelError
+from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.io.case import Case
 from kratos_lite.io.document import Document, Properties
 from kratos_lite.io.kratos import ELASTIC, material_from
@@ -42,8 +42,7 @@ def materials_of(
         number = entry.integer("properties_id")
         _assign(entry, case, document, number)
         found[number] = _material(entry, document.properties[number], notes)
-    _complete(found, document)
-    return found
+    return _used(found, document)
 
 
 def _assign(entry: Settings, case: Case, document: Document, number: int) -> None:
@@ -106,19 +105,26 @@ def _number(variables: Settings, key: str) -> Any:
     return value
 
 
-def _complete(found: dict[int, LinearMaterial], document: Document) -> None:
-    """Take materials that only the mesh file has; name the elements that have none at all."""
-    mesh = document.mesh
+def _used(found: dict[int, LinearMaterial], document: Document) -> dict[int, LinearMaterial]:
+    """Return the materials that elements have, those of the mesh file too; name elements without any."""
+    mesh, used = document.mesh, {}
     for block in mesh.blocks:
         for number in map(int, np.unique(block.properties)):
-            if number in found:
-                continue
-            given = document.properties.get(number)
-            material = material_from(given.values) if given else None
+            material = found.get(number) or _of_mesh_file(document, number)
             if material is None:
                 cells = np.flatnonzero(block.properties == number)
                 raise ModelError(
                     f"{mesh.place(block, int(cells[0]))} has no material (property {number}, {len(cells)} "
                     f"elements of this kind); name its part in the materials file"
                 )
-            found[number] = material
+            used[number] = material
+    return used
+
+
+def _of_mesh_file(document: Document, number: int) -> LinearMaterial | None:
+    given = document.properties.get(number)
+    try:
+        return material_from(given.values) if given else None
+    except KratosLiteError as error:
+        line = given.line if given else 0
+        raise InputError(f"{document.mesh.source}:{line}: Properties {number}: {error}") from None

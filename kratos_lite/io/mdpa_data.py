@@ -64,7 +64,9 @@ def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None)
             if is_nodal:
                 at = _free(source, at, end)
             start = WORD.search(source.data, at, end)
-            value, at = value_at(source, start.start() if start else end, end, kind or "vector")
+            value, at = value_at(source, start.start() if start else end, end, kind)
+            if not isinstance(value, np.ndarray):
+                raise ValueError(f"{value!r} is not a vector like the first row; write [3] (x, y, z)")
             if values and value.shape != values[0].shape:
                 raise ValueError(f"has size {list(value.shape)}, but the first row {list(values[0].shape)}")
             ids.append(number)

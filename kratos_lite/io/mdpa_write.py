@@ -27,6 +27,8 @@ def write_mdpa(path: str | Path, document: Document) -> None:
 
     Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``
     and its kin are written as ``SmallDisplacementElement3D8N``, the name by which Kratos knows them.
+    A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
+    variable of each master from the word before in the header, so it reads such a constraint differently.
 
     Raises
     ------

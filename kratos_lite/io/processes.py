@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -64,12 +64,14 @@ class Action:
         x, y, z = points.T
         variables = {"x": x, "y": y, "z": z, "t": time, "X": x, "Y": y, "Z": z}
         product: Any = 1.0
-        for factor in self.factors:
-            try:
+        try:
+            for factor in self.factors:
                 product = product * (evaluate(factor, variables) if isinstance(factor, str) else factor)
-            except ValueError as error:
-                key = "value" if "value" in self.settings else "modulus"
-                raise self.settings.error(key, f"{self.component}: {error}") from None
+            if not np.isfinite(product).all():
+                raise ValueError("modulus × direction is too large for a number")
+        except ValueError as error:
+            key = "value" if "value" in self.settings else "modulus"
+            raise self.settings.error(key, f"{self.component}: {error}") from None
         return product  # type: ignore[no-any-return]
 
 
@@ -157,7 +159,7 @@ def vector_by_direction(settings: Settings, case: Case, on_conditions: bool) -> 
         raise settings.error("direction", "automatic normals are not supported; give three numbers")
     direction = [_value(settings, d, "direction") for d in _three(settings, "direction")]
     if not any(isinstance(d, str) for d in direction):
-        length = sqrt(sum(float(d) ** 2 for d in direction))
+        length = hypot(*map(float, direction))
         if length < 1e-12:
             raise settings.error("direction", "direction is zero; give a vector of any other length")
         direction = [float(d) / length for d in direction]
@@ -221,7 +223,8 @@ def run(actions: Sequence[Action], times: Sequence[float], values: Variables) ->
     for action, active in zip(actions, steps, strict=True):
         if not active or not len(action.rows):
             why = "its interval holds no step" if not active else "its part has none to act on"
-            notes.append(f"{action.settings.path}: {action.component} is never set: {why}")
+            where = action.settings.path.removesuffix(".Parameters")
+            notes.append(f"{where}: {action.component} is never set: {why}")
     _set(actions, steps, times, values)
     _hold(actions, steps, len(times) - 1, values)
     return notes

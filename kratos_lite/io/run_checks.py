@@ -86,6 +86,8 @@ def node_checks(settings: Settings, case: Case) -> Iterator[Check]:
     is_list = isinstance(value, list)
     pairs = zip(("_X", "_Y", "_Z"), value, strict=False) if is_list else [("", value)]
     rank, span = settings.integer("tolerance_rank", 3), interval_of(settings)
+    if abs(rank) > 30:
+        raise settings.error("tolerance_rank", f"tolerance_rank is a count of decimals; got {rank}")
     deformed = case.moved and not settings.flag("reference_conf", False)
     for suffix, one in pairs:
         what = f"{name}{suffix} on {part}"
@@ -157,12 +159,12 @@ class Tabled:
 
     def __call__(self, result: Result) -> tuple[Array, Array]:
         """Return the expected values and the allowed differences."""
-        times = np.asarray(self.data.get("TIME"), dtype=float)
-        if not times.size or not times[0] - 1e-9 <= self.time <= times[-1] + 1e-9:
+        times = self.data.numbers("TIME")
+        if not times or not times[0] - 1e-9 <= self.time <= times[-1] + 1e-9:
             raise ValueError(f"the file has no values at time {self.time:g} s")
         nodes = [self.data.section(f"NODE_{i}", required=True) for i in result.mesh.node_ids[self.rows]]
-        series = [np.asarray(node.get(self.component), dtype=float) for node in nodes]
-        if any(values.shape != times.shape for values in series):
+        series = [node.numbers(self.component) for node in nodes]
+        if any(len(values) != len(times) for values in series):
             raise ValueError(f"{self.component} must be a list with one number for each TIME")
         expected = np.array([np.interp(self.time, times, values) for values in series])
         return expected, np.maximum(self.tolerances[0], self.tolerances[1] * np.abs(expected))

@@ -26,6 +26,7 @@ class Settings:
     values : the object.
     source : name of the file, for messages.
     path : keys that lead here, for messages, such as ``solver_settings``.
+    place : line and column of the key that leads here, for messages about an empty object.
 
     Examples
     --------
@@ -34,8 +35,8 @@ class Settings:
     'amg'
     """
 
-    def __init__(self, values: Object, source: str, path: str = "") -> None:
-        self.values, self.source, self.path = values, source, path
+    def __init__(self, values: Object, source: str, path: str = "", place: tuple[int, int] = (1, 1)) -> None:
+        self.values, self.source, self.path, self.place = values, source, path, place
 
     def __contains__(self, key: str) -> bool:
         return key in self.values
@@ -46,9 +47,8 @@ class Settings:
 
     def error(self, key: str, message: str) -> InputError:
         """Return an error at the place of a key, or of the object where it is missing."""
-        place = self.values.places.get(key) or next(iter(self.values.places.values()), None)
-        where = ":".join([self.source, *map(str, place or ())])
-        return InputError(f"{where}: {message}")
+        line, column = self.values.places.get(key) or next(iter(self.values.places.values()), self.place)
+        return InputError(f"{self.source}:{line}:{column}: {message}")
 
     def get(self, key: str, default: Any = REQUIRED) -> Any:
         """Return a value of any type."""
@@ -87,6 +87,12 @@ class Settings:
         fits = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
         return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of three numbers")]
 
+    def numbers(self, key: str) -> list[float]:
+        """Return a list of numbers."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(map(is_number, value))
+        return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of numbers")]
+
     def texts(self, key: str) -> list[str]:
         """Return a list of strings; an empty one where the key is missing."""
         value = self.values.get(key)
@@ -97,14 +103,17 @@ class Settings:
         """Return an inner object; an empty one where the key is missing, unless it is required."""
         default = REQUIRED if required else Object()
         value = self._typed(key, default, isinstance(self.values.get(key), Object), "an object {…}")
-        return Settings(value, self.source, self.name(key))
+        return Settings(value, self.source, self.name(key), self.values.places.get(key, self.place))
 
     def sections(self, key: str) -> list[Settings]:
         """Return a list of inner objects."""
         value = self.values.get(key)
         fits = isinstance(value, list) and all(isinstance(v, Object) for v in value)
         entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
-        return [Settings(entry, self.source, f"{self.name(key)}[{i}]") for i, entry in enumerate(entries)]
+        place = self.values.places.get(key, self.place)
+        return [
+            Settings(entry, self.source, f"{self.name(key)}[{i}]", place) for i, entry in enumerate(entries)
+        ]
 
     def unknown(self, known: Iterable[str]) -> list[str]:
         """Return the keys that are not among the known ones."""

@@ -102,9 +102,9 @@ class _Reader:
         return self.text[self.at : self.at + 1]
 
     def value(self, depth: int) -> Any:
-        if depth > MAX_DEPTH + 1:
-            raise self.error(f"nesting deeper than {MAX_DEPTH}; flatten the file")
         first = self.skip()
+        if depth > MAX_DEPTH and first in ("{", "["):
+            raise self.error(f"nesting deeper than {MAX_DEPTH}; flatten the file")
         if first == "{":
             found = Object()
             self._items("}", lambda: self._member(found, depth))

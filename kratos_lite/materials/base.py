@@ -80,7 +80,7 @@ class LinearMaterial:
     def elasticity(self) -> Array:
         """Return C (6, 6) in Pa; by default the inverse of the compliance."""
         try:
-            return np.linalg.inv(self.compliance())
+            return np.asarray(np.linalg.inv(self.compliance()), dtype=float)
         except np.linalg.LinAlgError:
             raise MaterialError(f"{type(self).__name__}: the compliance is singular") from None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import permutations
 from math import sqrt
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import gauss
 from kratos_lite.quadrature.base import Rule
+
+Array = NDArray[np.float64]
 
 __all__ = [
     "CELLS",
@@ -35,7 +37,7 @@ def _points_for(degree: int) -> int:
     return degree // 2 + 1
 
 
-def _orbits(d: int, orbits: list[tuple[float, tuple[float, ...]]]) -> tuple[NDArray[np.float64], ...]:
+def _orbits(d: int, orbits: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[Array, Array]:
     """Return all permutations of barycentric points with their weights (share of the volume)."""
     points, weights = [], []
     for weight, barycentric in orbits:
@@ -84,14 +86,14 @@ def triangle(degree: int) -> Rule:
     if degree <= 2:
         return Rule(*_orbits(2, [(1 / 3, (2 / 3, 1 / 6, 1 / 6))]), 2, "Strang-Fix 3")
     if degree <= 4:
-        orbits = []
+        pairs: list[tuple[float, tuple[float, ...]]] = []
         for s in (1, -1):
             a = (8 - sqrt(10) + s * sqrt(38 - 44 * sqrt(2 / 5))) / 18
             w = (620 + s * sqrt(213125 - 53320 * sqrt(10))) / 3720
-            orbits.append((w, (1 - 2 * a, a, a)))
-        return Rule(*_orbits(2, orbits), 4, "Dunavant 6")
+            pairs.append((w, (1 - 2 * a, a, a)))
+        return Rule(*_orbits(2, pairs), 4, "Dunavant 6")
     if degree <= 5:
-        orbits = [(9 / 40, (1 / 3,) * 3)]
+        orbits: list[tuple[float, tuple[float, ...]]] = [(9 / 40, (1 / 3,) * 3)]
         for s in (1, -1):
             a = (6 + s * sqrt(15)) / 21
             orbits.append(((155 + s * sqrt(15)) / 1200, (1 - 2 * a, a, a)))
@@ -114,7 +116,7 @@ def tetrahedron(degree: int) -> Rule:
         return Rule(*_orbits(3, [(1 / 4, (1 - 3 * a, a, a, a))]), 2, "Stroud T3:2-1")
     if degree in (4, 5):
         c = (10 - 2 * sqrt(15)) / 40
-        orbits = [(16 / 135, (1 / 4,) * 4), (10 / 189, (c, c, 1 / 2 - c, 1 / 2 - c))]
+        orbits: list[tuple[float, tuple[float, ...]]] = [(16 / 135, (1 / 4,) * 4), (10 / 189, (c, c, 1 / 2 - c, 1 / 2 - c))]
         for s in (1, -1):
             a = (7 - s * sqrt(15)) / 34
             orbits.append(((2665 + s * 14 * sqrt(15)) / 37800, (1 - 3 * a, a, a, a)))

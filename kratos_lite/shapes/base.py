@@ -73,9 +73,7 @@ def coordinates(xi: ArrayLike) -> Array:
     return np.moveaxis(np.asarray(xi, dtype=float), -1, 0)
 
 
-def mid_edges(
-    corners: ArrayLike, edges: tuple[tuple[int, int], ...]
-) -> Array:
+def mid_edges(corners: ArrayLike, edges: tuple[tuple[int, int], ...]) -> Array:
     """Return the corners (n, d) followed by the middles of `edges`."""
     X = np.asarray(corners, dtype=float)
     return np.vstack([X, X[np.array(edges)].mean(axis=1)])

@@ -102,7 +102,7 @@ def inverse_map(
 
 def _scale(size: Array, p: Array) -> Array:
     """Return the size of a cell, or of its distance from the origin where that is larger."""
-    return np.maximum(size, np.abs(p).max(axis=1))
+    return np.asarray(np.maximum(size, np.abs(p).max(axis=1)))
 
 
 def _solve(J: Array, r: Array) -> Array:

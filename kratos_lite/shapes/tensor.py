@@ -13,7 +13,7 @@ from kratos_lite.shapes.base import Array
 
 
 def _product(f: Array) -> Array:
-    return f.prod(axis=-1)
+    return np.asarray(f.prod(axis=-1))
 
 
 def _gradient(f: Array, df: Array) -> Array:
@@ -41,12 +41,12 @@ def _edge_factors(xi: ArrayLike, p: Array) -> tuple[Array, Array]:
 
 def linear_N(xi: ArrayLike, p: Array) -> Array:
     """Return N_a = prod_i (1 + xi_i p_ai) / 2^d."""
-    return _product(_linear_factors(xi, p)[0]) / 2 ** p.shape[1]
+    return np.asarray(_product(_linear_factors(xi, p)[0]) / 2 ** p.shape[1])
 
 
 def linear_dN(xi: ArrayLike, p: Array) -> Array:
     """Return the derivatives of `linear_N`."""
-    return _gradient(*_linear_factors(xi, p)) / 2 ** p.shape[1]
+    return np.asarray(_gradient(*_linear_factors(xi, p)) / 2 ** p.shape[1])
 
 
 def lagrange_N(xi: ArrayLike, p: Array) -> Array:

@@ -107,16 +107,15 @@ def _run_one(check: Callable[[S], Measured | str], subject: S) -> Finding:
 
 
 def describe(error: Exception) -> str:
-    """Return an error as one text with the line of the student's file that raised it, if one did."""
-    ours, numpys = Path(__file__).parents[1], Path(np.__file__).parent
-    theirs = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if not {ours, numpys} & set(Path(frame.filename).parents)
-    ]
-    where = f" at {Path(theirs[-1].filename).name}:{theirs[-1].lineno}" if theirs else ""
+    """Return an error as one text, with the last line of the student's own code that led to it."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = ""
+    for ours in (Path(__file__).parent, Path(__file__).parents[1]):
+        passed = {ours, Path(np.__file__).parent}
+        theirs = [frame for frame in frames if not passed & set(Path(frame.filename).parents)]
+        place = f" at {Path(theirs[-1].filename).name}:{theirs[-1].lineno}" if theirs else place
     kind = "" if isinstance(error, ConformanceError) else f"{type(error).__name__}: "
-    return f"{kind}{error}{where}"
+    return f"{kind}{error}{place}"
 
 
 def difference(found: ArrayLike, expected: ArrayLike) -> float:

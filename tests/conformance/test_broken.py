@@ -461,6 +461,52 @@ def test_an_absolute_tolerance_is_found_by_scaling():
     assert "length scaling" in failed(check_element(Broken))
 
 
+def test_a_node_that_is_treated_unlike_the_others_is_found():
+    class Broken(ChangedStiffness):
+        def change(self, K):
+            K = K.copy()
+            K[..., 0, :, :] *= 1 + 1e-9
+            K[..., 0] *= 1 + 1e-9
+            return K
+
+    found = failed(check_element(Broken))
+    assert found["numbering invariance"].detail.startswith("K with its nodes listed as (")
+    assert not {"symmetry", "rank", "length scaling"} & set(found)
+
+
+def test_digits_lost_far_from_the_origin_are_found():
+    class Broken(KinematicLinear3D8N):
+        def __init__(self, X, rule=None):
+            X = np.asarray(X, dtype=float)
+            super().__init__(X + 1e-14 * np.abs(X).max() * np.sin(np.arange(24.0)).reshape(8, 3), rule)
+
+    found = failed(check_element(Broken))
+    assert 20 < found["offset"].measured < 2000
+    assert not {"rank", "mass total"} & set(found)
+
+
+def test_a_face_left_out_is_missed_on_the_boundary_of_a_patch():
+    class Broken(KinematicLinear):
+        shape, rule = derived(Hexahedron8, faces=Hexahedron8.faces[:5]), hexahedron(3)
+
+    found = failed(check_element(Broken))
+    assert set(found) == {"faces", "shared faces"}
+    assert found["shared faces"].detail.startswith("the boundary of a 2x1x1 box has the area 8 (10)")
+
+
+def test_an_error_inside_the_library_shows_the_line_that_led_to_it():
+    class Broken(KinematicLinear3D8N):
+        def volume(self):
+            return KinematicLinear3D8N(self.X[:7]).volume()
+
+    detail = failed(check_element(Broken))["volume"].detail
+    line = Broken.volume.__code__.co_firstlineno + 1
+    assert detail.startswith(
+        "raises MeshError: KinematicLinear3D8N needs X of shape (..., 8, 3); got (7, 3) at"
+    )
+    assert detail.endswith(f"test_broken.py:{line}")
+
+
 def test_an_unsymmetric_stiffness_is_found():
     class Broken(ChangedStiffness):
         def change(self, K):

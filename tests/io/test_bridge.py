@@ -269,3 +269,19 @@ def test_warnings_of_meshio_become_notes(tmp_path, monkeypatch):
 
     monkeypatch.setattr(meshio, "read", read)
     assert [str(note) for note in read_meshio(tmp_path / "a.vtk").notes] == ["Warning: odd"]
+
+
+def test_elements_listed_twice_in_a_gmsh_file_are_refused(tmp_path):
+    twice = [("tetra", [[0, 1, 2, 3], [0, 1, 2, 3]])]
+    meshio.Mesh(np.eye(4, 3), twice).write(tmp_path / "a.msh", file_format="gmsh22")
+    with pytest.raises(
+        InputError, match=r"KinematicLinear3D4N listed twice; save it from Gmsh as version 4\.1"
+    ):
+        read_meshio(tmp_path / "a.msh")
+
+
+@pytest.mark.parametrize("ending", ["gz", "GZ"])
+def test_no_gzipped_vtu_is_written(tmp_path, ending):
+    with pytest.raises(InputError, match=r"write it as \.vtu"):
+        write_vtu(tmp_path / f"a.vtu.{ending}", one("Tetrahedron4"))
+    assert list(tmp_path.iterdir()) == []

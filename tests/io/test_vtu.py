@@ -157,7 +157,9 @@ def test_meshio_reads_the_same_file(tmp_path):
     np.testing.assert_array_equal(np.concatenate(found.cell_data["E"]), [0, 1, 3, 4, 5, 6, 7])
     for cells, name in zip(found.cells, names, strict=True):
         block = next(b for b in mesh.blocks if b.name == name)
-        np.testing.assert_array_equal(cells.data, block.nodes[:, list(SHAPES[name].to_vtk)])
+        # meshio follows the text of VTK on its linear wedge, not VTK's formulas: it exchanges two corners
+        order = [0, 2, 1, 3, 5, 4] if name == "Wedge6" else list(SHAPES[name].to_vtk)
+        np.testing.assert_array_equal(cells.data, block.nodes[:, order])
 
 
 def test_a_mesh_without_elements_is_written(tmp_path):

@@ -1,0 +1,160 @@
+"""Wrong arguments of the public functions end in an error of the library with a clear text."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+TOP = (7, "x")
+
+
+def model():
+    one = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+    one.fix("z-")
+    one.add(kl.Gravity((0, 0, -9.81)))
+    return one
+
+
+def solved_with(load):
+    one = model()
+    one.add(load)
+    return one.solve()
+
+
+WRONG = {
+    "mesh": (lambda: kl.Model(None), "a Mesh is needed"),
+    "material number": (lambda: kl.Model(kl.box(), 5), "a material such as Isotropic3D is needed; got int"),
+    "material word": (
+        lambda: kl.Model(kl.box(), "steel"),
+        "a material such as Isotropic3D is needed; got str",
+    ),
+    "material part": (lambda: kl.Model(kl.box(), {"zz": STEEL}), "there is no part 'zz'"),
+    "material property": (lambda: kl.Model(kl.box(), {99: STEEL}), "no element has property 99"),
+    "no material": (lambda: kl.Model(kl.box()).solve(), "has no material"),
+    "assign rows": (lambda: model().assign(STEEL, [99]), "element rows must lie in 0 … 7"),
+    "axes number": (lambda: model().fix("x-", 5), "axes must be some of x, y, z"),
+    "axes letter": (lambda: model().fix("x-", "X"), "axes must be some of x, y, z"),
+    "axes twice": (lambda: model().fix("x-", "xx"), "each once"),
+    "value word": (lambda: model().fix("x-", "x", "abc"), "must be made of real numbers; got 'abc'"),
+    "value digits": (lambda: model().fix("x-", "x", "1.5"), "must be made of real numbers; got '1.5'"),
+    "value none": (lambda: model().fix("x-", "x", None), "a prescribed displacement must be"),
+    "value complex": (lambda: model().fix("x-", "x", 1j), "real numbers; got 1j"),
+    "value nan": (lambda: model().fix("x-", "x", np.nan), "must be finite; got nan"),
+    "value shape": (lambda: model().fix("x+", "xz", [1, 2, 3]), "one per axis of 'xz'"),
+    "where float": (lambda: model().fix(1.5), "nodes are chosen by part name"),
+    "where row": (lambda: model().fix([99]), "node rows must lie in 0 … 26"),
+    "where negative": (lambda: model().fix([-1]), "node rows must lie in 0 … 26"),
+    "where mask": (lambda: model().fix(np.ones(5, bool)), r"a node mask must have shape \(27,\)"),
+    "where nothing": (lambda: model().fix(np.zeros(27, bool)), "cannot fix xyz: no node is chosen"),
+    "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),
+    "link negative": (lambda: model().link((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),
+    "link word": (lambda: model().link("a", {TOP: 1.0}), "a degree of freedom is"),
+    "link float": (lambda: model().link((1.5, "x"), {TOP: 1.0}), "a degree of freedom is"),
+    "link axis": (lambda: model().link((1, "xy"), {TOP: 1.0}), "a degree of freedom is"),
+    "link axis number": (lambda: model().link((1, 0), {TOP: 1.0}), "a degree of freedom is"),
+    "link master": (lambda: model().link((1, "x"), {7: 1.0}), "a degree of freedom is"),
+    "link masters": (lambda: model().link((1, "x"), [TOP]), "masters must map"),
+    "link weight": (
+        lambda: model().link((1, "x"), {TOP: "a"}),
+        "weights of a constraint must be made of real",
+    ),
+    "link weight none": (lambda: model().link((1, "x"), {TOP: None}), "weights of a constraint must be"),
+    "link weight nan": (
+        lambda: model().link((1, "x"), {TOP: np.nan}),
+        "weights of a constraint must be finite",
+    ),
+    "link constant": (
+        lambda: model().link((1, "x"), {TOP: 1.0}, np.inf),
+        "constant of a constraint must be finite",
+    ),
+    "load number": (lambda: model().add(5), "a load such as Gravity or Traction is needed; got int"),
+    "load class": (lambda: model().add(kl.Gravity), "a load such as Gravity or Traction is needed"),
+    "gravity word": (lambda: kl.Gravity("down"), "gravity must be made of real numbers; got 'down'"),
+    "gravity number": (lambda: kl.Gravity(-9.81), r"gravity must be \(3,\) or \(n, 3\)"),
+    "gravity plane": (lambda: kl.Gravity((0, 1)), r"got shape \(2,\)"),
+    "gravity ragged": (lambda: kl.Gravity([[1, 2], [3]]), "gravity must be made of real numbers"),
+    "gravity rows": (lambda: solved_with(kl.Gravity(np.ones((5, 3)))), r"Gravity needs shape \(27, 3\)"),
+    "force rows": (lambda: solved_with(kl.BodyForce(np.ones((99, 3)))), r"BodyForce needs shape \(27, 3\)"),
+    "force part": (lambda: solved_with(kl.BodyForce((0, 0, 1), "nope")), "there is no part 'nope'"),
+    "force property": (lambda: solved_with(kl.BodyForce((0, 0, 1), 7)), "no element has property 7"),
+    "traction rows": (lambda: kl.Traction("z+", np.ones((4, 3))), r"a traction must be \(3,\) in Pa"),
+    "traction edge": (lambda: solved_with(kl.Traction([26, 25], (0, 0, 1))), "a traction finds no face"),
+    "pressure word": (lambda: kl.Pressure("z+", "a"), "a pressure must be made of real numbers"),
+    "pressure none": (lambda: kl.Pressure("z+", None), "a pressure must be"),
+    "pressure list": (lambda: kl.Pressure("z+", [1, 2]), "a pressure must be one number in Pa"),
+    "pressure nan": (lambda: kl.Pressure("z+", np.nan), "a pressure must be finite"),
+    "pressure normal": (lambda: kl.Pressure("z+", 1.0, "inward"), "normal must be 'outward' or 'nodes'"),
+    "point rows": (lambda: kl.PointLoad([1, 2], np.ones((2, 3))), r"a point load must be \(3,\) in N"),
+    "point nowhere": (lambda: solved_with(kl.PointLoad([], (0, 0, 1))), "nodes are chosen|finds no node"),
+    "nodal shape": (
+        lambda: solved_with(kl.NodalForces(np.ones((2, 3)))),
+        r"nodal forces need shape \(27, 3\)",
+    ),
+    "nodal vector": (lambda: kl.NodalForces(np.ones(3)), r"nodal forces must be \(n, 3\)"),
+    "activate word": (lambda: model().activate("a"), "the initial displacement must be made of real numbers"),
+    "activate shape": (
+        lambda: model().activate(np.zeros(3)),
+        r"the initial displacement needs shape \(27, 3\)",
+    ),
+    "prestress word": (lambda: model().add_prestress("a"), "a prestress must be made of real numbers"),
+    "prestress five": (lambda: model().add_prestress(np.zeros(5)), "a prestress has six components"),
+    "prestress rows": (
+        lambda: model().add_prestress(np.zeros((3, 6))),
+        r"or shape \(8, 6\); got shape \(3, 6\)",
+    ),
+    "rule word": (lambda: model().use_rule("x"), "a Rule or an INTEGRATION_ORDER 1 … 5 is needed; got 'x'"),
+    "rule float": (lambda: model().use_rule(2.0), "a Rule or an INTEGRATION_ORDER 1 … 5 is needed; got 2.0"),
+    "solver": (lambda: model().solve("cholesky"), "solver must be one of auto, dense, direct, amg"),
+    "solver none": (lambda: model().solve(None), "solver must be one of auto, dense, direct, amg"),
+    "tolerance": (lambda: model().solve(tolerance=0), "tolerance must be a number between 0 and 1; got 0"),
+    "tolerance nan": (lambda: model().solve(tolerance=np.nan), "tolerance must be a number between 0 and 1"),
+    "tolerance word": (lambda: model().solve(tolerance="a"), "tolerance must be a number between 0 and 1"),
+    "progress": (lambda: model().solve(progress=5), "progress must be a function"),
+    "dense": (lambda: kl.Model(kl.box(cells=(15, 15, 15)), STEEL).solve("dense"), "can still move"),
+    "place": (lambda: model().solve().stress("nodes"), "at must be one of gauss, element, node; got 'nodes'"),
+    "place none": (lambda: model().solve().strain(None), "at must be one of gauss, element, node"),
+    "part of result": (lambda: model().solve().displacement("nope"), "there is no part 'nope'"),
+    "box size": (lambda: kl.box((-1, 1, 1)), "size must be three lengths > 0 m"),
+    "box size word": (lambda: kl.box("abc"), "size must be made of real numbers; got 'abc'"),
+    "box size number": (lambda: kl.box(2.0), "size must be three lengths > 0 m"),
+    "box origin": (lambda: kl.box(origin=(np.nan, 0, 0)), "origin must be finite"),
+    "box cells": (lambda: kl.box(cells=(0, 1, 1)), "cells must be three whole numbers ≥ 1"),
+    "box cells half": (lambda: kl.box(cells=(1.5, 1, 1)), "cells must be three whole numbers ≥ 1"),
+    "box cells one": (lambda: kl.box(cells=3), "cells must be three whole numbers ≥ 1; got 3"),
+    "box cells word": (lambda: kl.box(cells="abc"), "cells must be made of real numbers"),
+    "box cells none": (lambda: kl.box(cells=None), "cells must be"),
+    "box element": (lambda: kl.box(element="KinematicLinear3D9N"), "unknown element .* Did you mean"),
+    "box element class": (lambda: kl.box(element=kl.KinematicLinear3D8N), "element must be a name such as"),
+    "annulus": (lambda: kl.annulus(2, 1, 1), "an annulus needs 0 < inner < outer"),
+    "annulus word": (lambda: kl.annulus("a", 2, 1), "inner, outer and width must be made of real numbers"),
+    "annulus cells": (lambda: kl.annulus(1, 2, 1, (1, 2, 1)), "at least 3 cells around; got 2"),
+    "empty": (lambda: kl.Model(kl.Mesh(np.zeros((0, 3))), STEEL).solve(), "the model has no elements"),
+    "points only": (lambda: kl.Model(kl.Mesh(np.zeros((3, 3))), STEEL).solve(), "the model has no elements"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(WRONG))
+def test_wrong_arguments_are_explained(name):
+    call, text = WRONG[name]
+    with pytest.raises(kl.KratosLiteError, match=text):
+        call()
+
+
+def test_a_full_matrix_of_a_large_model_is_refused_before_it_takes_the_memory():
+    one = kl.Model(kl.box(cells=(15, 15, 15)), STEEL)
+    one.fix("z-")
+    with pytest.raises(
+        kl.InputError, match="solver='dense' is for up to 10000 degrees of freedom; got 12288"
+    ):
+        one.solve("dense")
+
+
+def test_numbers_of_every_kind_are_accepted():
+    one = kl.Model(kl.box(cells=np.array([2, 2, 2])), {np.int64(1): STEEL})
+    one.fix(np.array([0, 1, 2], dtype=np.uint8), "xyz", np.float32(0))
+    one.fix("z-", value=[0, 0, 0])
+    one.link((np.int32(26), "z"), {(np.int64(25), "z"): 1}, 0)
+    one.add(kl.Gravity([0, 0, -10]))
+    one.add(kl.Pressure(np.arange(27), np.float64(2)))
+    assert np.isfinite(one.solve(tolerance=np.float64(1e-8)).u).all()

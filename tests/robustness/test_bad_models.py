@@ -1,0 +1,291 @@
+"""Broken bodies end in one clear error or a warning; never in a plausible wrong number."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+KINDS = [4, 5, 6, 8, 10, 13, 15, 20, 27]
+
+
+def kind(n):
+    return f"KinematicLinear3D{n}N"
+
+
+def block(nodes, n=8):
+    nodes = np.asarray(nodes, dtype=np.int32)
+    m = len(nodes)
+    return kl.Block(
+        kind(n), nodes, np.arange(1, m + 1), np.ones(m, dtype=np.int64), kl.ELEMENTS[kind(n)].shape
+    )
+
+
+def model_of(mesh, *, rollers=False):
+    model = kl.Model(mesh, STEEL)
+    model.add(kl.Gravity((0, 0, -9.81)))
+    if rollers:
+        for side in ("x-", "x+", "y-", "y+", "z-"):
+            model.fix(side, side[0])
+    else:
+        model.fix("z-")
+    return model
+
+
+def changed(nodes, columns, n=2):
+    """Return a cube whose first element has some of its nodes in another order."""
+    mesh = kl.box(cells=(n, n, n), element=kind(nodes))
+    first = mesh.blocks[0].nodes[0]
+    first[list(range(len(columns)))] = first[list(columns)]
+    return mesh
+
+
+@pytest.mark.parametrize("nodes", KINDS)
+def test_two_swapped_nodes_are_named(nodes):
+    mesh = changed(nodes, (0, 2, 1))
+    with pytest.raises(
+        kl.MeshError, match=rf"element 1 \({kind(nodes)}\): det J = -\S+ at .* must be > 0; nodes "
+    ):
+        model_of(mesh).solve()
+
+
+@pytest.mark.parametrize("nodes", [4, 10])
+def test_a_mirrored_tetrahedron_is_called_inside_out(nodes):
+    mesh = kl.box(element=kind(nodes))
+    mesh.points[:, 0] *= -1
+    with pytest.raises(kl.MeshError, match=r"inside out; mesh\.reoriented\(\) mends") as caught:
+        model_of(mesh).solve()
+    assert len(str(caught.value).splitlines()) == 6
+
+
+def test_many_inverted_elements_are_listed_up_to_twenty_and_counted():
+    mesh = kl.box(cells=(3, 3, 3))
+    mesh.points[:, 0] *= -1
+    with pytest.raises(kl.MeshError, match="… and 7 more") as caught:
+        model_of(mesh).solve()
+    assert len(str(caught.value).splitlines()) == 21
+
+
+def test_slightly_folded_bricks_are_solved_with_a_warning():
+    mesh = kl.box()
+    mesh.points[mesh.nodes(lambda X: X.sum(axis=1) == 3)] = (0.32, 0.32, 0.32)
+    warnings = model_of(mesh).solve().report.warnings
+    assert any("1 elements have det J slightly < 0 at a node" in text for text in warnings)
+
+
+def test_quarter_point_nodes_are_accepted_and_noted():
+    mesh = kl.box(element=kind(20))
+    edge = mesh.nodes(lambda X: X[:, 0] == 0.5)
+    mesh.points[edge, 0] = 0.25
+    warnings = model_of(mesh).solve().report.warnings
+    assert "1 elements have det J = 0 at a corner node (singular corner)" in warnings
+
+
+@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
+def test_a_body_without_supports_names_all_six_motions(solver):
+    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+    model.add(kl.Gravity((0, 0, -9.81)))
+    text = r"the body \(27 nodes\) can still move: translation x, y, z; rotation about x, y, z"
+    with pytest.raises(kl.ModelError, match=text):
+        model.solve(solver)
+
+
+def test_rollers_at_the_bottom_alone_leave_three_motions():
+    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+    model.fix("z-", "z")
+    with pytest.raises(kl.ModelError, match="can still move: translation x, y; rotation about z"):
+        model.solve()
+
+
+def test_a_line_of_supports_leaves_the_rotation_about_it():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix(lambda X: (X[:, 0] == 0) & (X[:, 2] == 0))
+    with pytest.raises(kl.ModelError, match=r"can still move: rotation about y\. Fix more"):
+        model.solve()
+
+
+def test_half_of_a_body_that_floats_is_named_and_coincident_nodes_are_counted():
+    low, high = kl.box(), kl.box(origin=(0, 0, 1))
+    nodes = np.vstack([low.blocks[0].nodes, high.blocks[0].nodes + 8])
+    mesh = kl.Mesh(np.vstack([low.points, high.points]), [block(nodes)])
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-")
+    with pytest.raises(
+        kl.ModelError, match=r"the part of node 9 \(8 nodes\) can still move: translation x, y, z"
+    ):
+        model.solve()
+    model.fix("z+")
+    assert any("4 pairs of nodes coincide" in text for text in model.solve().report.warnings)
+
+
+@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
+@pytest.mark.parametrize(
+    ("shift", "words"),
+    [((1, 0, 1), "rotation about y"), ((1, 1, 1), "rotation about x, y, z")],
+    ids=["edge", "corner"],
+)
+def test_bodies_that_hang_together_by_an_edge_or_a_corner_can_turn_there(solver, shift, words):
+    one = kl.box()
+    points = np.vstack([one.points, one.points + shift])
+    unique, merged = np.unique(points, axis=0, return_inverse=True)
+    nodes = np.vstack([one.blocks[0].nodes, one.blocks[0].nodes + 8])
+    model = kl.Model(kl.Mesh(unique, [block(merged.ravel()[nodes])]), STEEL)
+    model.fix("z-")
+    with pytest.raises(
+        kl.ModelError, match=rf"can still move: {words} \(it hangs on a node or an edge only\)"
+    ):
+        model.solve(solver)
+    model.fix("z+")
+    assert np.isfinite(model.solve(solver).u).all()
+
+
+def test_three_bricks_in_a_closed_ring_of_edges_and_faces_are_one_body():
+    """Bricks 1 and 3 share an edge only, but brick 2 holds both by faces."""
+    mesh = kl.box(cells=(2, 1, 2))
+    kept = kl.Mesh(mesh.points, [block(mesh.blocks[0].nodes[:3])])
+    model = kl.Model(kept, STEEL)
+    model.fix("x-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    assert np.abs(model.solve().u).max() < 1e-2
+
+
+def test_constraint_weights_of_any_size_do_not_hide_supports():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("z-")
+    top = [int(n) for n in model.mesh.nodes("z+")]
+    model.link((top[0], "x"), {(top[1], "x"): 1e9})
+    assert model.check() == []
+
+
+def test_a_needle_held_at_one_end_is_held():
+    model = kl.Model(kl.box((1e5, 1, 1)), STEEL)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1.0, 0, 0)))
+    long = model.solve().displacement("x+")[:, 0].mean() / 1e5
+    short = kl.Model(kl.box((1e2, 1, 1)), STEEL)
+    short.fix("x-")
+    short.add(kl.Traction("x+", (1.0, 0, 0)))
+    assert long == pytest.approx(short.solve().displacement("x+")[:, 0].mean() / 1e2, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("constants", "text"),
+    [
+        ({"E": 0.0}, r"E \(YOUNG_MODULUS\) 0 must be > 0 Pa"),
+        ({"E": -1.0}, r"E \(YOUNG_MODULUS\) -1 must be > 0 Pa"),
+        ({"E": np.nan}, r"E \(YOUNG_MODULUS\) must be finite; got nan"),
+        ({"E": np.inf}, r"E \(YOUNG_MODULUS\) must be finite; got inf"),
+        ({"E": 10**400}, r"E \(YOUNG_MODULUS\) must be finite"),
+        ({"E": "steel"}, r"E \(YOUNG_MODULUS\) must be a number; got 'steel'"),
+        ({"E": True}, r"E \(YOUNG_MODULUS\) must be a number; got True"),
+        ({"nu": 0.5}, r"nu \(POISSON_RATIO\) 0.5 must be < 0.5"),
+        ({"nu": 0.7}, r"nu \(POISSON_RATIO\) 0.7 must be < 0.5"),
+        ({"nu": -1.0}, r"nu \(POISSON_RATIO\) -1 must be > -1"),
+        ({"density": -1.0}, r"density \(DENSITY\) -1 must be ≥ 0"),
+    ],
+)
+def test_impossible_material_constants_are_refused(constants, text):
+    with pytest.raises(kl.MaterialError, match=text):
+        kl.Isotropic3D(**{"E": 1.0, "nu": 0.3, **constants})
+
+
+def test_impossible_orthotropic_constants_are_refused():
+    good = {"E_x": 1, "E_y": 1, "E_z": 1, "nu_xy": 0, "nu_yz": 0, "nu_xz": 0, "G_xy": 1, "G_yz": 1, "G_xz": 1}
+    with pytest.raises(kl.MaterialError, match=r"nu_xy² = 1.21 must be < E_x / E_y = 1"):
+        kl.Orthotropic3D(**{**good, "nu_xy": 1.1})
+    with pytest.raises(kl.MaterialError, match="the three Poisson ratios together are too large"):
+        kl.Orthotropic3D(**{**good, "nu_xy": 0.9, "nu_yz": 0.9, "nu_xz": 0.9})
+    with pytest.raises(kl.MaterialError, match=r"G_yz \(SHEAR_MODULUS_YZ\) 0 must be > 0 Pa"):
+        kl.Orthotropic3D(**{**good, "G_yz": 0})
+
+
+def test_nearly_incompressible_bricks_warn_that_they_lock():
+    model = model_of(kl.box())
+    model.assign(kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0))
+    assert any("KinematicLinear3D8N may lock" in text for text in model.solve().report.warnings)
+    tets = model_of(kl.box(element=kind(10)))
+    tets.assign(kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0))
+    assert tets.solve().report.warnings == []
+
+
+def test_broken_coordinates_and_node_lists_are_named():
+    mesh = kl.box()
+    mesh.points[3, 1] = np.nan
+    with pytest.raises(kl.MeshError, match=r"node 4 has coordinates \[.*nan.*\]; they must be finite"):
+        model_of(mesh).solve()
+    twice = kl.box()
+    twice.blocks[0].nodes[0, 1] = twice.blocks[0].nodes[0, 0]
+    with pytest.raises(kl.MeshError, match=r"element 1 \(KinematicLinear3D8N\) uses node 1 more than once"):
+        model_of(twice).solve()
+    for wrong in (-1, 8):
+        outside = kl.box()
+        outside.blocks[0].nodes[0, 6] = wrong
+        with pytest.raises(kl.MeshError, match=r"element 1 .* uses node rows \[.*\]; rows are 0 … 7"):
+            model_of(outside).solve()
+
+
+@pytest.mark.parametrize("spoil", ["columns", "floats", "properties"])
+def test_blocks_of_the_wrong_form_are_refused(spoil):
+    mesh = kl.box(cells=(2, 1, 1))
+    one = mesh.blocks[0]
+    if spoil == "columns":
+        one.nodes = one.nodes[:, :4]
+    elif spoil == "floats":
+        one.nodes = one.nodes.astype(float)
+    else:
+        one.properties = one.properties[:1]
+    with pytest.raises(
+        kl.MeshError, match=r"block KinematicLinear3D8N: nodes must be whole numbers of shape \(2, 8\)"
+    ):
+        model_of(mesh).solve()
+
+
+def test_elements_that_cover_each_other_are_reported():
+    mesh = kl.box()
+    double = kl.Mesh(mesh.points, [block(np.vstack([mesh.blocks[0].nodes] * 2))], parts=mesh.parts)
+    result = model_of(double).solve()
+    assert "1 elements have the same nodes as another (1 and 2): both count" in result.report.warnings
+
+
+def test_a_face_between_linear_and_quadratic_bricks_is_reported():
+    low, high = kl.box(), kl.box(element=kind(20), origin=(0, 0, 1))
+    points = np.vstack([low.points, high.points])
+    unique, merged = np.unique(points, axis=0, return_inverse=True)
+    merged = merged.ravel()
+    blocks = [block(merged[low.blocks[0].nodes]), block(merged[high.blocks[0].nodes + 8], 20)]
+    warnings = model_of(kl.Mesh(unique, blocks)).solve().report.warnings
+    assert any("share the corners of a face but not its further nodes" in text for text in warnings)
+
+
+def test_loads_that_cannot_do_anything_are_reported():
+    light = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.0))
+    light.fix("z-")
+    light.add(kl.Gravity((0, 0, -9.81)))
+    assert light.solve().report.warnings == [
+        "gravity acts on no mass: every material has density 0; give density in kg/m³"
+    ]
+    held = kl.Model(kl.box(), STEEL)
+    held.fix("z-")
+    held.add(kl.PointLoad("z-", (0, 0, 1.0)))
+    assert held.solve().report.warnings == ["all loads act on fixed components, so nothing moves"]
+
+
+def test_a_rule_that_leaves_hourglass_modes_is_reported_and_one_of_another_cell_refused():
+    from kratos_lite.quadrature import pyramid, tetrahedron
+
+    model = model_of(kl.box(cells=(2, 2, 2)), rollers=True)
+    model.use_rule(1)
+    assert any("12 spurious zero-energy modes" in text for text in model.check())
+    for rule in (tetrahedron(2), pyramid(3)):
+        model.use_rule(rule)
+        with pytest.raises(kl.InputError, match="does not fit KinematicLinear3D8N"):
+            model.solve()
+
+
+@pytest.mark.parametrize("nodes", KINDS)
+def test_one_gauss_point_still_gives_a_constant_stress_at_the_nodes(nodes):
+    mesh = kl.box(element=kind(nodes))
+    model = kl.Model(mesh, STEEL)
+    model.use_rule(1)
+    model.fix(np.arange(mesh.n_nodes), "xyz", 1e-3 * mesh.points)
+    np.testing.assert_allclose(model.solve().stress("node")[:, :3], 525e3, rtol=1e-10)

@@ -1,0 +1,358 @@
+"""Prescribed displacements, multi-point constraints, and materials that differ."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
+
+
+def kind(n):
+    return f"KinematicLinear3D{n}N"
+
+
+def stretched(mesh=None, amount=1e-3):
+    """Return a bar pulled by a prescribed displacement of its end, free to contract."""
+    model = kl.Model(mesh or kl.box((2, 1, 1), (2, 2, 2)), STEEL)
+    for side in ("x-", "y-", "z-"):
+        model.fix(side, side[0])
+    model.fix("x+", "x", amount)
+    return model
+
+
+def test_prescribed_end_gives_uniaxial_stress_and_its_reactions():
+    result = stretched().solve()
+    stress = STEEL.E * 1e-3 / 2
+    np.testing.assert_allclose(result.stress()[..., 0], stress, rtol=1e-12)
+    np.testing.assert_allclose(result.stress()[..., 1:], 0, atol=1e-6)
+    assert result.reaction("x+")[:, 0].sum() == pytest.approx(stress, rel=1e-12)
+    assert result.reaction("x-")[:, 0].sum() == pytest.approx(-stress, rel=1e-12)
+    np.testing.assert_allclose(result.displacement("y+")[:, 1], -0.3 * 5e-4, rtol=1e-12)
+    np.testing.assert_allclose(result.von_mises(), stress, rtol=1e-12)
+    assert result.energy() == pytest.approx(stress * 1e-3 / 2, rel=1e-12)
+    assert result.energy() == pytest.approx((result.reactions * result.u).sum() / 2, rel=1e-12)
+
+
+def test_strain_and_stress_in_every_place_agree_for_a_uniform_field():
+    result = stretched().solve()
+    for at, shape in (("gauss", (8, 8, 6)), ("element", (8, 6)), ("node", (27, 6))):
+        strain, stress = result.strain(at), result.stress(at)
+        assert strain.shape == stress.shape == shape
+        np.testing.assert_allclose(strain[..., 0], 5e-4, rtol=1e-12)
+        np.testing.assert_allclose(strain[..., 1], -1.5e-4, rtol=1e-12)
+        np.testing.assert_allclose(stress[..., 0], 1e8, rtol=1e-12)
+        assert result.von_mises(at).shape == shape[:-1]
+
+
+def test_values_can_be_given_per_axis_and_per_node():
+    mesh = kl.box()
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-", "xyz", (1e-3, 2e-3, 3e-3))
+    top = mesh.nodes("z+")
+    model.fix("z+", "zx", np.column_stack([1e-3 * np.arange(4), np.full(4, 5e-3)]))
+    u = model.solve().u
+    np.testing.assert_array_equal(u[mesh.nodes("z-")], np.tile((1e-3, 2e-3, 3e-3), (4, 1)))
+    np.testing.assert_array_equal(u[top, 2], 1e-3 * np.arange(4))
+    np.testing.assert_array_equal(u[top, 0], 5e-3)
+
+
+def test_a_component_prescribed_twice_is_an_error_unless_it_is_overridden():
+    model = stretched()
+    model.fix("x+", "x", 1e-3)
+    with pytest.raises(kl.ModelError, match=r"node \d+ along x is prescribed twice: 0\.001 m and 0\.002 m"):
+        model.fix("x+", "x", 2e-3)
+    model.fix("x+", "x", 2e-3, override=True)
+    np.testing.assert_allclose(model.solve().stress()[..., 0], 2e8, rtol=1e-12)
+
+
+@pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
+def test_skew_rollers_let_a_turned_bar_behave_as_the_straight_one(solver):
+    angle = np.deg2rad(25)
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    straight = stretched().solve()
+    mesh = kl.box((2, 1, 1), (2, 2, 2))
+    sides = {side: mesh.nodes(side) for side in ("x-", "x+", "y-", "z-")}
+    mesh.points[:] = mesh.points @ turn.T
+    model = kl.Model(mesh, STEEL)
+    model.fix(sides["z-"], "z")
+    corner = set(sides["x-"]) & set(sides["y-"])
+    model.fix(sorted(corner), "xy")
+    for node in set(sides["x-"]) - corner:  # u · (c, s) = 0
+        model.link((int(node), "x"), {(int(node), "y"): -s / c})
+    for node in set(sides["y-"]) - corner - set(sides["x+"]):  # u · (-s, c) = 0
+        model.link((int(node), "y"), {(int(node), "x"): s / c})
+    for node in sides["x+"]:
+        if node in sides["y-"]:
+            model.fix([int(node)], "xy", 1e-3 * np.array([c, s]))
+        else:
+            model.link((int(node), "x"), {(int(node), "y"): -s / c}, 1e-3 / c)
+    result = model.solve(solver, tolerance=1e-12)
+    np.testing.assert_allclose(result.u, straight.u @ turn.T, rtol=0, atol=1e-9 * 1e-3)
+
+
+def test_periodic_constraints_make_a_layered_cell_as_stiff_as_its_layers():
+    """Layers in parallel: E = mean; the cell is stretched by a periodic jump along x."""
+    mesh = kl.box(cells=(2, 1, 2))
+    model = kl.Model(mesh)
+    model.assign(kl.Isotropic3D(E=1.0, nu=0.0), np.flatnonzero(centres(mesh)[:, 2] < 0.5))
+    model.assign(kl.Isotropic3D(E=3.0, nu=0.0), np.flatnonzero(centres(mesh)[:, 2] > 0.5))
+    left, right = mesh.nodes("x-"), mesh.nodes("x+")
+    for a, b in zip(left, right, strict=True):
+        for axis in "xyz":
+            model.link((int(b), axis), {(int(a), axis): 1.0}, 0.01 if axis == "x" else 0.0)
+    model.fix([0], "xyz")
+    model.fix(mesh.nodes(lambda X: (X[:, 0] == 0) & (X[:, 2] == 0) & (X[:, 1] > 0)), "xz")
+    model.fix(mesh.nodes(lambda X: (X[:, 0] == 0) & (X[:, 2] == 1) & (X[:, 1] == 0)), "xy")
+    result = model.solve()
+    np.testing.assert_allclose(result.u[:, 0], 0.01 * mesh.points[:, 0], atol=1e-14)
+    assert result.energy() == pytest.approx(0.5 * 2.0 * 0.01**2, rel=1e-12)
+
+
+def centres(mesh):
+    return mesh.points[mesh.blocks[0].nodes].mean(axis=1)
+
+
+def test_a_rigid_plate_by_constraints_keeps_its_shape_and_carries_the_moment():
+    mesh = kl.box((4, 1, 1), (4, 1, 1), kind(20), origin=(0, -0.5, -0.5))
+    model = kl.Model(mesh, STEEL)
+    model.fix("x-")
+    end = mesh.nodes("x+")
+    centre = mesh.points[end] - (4, 0, 0)
+    a, b = (int(end[np.argmin(np.linalg.norm(centre - p, axis=1))]) for p in ((0, 0.5, 0.5), (0, 0.5, -0.5)))
+    for node, (_, _, z) in zip(end, centre, strict=True):
+        if node not in (a, b):  # u_x is linear in z and does not depend on y
+            model.link((int(node), "x"), {(a, "x"): 0.5 + z, (b, "x"): 0.5 - z})
+    model.add(kl.PointLoad([a], (1e3, 0, 0)))
+    model.add(kl.PointLoad([b], (-1e3, 0, 0)))
+    result = model.solve()
+    u = result.u[end, 0]
+    np.testing.assert_allclose(u, (result.u[a, 0] - result.u[b, 0]) * centre[:, 2], atol=1e-20)
+    slope = result.u[a, 0] - result.u[b, 0]
+    assert slope == pytest.approx(1e3 * 4 / (STEEL.E / 12), rel=0.03)
+
+
+def test_chains_of_constraints_with_constants_and_fixed_masters_are_followed_to_the_end():
+    mesh = kl.box((1, 1, 1), (1, 1, 1))
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-", "xyz", (0.0, 0.0, 1e-4))
+    top = [int(n) for n in mesh.nodes("z+")]
+    low = int(mesh.nodes("z-")[0])
+    model.link((top[1], "z"), {(top[2], "z"): 2.0}, 1e-5)
+    model.link((top[2], "z"), {(top[3], "z"): 0.5, (low, "z"): 1.0}, -3e-5)
+    model.add(kl.PointLoad([top[3]], (0, 0, 1e5)))
+    u = model.solve().u[:, 2]
+    assert u[top[2]] == pytest.approx(0.5 * u[top[3]] + 1e-4 - 3e-5, rel=1e-12)
+    assert u[top[1]] == pytest.approx(2 * u[top[2]] + 1e-5, rel=1e-12)
+
+
+def test_constraints_that_contradict_are_errors():
+    def model():
+        one = kl.Model(kl.box(), STEEL)
+        one.fix("z-")
+        return one
+
+    top = [int(n) for n in kl.box().nodes("z+")]
+    circle = model()
+    circle.link((top[0], "x"), {(top[1], "x"): 1.0})
+    circle.link((top[1], "x"), {(top[2], "x"): 1.0})
+    circle.link((top[2], "x"), {(top[0], "x"): 0.5})
+    with pytest.raises(kl.ModelError, match="go round in a circle"):
+        circle.solve()
+    own = model()
+    own.link((top[0], "x"), {(top[0], "x"): 0.5})
+    with pytest.raises(kl.ModelError, match="go round in a circle"):
+        own.solve()
+    fixed = model()
+    fixed.link((0, "x"), {(top[0], "x"): 1.0})
+    with pytest.raises(kl.ModelError, match="node 1 along x is both fixed and the slave of a constraint"):
+        fixed.solve()
+    twice = model()
+    twice.link((top[0], "x"), {(top[1], "x"): 1.0})
+    twice.link((top[0], "x"), {(top[2], "x"): 1.0})
+    with pytest.raises(kl.ModelError, match="is the slave of two constraints"):
+        twice.solve()
+
+
+def test_tied_coincident_nodes_join_two_bodies():
+    low, high = kl.box((1, 1, 1)), kl.box((1, 1, 1), origin=(0, 0, 1))
+    blocks = []
+    for mesh, start in ((low, 0), (high, 8)):
+        old = mesh.blocks[0]
+        blocks.append(
+            kl.Block(old.name, old.nodes + np.int32(start), old.ids + start, old.properties, old.shape)
+        )
+    model = kl.Model(kl.Mesh(np.vstack([low.points, high.points]), blocks), STEEL)
+    whole = kl.Model(kl.box((1, 1, 2), (1, 1, 2)), STEEL)
+    for one in (model, whole):
+        one.fix("z-")
+        one.add(kl.Gravity((1, 0, -9.81)))
+    for a, b in zip(low.nodes("z+"), high.nodes("z-"), strict=True):
+        for axis in "xyz":
+            model.link((int(b) + 8, axis), {(int(a), axis): 1.0})
+    result = model.solve()
+    np.testing.assert_allclose(result.displacement("z+"), whole.solve().displacement("z+"), rtol=1e-11)
+    assert any("pairs of nodes coincide" in text for text in result.report.warnings)
+
+
+def test_two_materials_in_series_share_the_stress():
+    mesh = kl.box((1, 1, 2), (1, 1, 2))
+    mesh.blocks[0].properties[:] = (3, 8)
+    soft, hard = kl.Isotropic3D(E=1.0, nu=0.0), kl.Isotropic3D(E=4.0, nu=0.0)
+    model = kl.Model(mesh, {3: soft, 8: hard})
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, 1.0)))
+    result = model.solve()
+    np.testing.assert_allclose(result.displacement("z+")[:, 2], 1.25, rtol=1e-13)
+    np.testing.assert_allclose(result.stress()[..., 2], 1.0, rtol=1e-12)
+    np.testing.assert_allclose(result.strain("element")[:, 2], (1.0, 0.25), rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", [(8, 6), (8, 5, 4)])
+def test_cells_of_several_kinds_in_one_mesh_pass_the_patch_test(order):
+    """A brick beside two wedges; a brick under a pyramid with tetrahedra around it."""
+    corners = (kl.KinematicLinear3D8N.nodes + 1) / 2
+    if order == (8, 6):
+        points = np.vstack([corners, corners[[1, 2, 5, 6]] + (1, 0.2, 0)])
+        cells = {8: [range(8)], 6: [(1, 8, 9, 5, 10, 11), (1, 9, 2, 5, 11, 6)]}
+    else:
+        points = np.vstack([corners, [(0.5, 0.4, 1.6), (1.7, 0.5, 1.4)]])
+        cells = {8: [range(8)], 5: [(4, 5, 6, 7, 8)], 4: [(5, 9, 6, 8)]}
+    blocks = []
+    for n, nodes in cells.items():
+        rows = np.array([list(c) for c in nodes], dtype=np.int32)
+        m = len(rows)
+        shape = kl.ELEMENTS[kind(n)].shape
+        blocks.append(kl.Block(kind(n), rows, np.arange(m) + 10 * n, np.ones(m, dtype=np.int64), shape))
+    mesh = kl.Mesh(points, blocks)
+    F = 1e-3 * np.array([[1, 2, 3], [0, -1, 2], [1, 1, 1]])
+    model = kl.Model(mesh, STEEL)
+    held = np.array([0, 1, 2, 3])
+    model.fix(held, "xyz", points[held] @ F.T)
+    strain = (F + F.T) / 2
+    sigma = STEEL.lame[0] * np.trace(strain) * np.eye(3) + 2 * STEEL.lame[1] * strain
+    forces = np.zeros_like(points)
+    for batch in model.batches():
+        stress = np.array([sigma[0, 0], sigma[1, 1], sigma[2, 2], sigma[0, 1], sigma[1, 2], sigma[0, 2]])
+        element = batch.at(points)
+        part = element.internal_load(np.tile(stress, (len(batch), len(batch.rule), 1)))
+        np.add.at(forces, batch.nodes, part)
+    outside = np.zeros_like(points)
+    for face in mesh.boundary:  # the same forces from the outside: traction σ n on every boundary face
+        from kratos_lite.elements import surface
+
+        n_dA = surface.area_vectors(face.shape, points[face.nodes])
+        N = np.array([face.shape.N(xi) for xi in surface.face_rule(face.shape).points])
+        np.add.at(outside, face.nodes, np.einsum("gn,fgi->fni", N, n_dA @ sigma))
+    np.testing.assert_allclose(outside, forces, atol=1e-6)
+    model.add(kl.NodalForces(outside))
+    result = model.solve()
+    np.testing.assert_allclose(result.u, points @ F.T, atol=1e-14)
+    for row in result.stress():
+        np.testing.assert_allclose(row[:, 0], sigma[0, 0], rtol=1e-10)
+    assert not result.report.warnings
+
+
+def test_prestress_that_balances_gravity_leaves_the_body_unmoved():
+    rho, g = 2000.0, 9.81
+    mesh = kl.box(cells=(2, 2, 4))
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e8, nu=0.3, density=rho))
+    for side in ("x-", "x+", "y-", "y+", "z-"):
+        model.fix(side, side[0])
+    model.add(kl.Gravity((0, 0, -g)))
+    depth = 1 - centres(mesh)[:, 2]
+    stress = -rho * g * depth[:, None] * np.array([0.4, 0.4, 1, 0, 0, 0])
+    model.add_prestress(stress)
+    result = model.solve()
+    # element-wise constant stress balances the consistent nodal weight inside the body exactly
+    free = kl.Model(mesh, kl.Isotropic3D(E=1e8, nu=0.3, density=rho))
+    assert free.prestress is None
+    np.testing.assert_allclose(result.u, 0, atol=1e-3 * rho * g / 1e8 * 0.05)
+    assert result.reaction("z-")[:, 2].sum() == pytest.approx(rho * g, rel=1e-12)
+    np.testing.assert_allclose(result.stress("element"), stress, rtol=1e-9, atol=1e-9 * rho * g)
+
+
+def test_uniform_prestress_released_gives_the_elastic_strain_back():
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), STEEL)
+    for side in ("x-", "y-", "z-"):
+        model.fix(side, side[0])
+    model.add_prestress((2e8, 0, 0, 0, 0, 0))
+    result = model.solve()
+    np.testing.assert_allclose(result.displacement("x+")[:, 0], -1e-3, rtol=1e-12)
+    np.testing.assert_allclose(result.stress(), 0, atol=1e-4)
+
+
+def test_a_body_activated_in_a_displaced_state_has_no_stress_there():
+    mesh = kl.box((2, 1, 1), (2, 2, 2))
+    u0 = 1e-3 * np.column_stack([mesh.points[:, 0], 0 * mesh.points[:, 0], mesh.points[:, 1]])
+    model = stretched(mesh)
+    for side in ("x-", "y-", "z-"):
+        model.fix(side, "xyz", u0[mesh.nodes(side)], override=True)
+    model.fix("x+", "xyz", u0[mesh.nodes("x+")], override=True)
+    model.activate(u0)
+    result = model.solve()
+    np.testing.assert_allclose(result.u, u0, atol=1e-16)
+    np.testing.assert_allclose(result.stress(), 0, atol=1e-3)
+    assert result.energy() == pytest.approx(0, abs=1e-10)
+
+
+def test_orthotropic_bar_has_the_modulus_and_contractions_of_its_axes():
+    wood = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.35, 0.7e9, 0.05e9, 0.6e9)
+    moduli, ratio = (11e9, 0.9e9, 0.5e9), {(0, 1): 0.4, (1, 2): 0.3, (0, 2): 0.35}
+    for axis, letter in enumerate("xyz"):
+        model = kl.Model(kl.box(cells=(2, 2, 2), element=kind(10)), wood)
+        for side in ("x-", "y-", "z-"):
+            model.fix(side, side[0])
+        model.fix(letter + "+", letter, 1e-3)
+        result = model.solve()
+        np.testing.assert_allclose(result.stress()[..., axis], 1e-3 * moduli[axis], rtol=1e-10)
+        for other in range(3):
+            if other != axis:
+                i, j = min(axis, other), max(axis, other)
+                nu = ratio[i, j] if axis < other else ratio[i, j] * moduli[j] / moduli[i]
+                np.testing.assert_allclose(result.strain()[..., other], -nu * 1e-3, rtol=1e-10)
+
+
+def test_orthotropic_shear_moduli_belong_to_their_planes():
+    wood = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.35, 0.7e9, 0.05e9, 0.6e9)
+    for (i, j), row, G in (((0, 1), 3, 0.7e9), ((1, 2), 4, 0.05e9), ((0, 2), 5, 0.6e9)):
+        mesh = kl.box()
+        field = np.zeros((8, 3))
+        field[:, i] = 1e-3 * mesh.points[:, j]
+        model = kl.Model(mesh, wood)
+        model.fix(np.arange(8), "xyz", field)
+        np.testing.assert_allclose(model.solve().stress()[..., row], 1e-3 * G, rtol=1e-12)
+
+
+def test_an_isotropic_body_written_as_orthotropic_is_the_same():
+    E, nu = 2e11, 0.3
+    G = E / (2 * (1 + nu))
+    same = kl.Orthotropic3D(E, E, E, nu, nu, nu, G, G, G, 7850.0)
+    results = []
+    for material in (STEEL, same):
+        model = kl.Model(kl.box((3, 1, 1), (3, 1, 1), kind(20)), material)
+        model.fix("x-")
+        model.add(kl.Gravity((0, 0, -9.81)))
+        results.append(model.solve())
+    np.testing.assert_allclose(results[1].u, results[0].u, rtol=0, atol=1e-11 * np.abs(results[0].u).max())
+
+
+def test_nodes_without_elements_are_reported_and_change_nothing():
+    mesh = kl.box((2, 1, 1), (2, 2, 2))
+    more = kl.Mesh(np.vstack([mesh.points, [(9.0, 9, 9)]]), mesh.blocks, parts=mesh.parts)
+    result = stretched(more).solve()
+    np.testing.assert_array_equal(result.u[:-1], stretched().solve().u)
+    np.testing.assert_array_equal(result.u[-1], 0)
+    assert "1 nodes belong to no element and carry no equations: 28" in result.report.warnings
+
+
+def test_reaction_moments_balance_the_load():
+    mesh = kl.box((3, 1, 1), (3, 1, 1), kind(20))
+    model = kl.Model(mesh, STEEL)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (10, 20, -30)))
+    result = model.solve()
+    np.testing.assert_allclose(result.reaction("x-").sum(axis=0), (-10, -20, 30), rtol=1e-10)
+    moment = np.cross(mesh.points, result.reactions).sum(axis=0)
+    np.testing.assert_allclose(moment, -np.cross((3, 0.5, 0.5), (10, 20, -30)), rtol=1e-10)
