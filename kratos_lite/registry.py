@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import lru_cache
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Generic, ParamSpec, TypeVar, cast
 
 from kratos_lite.errors import InputError, nearest

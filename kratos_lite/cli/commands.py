@@ -138,16 +138,19 @@ def check(options: Namespace) -> int:
 
 
 def _check_python(path: Path) -> int:
-    from kratos_lite.testing import run_file
+    from kratos_lite.testing import failures, run_file
 
-    passed = True
+    broken = 0
     for name, findings in run_file(path):
-        bad = [finding for finding in findings if not finding.passed]
-        passed &= not bad
-        print(f"{name}: {len(findings) - len(bad)} of {len(findings)} checks passed")
+        failed = failures(findings)
+        broken += len(failed)
+        skipped = sum(finding.skipped for finding in findings)
+        passed = len(findings) - len(failed) - skipped
+        print(f"{name}: {passed} checks passed, {len(failed)} failed, {skipped} not run")
         for finding in findings:
-            print(f"  {finding}")
-    return 0 if passed else 2
+            word = "ok" if finding.passed else "not run" if finding.skipped else "FAILED"
+            print(f"  {word:<8}{finding}")
+    return 2 if broken else 0
 
 
 def convert(options: Namespace) -> int:

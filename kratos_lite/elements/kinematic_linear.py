@@ -101,10 +101,10 @@ class KinematicLinear:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if "shape" not in cls.__dict__:
-            return
+        if not (hasattr(cls, "shape") and hasattr(cls, "rule")):
+            return  # a family of elements, not an element
         cls.nodes = cls.shape.nodes
-        if "mass_rule" not in cls.__dict__:
+        if not hasattr(cls, "mass_rule"):
             cls.mass_rule = cls.rule
         suffix = cls.__name__.removeprefix("KinematicLinear")
         same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]

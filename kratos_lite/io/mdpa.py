@@ -47,7 +47,8 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
         if frame.name in frames and frame.name != "Mesh":
             frames[frame.name].append(frame)
         else:
-            source.note(f"block {frame.name} is skipped.{nearest(frame.name, TOP)}", frame.offset)
+            hint = "" if frame.name in TOP else nearest(frame.name, TOP)
+            source.note(f"block {frame.name} is skipped.{hint}", frame.offset)
     document = _read(source, frames)
     source.problems.raise_if_any()
     document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)

@@ -81,8 +81,11 @@ def repeated(ids: Ints) -> list[tuple[int, int]]:
 
 
 def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
-    """Return the blocks of elements, conditions or geometries; their nodes must be in the mesh."""
-    blocks = [_read_block(source, frame, mesh) for frame in frames]
+    """Return the blocks of elements, conditions or geometries; their nodes must be in the mesh.
+
+    Empty blocks, of which some programs write one for each kind they know, say nothing and are left out.
+    """
+    blocks = [block for frame in frames if len(block := _read_block(source, frame, mesh))]
     if blocks:
         _refuse_repeated(source, blocks, WORDS[frames[0].name])
     return blocks

@@ -234,7 +234,7 @@ def _number(token: bytes, kind: str) -> float:
         if token not in TRUTH:
             raise ValueError(f"{shown(token)} is neither true nor false; write 1 or 0")
         return TRUTH[token]
-    return 0 if kind == "p" and token == b"0" else integer(token)
+    return 0 if kind == "p" and not token.strip(b"0") else integer(token)
 
 
 def _text(word: re.Match[bytes]) -> str:

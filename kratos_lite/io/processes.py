@@ -66,7 +66,8 @@ class Action:
         product: Any = 1.0
         try:
             for factor in self.factors:
-                product = product * (evaluate(factor, variables) if isinstance(factor, str) else factor)
+                with np.errstate(over="ignore"):
+                    product = product * (evaluate(factor, variables) if isinstance(factor, str) else factor)
             if not np.isfinite(product).all():
                 raise ValueError("modulus × direction is too large for a number")
         except ValueError as error:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def legendre(n: int) -> tuple[Array, Array]:
     """Return the n-point Gauss-Legendre rule on [-1, 1], exact to degree 2n - 1.
 
-    Source: closed forms up to five points (Abramowitz & Stegun 25.4.30), Newton beyond.
+    Source: closed forms up to five points (Abramowitz & Stegun 25.4.30), `numpy` beyond.
 
     >>> legendre(2)[0]
     array([-0.57735027,  0.57735027])

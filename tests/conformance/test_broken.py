@@ -443,14 +443,16 @@ def test_functions_overridden_in_the_element_alone_are_found():
     assert found["functions"].detail.startswith("N of the element")
 
 
-class ChangedStiffness(KinematicLinear3D8N):
-    """Takes a change of K; `stiffness` follows `stiffness_by_axis`."""
+with ELEMENTS.temporary():
 
-    def stiffness_by_axis(self, C):
-        return self.change(super().stiffness_by_axis(C))
+    class ChangedStiffness(KinematicLinear3D8N):
+        """Takes a change of K; `stiffness` follows `stiffness_by_axis`."""
 
-    def change(self, K):
-        return K
+        def stiffness_by_axis(self, C):
+            return self.change(super().stiffness_by_axis(C))
+
+        def change(self, K):
+            return K
 
 
 def test_an_absolute_tolerance_is_found_by_scaling():

@@ -32,6 +32,7 @@ import json, sys
 import KratosMultiphysics as K
 import KratosMultiphysics.StructuralMechanicsApplication as S
 K.Logger.GetDefaultOutput().SetSeverity(K.Logger.Severity.WARNING)
+X = K.DISPLACEMENT_X
 part = K.Model().CreateModelPart("main")
 for v in (K.DISPLACEMENT, K.REACTION, K.VELOCITY, S.POINT_LOAD):
     part.AddNodalSolutionStepVariable(v)
@@ -45,7 +46,7 @@ print("RESULT" + json.dumps({
     "elements": {e.Id: [n.Id for n in e.GetNodes()] for e in part.Elements},
     "conditions": {c.Id: [n.Id for n in c.GetNodes()] for c in part.Conditions},
     "E": properties[K.YOUNG_MODULUS], "g": list(properties[K.VOLUME_ACCELERATION]),
-    "fixed": {n.Id: n.GetSolutionStepValue(x) for x in [K.DISPLACEMENT_X] for n in part.Nodes if n.IsFixed(x)},
+    "fixed": {n.Id: n.GetSolutionStepValue(X) for n in part.Nodes if n.IsFixed(X)},
     "velocity": list(part.GetNode(11).GetSolutionStepValue(K.VELOCITY)),
     "parts": {p.FullName(): [sorted(n.Id for n in p.Nodes), sorted(e.Id for e in p.Elements)]
               for top in part.SubModelParts for p in [top, *top.SubModelParts]},

@@ -498,6 +498,85 @@ def test_expected_values_of_a_missing_file_are_reported(folder):
     assert line.startswith("check against none.json not evaluated: ")
 
 
+def file_check(**settings):
+    parameters = {"input_file_name": "reference.json", "model_part_name": "Structure", **settings}
+    return {"python_module": "from_json_check_result_process", "Parameters": parameters}
+
+
+@pytest.mark.parametrize(
+    ("content", "settings", "words"),
+    [
+        ({"TIME": [1.1]}, {}, "key 'NODE_1' is missing"),
+        ({"TIME": [0.5]}, {}, "the file has no values at time 1.1 s"),
+        (
+            {"TIME": [1.1], "NODE_1": {"DISPLACEMENT_X": []}},
+            {"model_part_name": "One"},
+            "one number for each TIME",
+        ),
+        (
+            {"TIME": [1.0, 2.0], "NODE_1": {"DISPLACEMENT_X": [0.0, 10.0]}},
+            {"model_part_name": "Structure", "sub_model_part_name": "One"},
+            "failed (node 1: found 0, expected 1, tolerance 0.001)",
+        ),
+        (
+            {"TIME": [1.0, 2.0], "NODE_1": {"DISPLACEMENT_X": [0.0, 10.0]}},
+            {"model_part_name": "One", "relative_tolerance": 1.0},
+            "passed (node 1: found 0, expected 1, tolerance 1)",
+        ),
+        (
+            {},
+            {"check_variables": [], "gauss_points_check_variables": ["PK2"]},
+            "values at Gauss points are not",
+        ),
+        ({}, {"model_part_name": "None"}, "its part has no nodes"),
+    ],
+)
+def test_expected_values_of_a_file_are_compared_at_the_last_time(folder, content, settings, words):
+    parts = "Begin SubModelPart One\nBegin SubModelPartNodes\n1\nEnd SubModelPartNodes\nEnd SubModelPart\n"
+    parts += "Begin SubModelPart None\nEnd SubModelPart\n"
+    (folder / "box.mdpa").write_text(box_mdpa() + parts)
+    write(folder, content, "reference.json")
+    entry = file_check(**{"check_variables": ["DISPLACEMENT_X"], **settings})
+    project = read_project(write(folder, run_file([CLAMP], [GRAVITY], checks=[entry])))
+    (line,) = project.evaluate(project.model.solve())
+    assert words in line
+
+
+def test_expected_values_count_places_from_the_deformed_body_unless_told(folder):
+    lift = process("assign_scalar_variable_process", "Top", "DISPLACEMENT_Z", value=0.5)
+    entries = [
+        process(
+            "check_scalar_to_nodes_process",
+            "Top",
+            "DISPLACEMENT_Z",
+            value=f"0.5 + z - {z}",
+            reference_conf=reference,
+        )
+        for z, reference in ((2.0, False), (1.5, True))
+    ]
+    project = read_project(write(folder, run_file([CLAMP, lift], [], checks=entries)))
+    assert [line.split()[4] for line in project.evaluate(project.model.solve())] == ["passed"] * 2
+
+
+def test_constraints_are_left_out_with_a_note_when_the_run_file_says_so(folder):
+    row = "Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X DISPLACEMENT_X\n1 0.0 [1.0] 27 26\n"
+    (folder / "box.mdpa").write_text(box_mdpa() + row + "End Constraints\n")
+    kept = read_project(write(folder, run_file([CLAMP], []))).model
+    left = read_project(write(folder, run_file([CLAMP], [], multi_point_constraints_used=False))).model
+    assert (len(kept.supports.links), len(left.supports.links)) == (1, 0)
+    assert "multi_point_constraints_used is false: 1 constraints left out" in left.notes
+
+
+def test_an_impossible_material_of_the_mesh_file_is_placed(folder):
+    text = box_mdpa().replace(
+        "Begin Properties 0\n", "Begin Properties 0\nYOUNG_MODULUS 1.0\nPOISSON_RATIO 0.5\n"
+    )
+    start = text.index("Begin SubModelPartElements")
+    (folder / "box.mdpa").write_text(text[:start] + text[start:].replace("\n8\n", "\n", 1))
+    with pytest.raises(InputError, match=r"box\.mdpa:1: Properties 0: .* must be < 0.5"):
+        read_project(write(folder, run_file([CLAMP], [])))
+
+
 def changed(**solver):
     return run_file([CLAMP], [GRAVITY], **solver)
 
