@@ -96,7 +96,12 @@ class Gravity(BodyForce):
 
 
 def _faces(mesh: Mesh, where: Where, what: str) -> list[Block]:
-    faces = [block for block in mesh.faces(where) if block.shape is not None]
+    faces = mesh.faces(where)
+    for block in faces:
+        if block.shape is None:
+            raise ModelError(
+                f"{what} meets conditions of the unknown kind {block.name} (the first is {block.ids[0]})"
+            )
     if not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
         raise ModelError(
@@ -221,6 +226,7 @@ class ConditionLoads(Load):
         for block in mesh.conditions:
             rows = slice(start, start + len(block))
             start += len(block)
+            _check_loadable(block, bool(self.force[0][rows].any()), bool(self.pressure[0][rows].any()))
             if block.shape is None or not len(block):
                 continue
             X = mesh.points[block.nodes]
@@ -231,6 +237,14 @@ class ConditionLoads(Load):
             if pressure.any() and block.shape.cell in ("triangle", "quadrilateral"):
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
+
+
+def _check_loadable(block: Block, force: bool, pressure: bool) -> None:
+    """Raise ModelError for a load stated on conditions that cannot carry it."""
+    if block.shape is None and (force or pressure):
+        raise ModelError(f"a load is given on conditions of the unknown kind {block.name}")
+    if block.shape is not None and pressure and block.shape.cell not in ("triangle", "quadrilateral"):
+        raise ModelError(f"a pressure acts on faces; {block.name} is not one")
 
 
 def outward_signs(mesh: Mesh, block: Block) -> Array:

@@ -84,7 +84,8 @@ def solve_static(
         if not np.isfinite(u).all() or solution.backward_error > 1e-8:
             raise SolveError(
                 f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
-                "look for very thin elements, very unlike stiffnesses or nearly free parts"
+                "ask for a smaller tolerance, or look for very thin elements, very unlike stiffnesses or "
+                "nearly free parts"
             )
         warnings += checks.check_rounding(noise, loads, loads - forces, reactions, model.supports)
     report = Report(

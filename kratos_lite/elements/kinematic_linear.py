@@ -220,7 +220,7 @@ class KinematicLinear:
         (..., n, 3) for one that is interpolated from the nodes.
         """
         b = np.asarray(b, dtype=float)
-        if b.ndim >= 2 and b.shape[-2:] == self.nodes.shape:
+        if b.ndim == self.X.ndim and b.shape[-2:] == self.nodes.shape:
             return np.asarray(self.scalar_mass() @ b)
         share = self.dV @ tabulate(self.shape, self.rule)[0]
         return np.asarray(share[..., :, None] * b[..., None, :])

@@ -57,7 +57,7 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
         measure = np.linalg.norm(tangents[..., 0, :], axis=-1) * rule.weights
     else:
         measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
-    if t.ndim >= 2 and t.shape[-2:] == (len(shape.nodes), 3):
+    if t.ndim == X.ndim and t.shape[-2:] == (len(shape.nodes), 3):
         return np.asarray((N.T * measure[..., None, :]) @ (N @ t))
     return np.asarray((measure @ N)[..., :, None] * t[..., None, :])
 

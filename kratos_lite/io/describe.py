@@ -10,6 +10,7 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.io.document import Data, Document
+from kratos_lite.io.mdpa_values import Table
 from kratos_lite.mesh import Block
 
 
@@ -19,12 +20,19 @@ def describe(document: Document) -> str:
     lines = [f"{'file':<12}{mesh.source}", f"{'nodes':<12}{mesh.n_nodes}"]
     if mesh.n_nodes:
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        lines.append(f"{'extent':<12}" + " × ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high, strict=True)) + " m")
+        lines.append(
+            f"{'extent':<12}" + " × ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high, strict=True)) + " m"
+        )
     lines += _blocks("elements", mesh.blocks, known=True)
     lines += _blocks("conditions", mesh.conditions)
     lines += _blocks("geometries", document.geometries)
     for properties in document.properties.values():
-        values = ", ".join(f"{name} {_short(value)}" for name, value in properties.values.items()) or "empty"
+        shown = [
+            f"{name} {_short(value)}"
+            for name, value in properties.values.items()
+            if not isinstance(value, Table)
+        ]
+        values = ", ".join(shown) or "empty"
         lines.append(f"{'properties':<12}{properties.id}: {values}{_at(properties.line)}")
     for title, group in (
         ("nodal data", document.nodal_data),
@@ -47,9 +55,10 @@ def _at(line: int) -> str:
 
 
 def _short(value: Any) -> str:
-    array = np.asarray(value)
-    if array.ndim and array.dtype.kind == "f":
-        return np.array2string(array, separator=", ", formatter={"float_kind": lambda x: f"{x:g}"})
+    if isinstance(value, np.ndarray):
+        return "[" + ", ".join(_short(v) for v in value.tolist()) + "]"
+    if isinstance(value, list):
+        return _short(np.array(value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

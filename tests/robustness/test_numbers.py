@@ -151,3 +151,30 @@ def test_displacements_respect_maxwell_and_betti():
     second = clamped(mesh, kl.PointLoad([b], (0, 0, 1.0))).solve().u
     assert first[b, 2] == pytest.approx(second[a, 1], rel=1e-9)
     assert abs(first[b, 2]) > 0
+
+
+def test_a_tolerance_that_is_far_too_loose_is_refused():
+    model = kl.Model(kl.box(cells=(6, 6, 6)), STEEL)
+    model.fix("z-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    with pytest.raises(kl.SolveError, match=r"backward error of .* only; ask for a smaller tolerance"):
+        model.solve("amg", tolerance=0.9)
+
+
+def test_nearly_incompressible_bodies_are_solved_in_spite_of_multigrid():
+    model = kl.Model(kl.box((4, 1, 1), (8, 2, 2)), kl.Isotropic3D(E=1e6, nu=0.4999, density=1.0))
+    model.fix("x-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    multigrid, direct = model.solve("amg"), model.solve("direct")
+    np.testing.assert_allclose(multigrid.u, direct.u, rtol=0, atol=1e-7 * np.abs(direct.u).max())
+
+
+def test_elements_with_different_rules_give_a_list_of_stresses():
+    model = clamped(kl.box((2, 1, 1), (2, 1, 1)))
+    model.use_rule(3, [1])
+    result = model.solve()
+    assert [s.shape for s in result.stress()] == [(8, 6), (27, 6)]
+    assert [s.shape for s in result.von_mises()] == [(8,), (27,)]
+    np.testing.assert_allclose(
+        result.u, clamped(kl.box((2, 1, 1), (2, 1, 1))).solve().u, rtol=1e-10, atol=1e-20
+    )

@@ -181,3 +181,42 @@ def test_faces_of_mixed_cells_carry_the_whole_load(split):
         blocks.append(kl.Block(old.name, inverse[old.nodes + start], old.ids, old.properties, old.shape))
     forces = nodal(kl.Mesh(unique, blocks), kl.Pressure("z+", 1.0), kl.Traction("x+", (1, 0, 0)))
     np.testing.assert_allclose(forces.sum(axis=0), (2, 0, -2), atol=1e-14)
+
+
+def test_one_value_per_element_is_not_taken_for_nodal_values():
+    """Eight bricks with eight body forces, and four squares with four tractions."""
+    from kratos_lite.elements import surface_load
+
+    mesh = kl.box(cells=(2, 2, 2))
+    element = kl.KinematicLinear3D8N(mesh.points[mesh.blocks[0].nodes])
+    b = np.arange(24.0).reshape(8, 3)
+    np.testing.assert_allclose(element.body_force(b).sum(axis=1), b / 8, rtol=1e-13)
+    (top,) = mesh.faces("z+")
+    t = np.arange(12.0).reshape(4, 3)
+    forces = surface_load(top.shape, mesh.points[top.nodes], t)
+    np.testing.assert_allclose(forces.sum(axis=1), t / 4, atol=1e-14)
+
+
+def test_loads_on_conditions_of_unknown_kind_are_refused():
+    mesh = kl.box()
+    (top,) = mesh.faces("z+")
+    odd = kl.Block("Odd4N", top.nodes, np.array([5]), np.array([0]), None)
+    part = kl.Part(nodes=top.nodes[0], conditions=np.array([0]))
+    mesh = kl.Mesh(mesh.points, mesh.blocks, conditions=[odd], parts={"lid": part})
+    for load in (kl.Traction("lid", (0, 0, 1)), kl.Pressure("lid", 1.0)):
+        with pytest.raises(
+            kl.ModelError, match=r"meets conditions of the unknown kind Odd4N \(the first is 5\)"
+        ):
+            nodal(mesh, load)
+
+
+def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
+    from kratos_lite.loads import ConditionLoads
+
+    mesh = faces_as_conditions(kl.box(), "z+", flip=False)
+    own, at_nodes = np.array([[1.0, 0, 0]]), np.zeros((8, 3))
+    at_nodes[:, 1] = 2 * mesh.points[:, 0]
+    load = ConditionLoads((own, at_nodes), (np.array([3.0]), np.zeros(8)))
+    forces = nodal(mesh, load)
+    np.testing.assert_allclose(forces.sum(axis=0), (1, 1, -3), atol=1e-14)
+    assert (mesh.points * forces[:, 1:2]).sum(axis=0)[0] == pytest.approx(2 / 3, rel=1e-13)
