@@ -1,8 +1,9 @@
 """Time one scene in kratos_lite and in Kratos, side by side: whole processes and phases, with the error.
 
-Scene: a unit block of n³ cells, clamped at the bottom, under gravity in three directions; read from one `.mdpa`
-file.  (The gravity cube cannot rank solvers: its load is one-dimensional.)  The displacements of the two
-must agree.  Needs the Kratos wheels: ``pip install ".[compare]"``.
+Scene: a unit block of n³ cells, clamped at the bottom, under gravity in three directions; read from
+one `.mdpa` file.  (The gravity cube cannot rank solvers: its load is one-dimensional.)  The
+displacements of the two must agree.
+Needs the Kratos wheels: ``pip install ".[compare]"``.
 
     python benchmarks/against_kratos.py --cells 10 16 --element 3D8N --runs 3
 """
@@ -37,11 +38,15 @@ for v in (KM.DISPLACEMENT, KM.REACTION, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD):
     part.AddNodalSolutionStepVariable(v)
 KM.ModelPartIO(sys.argv[1], KM.IO.READ | KM.IO.SKIP_TIMER).ReadModelPart(part)
 t = lap("read", t)
-for d, r in ((KM.DISPLACEMENT_X, KM.REACTION_X), (KM.DISPLACEMENT_Y, KM.REACTION_Y), (KM.DISPLACEMENT_Z, KM.REACTION_Z)):
-    KM.VariableUtils().AddDof(d, r, part)
+for axis in "XYZ":
+    displacement, reaction = (getattr(KM, f"{name}_{axis}") for name in ("DISPLACEMENT", "REACTION"))
+    KM.VariableUtils().AddDof(displacement, reaction, part)
 for p in part.Properties:
     p.SetValue(KM.CONSTITUTIVE_LAW, SMA.LinearElastic3DLaw())
-settings = KM.Parameters('{"solver_type": "amgcl", "tolerance": 1e-10, "max_iteration": 500, "block_size": 3, "use_block_matrices_if_possible": true}')
+settings = KM.Parameters(json.dumps({
+    "solver_type": "amgcl", "tolerance": 1e-10, "max_iteration": 500,
+    "block_size": 3, "use_block_matrices_if_possible": True,
+}))
 builder = KM.ResidualBasedBlockBuilderAndSolver(ConstructSolver(settings))
 scheme = KM.ResidualBasedIncrementalUpdateStaticScheme()
 strategy = KM.ResidualBasedLinearStrategy(part, scheme, builder, True, False, False, False)
@@ -64,7 +69,8 @@ phase["read"] = time.perf_counter() - t
 t = time.perf_counter()
 result = model.solve()
 phase["solve"] = time.perf_counter() - t
-json.dump({"phase": phase, "u": dict(zip(model.mesh.node_ids.tolist(), result.displacement().tolist()))}, open(sys.argv[2], "w"))
+u = dict(zip(model.mesh.node_ids.tolist(), result.displacement().tolist()))
+json.dump({"phase": phase, "u": u}, open(sys.argv[2], "w"))
 """
 
 
@@ -92,7 +98,9 @@ def run(code: str, path: Path, out: Path) -> tuple[float, dict]:
 
 def main() -> None:
     """Print a table: seconds (median), ratio Kratos / kratos_lite, largest difference of displacements."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cells", type=int, nargs="+", default=[8, 16])
     parser.add_argument("--element", default="3D8N")
     parser.add_argument("--runs", type=int, default=3)
@@ -102,10 +110,13 @@ def main() -> None:
         folder = Path(name)
         for n in options.cells:
             path = scene(folder, options.element, n)
-            runs = [(run(LITE, path, folder / "a"), run(KRATOS, path, folder / "b")) for _ in range(options.runs)]
+            runs = [
+                (run(LITE, path, folder / "a"), run(KRATOS, path, folder / "b")) for _ in range(options.runs)
+            ]
             for phase in ("import", "read", "solve", "process"):
                 pick = [
-                    [side[0] if phase == "process" else side[1]["phase"][phase] for side in pair] for pair in runs
+                    [side[0] if phase == "process" else side[1]["phase"][phase] for side in pair]
+                    for pair in runs
                 ]
                 ours, theirs = (statistics.median(column) for column in zip(*pick, strict=True))
                 label = f"{options.element} n={n}" if phase == "import" else ""

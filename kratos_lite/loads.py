@@ -13,6 +13,7 @@ from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, WhereElements
+from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
 
@@ -211,13 +212,18 @@ class ConditionLoads(Load):
 
     Parameters
     ----------
-    force : (c, 3) per condition and (n, 3) per node; Pa on faces, N/m on lines, N on points.
-    pressure : (c,) per condition and (n,) per node; Pa, positive against the normal about which
-        the nodes of the condition run counter-clockwise.
+    force : (c, 3) per condition; Pa on faces, N/m on lines, N on points.
+    nodal_force : (n, 3) per node, by the cell of the conditions that carry it.
+    pressure : (c,) per condition, Pa, positive against the normal about which the nodes of the
+        condition run counter-clockwise.
+    nodal_pressure : (n,) per node, Pa.
     """
 
-    def __init__(self, force: tuple[Array, Array], pressure: tuple[Array, Array]) -> None:
-        self.force, self.pressure = force, pressure
+    def __init__(
+        self, force: Array, nodal_force: dict[str, Array], pressure: Array, nodal_pressure: Array
+    ) -> None:
+        self.force, self.nodal_force = force, nodal_force
+        self.pressure, self.nodal_pressure = pressure, nodal_pressure
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return the nodal forces (n, 3) in N."""
@@ -226,14 +232,15 @@ class ConditionLoads(Load):
         for block in mesh.conditions:
             rows = slice(start, start + len(block))
             start += len(block)
-            _check_loadable(block, bool(self.force[0][rows].any()), bool(self.pressure[0][rows].any()))
+            _check_loadable(block, bool(self.force[rows].any()), bool(self.pressure[rows].any()))
+            _check_loadable(block, bool(self.force[rows].any()), bool(self.pressure[rows].any()))
             if block.shape is None or not len(block):
                 continue
             X = mesh.points[block.nodes]
-            force = self.force[0][rows, None, :] + self.force[1][block.nodes]
+            force = self.force[rows, None, :] + self.nodal_force[block.shape.cell][block.nodes]
             if force.any():
                 add_nodal(total, block.nodes, surface_load(block.shape, X, force))
-            pressure = self.pressure[0][rows, None] + self.pressure[1][block.nodes]
+            pressure = self.pressure[rows, None] + self.nodal_pressure[block.nodes]
             if pressure.any() and block.shape.cell in ("triangle", "quadrilateral"):
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
@@ -245,6 +252,18 @@ def _check_loadable(block: Block, force: bool, pressure: bool) -> None:
         raise ModelError(f"a load is given on conditions of the unknown kind {block.name}")
     if block.shape is not None and pressure and block.shape.cell not in ("triangle", "quadrilateral"):
         raise ModelError(f"a pressure acts on faces; {block.name} is not one")
+
+
+def check_loads(
+    loads: Sequence[Load], batches: Sequence[Batch], forces: Array, supports: Supports
+) -> list[str]:
+    """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
+    warnings = []
+    if any(isinstance(load, Gravity) for load in loads) and all(b.material.density == 0 for b in batches):
+        warnings.append("gravity acts on no mass: every material has density 0; give density in kg/m³")
+    elif forces.any() and not forces[~supports.fixed].any() and not supports.values.any():
+        warnings.append("all loads act on fixed components, so nothing moves")
+    return warnings
 
 
 def outward_signs(mesh: Mesh, block: Block) -> Array:

@@ -170,7 +170,7 @@ class Mesh:
             raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
         have = ", ".join(self.parts) or "none"
         raise MeshError(
-            f"there is no part {name!r}; the parts are {have} and the sides x- … z+.{nearest(name, self.parts)}"
+            f"there is no part {name!r}; have {have} and the sides x- … z+.{nearest(name, self.parts)}"
         )
 
     def _side(self, axis: int, end: int) -> Ints:

@@ -96,7 +96,31 @@ def check_joints(mesh: Mesh) -> list[str]:
             f"{len(open_)} pairs of elements ({a} and {b}) share the corners of a face but not its further "
             "nodes: the face can gape; use the same order on both sides"
         )
+    halves = _halved_squares(mesh, key)
+    if len(halves):
+        warnings.append(
+            f"{len(halves)} four-sided faces (the first of element {ids[halves[0]]}) meet triangles: "
+            "the faces can gape; put a pyramid or a wedge between"
+        )
     return warnings
+
+
+def _halved_squares(mesh: Mesh, key: NDArray[np.uint64]) -> Ints:
+    """Return the elements with a four-sided face of which three corners are a triangular face."""
+    squares, triangles, elements, start = [], [], [np.zeros(0, np.int64)], 0
+    for block in mesh.blocks:
+        for face in block.shape.faces if block.shape is not None else ():
+            if len(face) in (3, 6):
+                triangles.append(key[block.nodes[:, list(face[:3])]].sum(axis=1))
+            else:
+                squares.append(key[block.nodes[:, list(face[:4])]])
+                elements.append(np.arange(start, start + len(block)))
+        start += len(block)
+    if not (squares and triangles):
+        return elements[0]
+    corner = np.concatenate(squares)
+    three = corner.sum(axis=1, keepdims=True) - corner
+    return np.concatenate(elements)[np.isin(three, np.concatenate(triangles)).any(axis=1)]
 
 
 def bodies(mesh: Mesh) -> tuple[Ints, Ints, Ints]:

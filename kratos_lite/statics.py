@@ -15,6 +15,7 @@ from kratos_lite import checks, solvers
 from kratos_lite.assembly import Pattern, Progress, assemble_dense, assemble_stiffness, internal_load
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.loads import check_loads
 from kratos_lite.result import Report, Result, peak_memory
 from kratos_lite.supports import Reduction, reduction, rigid_modes
 
@@ -56,7 +57,7 @@ def solve_static(
         loads = external_loads(model, batches)
         forces = loads - initial_loads(model, batches)
     active, local = renumber(model, batches, forces)
-    warnings += checks.check_loads(model.loads, batches, forces, model.supports)
+    warnings += check_loads(model.loads, batches, forces, model.supports)
     points = model.mesh.points[active]
     reduced = reduction(model.supports, active)
     f = forces[active].ravel()

@@ -12,20 +12,22 @@ import kratos_lite
 PACKAGE = Path(kratos_lite.__file__).parent
 FLOORS = [
     {"errors"},
-    {"registry", "voigt"},
+    {"registry", "voigt", "arguments"},
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},
-    {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output", "io.strict_json"},
-    {"assembly", "loads", "checks", "testing", "solvers", "view"},
+    {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},
+    {"assembly", "loads", "mobility", "solvers", "testing", "view"},
+    {"checks"},
     {"io.mdpa", "io.elem", "io.vtu", "io.bridge"},
-    {"io.results"},
+    {"io.results", "io.documents"},
     {"result"},
     {"statics"},
     {"model"},
     {"io.kratos", "io.describe"},
     {"io.project"},
     {"io.files"},
-    {"cli", "__main__"},
+    {"cli"},
+    {"__main__"},
 ]
 """Each module (or package) imports only from floors above it in this list."""
 
@@ -83,7 +85,11 @@ def test_imports_point_to_floors_below(module, path):
 
 @pytest.mark.parametrize("package", ["pyamg", "meshio", "matplotlib"])
 def test_heavy_packages_appear_in_one_file_each(package):
-    users = [name for name, path in MODULES if f"import {package}" in path.read_text() or f"from {package}" in path.read_text()]
+    users = [
+        name
+        for name, path in MODULES
+        if f"import {package}" in path.read_text() or f"from {package}" in path.read_text()
+    ]
     assert len(users) == 1
 
 
@@ -125,5 +131,6 @@ def test_unknown_public_name_is_an_attribute_error():
 )
 def test_style(command):
     pytest.importorskip(command[0])
-    run = subprocess.run([sys.executable, "-m", *command], cwd=PACKAGE.parent, capture_output=True, text=True)
+    words = [sys.executable, "-m", *command]
+    run = subprocess.run(words, cwd=PACKAGE.parent, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr

@@ -15,7 +15,7 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
         prog="kratos-lite",
-        description="Finite elements for solids: from an input file to displacements, reactions and stresses.",
+        description="Finite elements for solids: from an input file to displacements and stresses.",
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

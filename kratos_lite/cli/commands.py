@@ -13,6 +13,7 @@ from kratos_lite.errors import InputError, ModelError
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
+    from kratos_lite.model import Model
     from kratos_lite.result import Result
 
 
@@ -45,7 +46,7 @@ def solve(options: Namespace) -> int:
     for path in (options.output, options.json, options.picture):
         if path and not Path(path).parent.is_dir():
             raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
-    solver, tolerance = options.solver or "auto", options.tolerance or 1e-10
+    solver, tolerance = options.solver or "auto", 1e-10
     project = None
     if Path(options.input).suffix.lower() == ".json":
         from kratos_lite.io.project import read_project
@@ -53,11 +54,13 @@ def solve(options: Namespace) -> int:
         project = read_project(options.input)
         model = project.model
         solver = options.solver or project.solver
-        tolerance = options.tolerance or project.tolerance
+        tolerance = project.tolerance
     else:
         from kratos_lite.io.files import read
 
         model = read(options.input, materials=not options.material, strict=not options.lenient)
+    if options.tolerance is not None:
+        tolerance = options.tolerance
     apply(model, options)
     read_seconds = perf_counter() - start
     progress = TerminalProgress()
@@ -106,8 +109,18 @@ def info(options: Namespace) -> int:
 
 
 def _document(options: Namespace) -> Document:
-    from kratos_lite.io.files import read_document
+    """Return what a file says; of a run file, what the model says that it means."""
+    from kratos_lite.io.document import Note
+    from kratos_lite.io.documents import read_document
 
+    if Path(options.input).suffix.lower() == ".json":
+        from kratos_lite.io.kratos import document_from
+        from kratos_lite.io.project import read_project
+
+        model = read_project(options.input).model
+        document = document_from(model)
+        document.notes += [Note(0, text) for text in model.notes]
+        return document
     return read_document(options.input, strict=not options.lenient)
 
 
@@ -124,17 +137,28 @@ def check(options: Namespace) -> int:
         from kratos_lite.io.kratos import model_from
 
         model = model_from(_document(options))
-    warnings, needs = model.check_geometry(), []
+    model.check_geometry()
+    needs = []
     try:
         warnings = model.check()
     except ModelError as error:
         needs.append(str(error))
+        warnings = _warnings_when_held(model)
     print(f"{path}: {model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements, no errors")
     for text in (*warnings, *model.notes):
         print(f"note     {text}")
     for text in needs:
         print(f"to solve {text}")
     return 0
+
+
+def _warnings_when_held(model: Model) -> list[str]:
+    """Return the warnings of a model that cannot be solved yet: they do not depend on what it lacks."""
+    from kratos_lite.materials import Isotropic3D
+
+    held = type(model)(model.mesh, Isotropic3D(E=1.0, nu=0.0))
+    held.fix(range(model.mesh.n_nodes))
+    return held.check()
 
 
 def _check_python(path: Path) -> int:

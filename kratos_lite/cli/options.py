@@ -63,7 +63,8 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
         elif part is None:
             part = name
         else:
-            raise InputError(f"{option}: {name!r} is no material;{nearest(name, MATERIALS)}")
+            known = ", ".join(MATERIALS)
+            raise InputError(f"{option}: {name!r} is no material; have {known}.{nearest(name, MATERIALS)}")
     kind: Any = MATERIALS[law]
     known = list(kind.variables)
     values: dict[str, float] = {}

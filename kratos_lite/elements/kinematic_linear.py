@@ -89,7 +89,7 @@ class KinematicLinear:
     >>> from kratos_lite import Isotropic3D, KinematicLinear3D8N
     >>> element = KinematicLinear3D8N(0.5 * KinematicLinear3D8N.nodes)
     >>> K = element.stiffness(Isotropic3D(E=210e6, nu=0.3).C)
-    >>> K.shape, float(element.volume())
+    >>> K.shape, round(float(element.volume()), 12)
     ((24, 24), 1.0)
     """
 

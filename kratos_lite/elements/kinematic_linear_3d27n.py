@@ -1,4 +1,4 @@
-"""KinematicLinear3D27N: twenty-seven-node hexahedron, 3x3x3 points; exact for quadratics on distorted cells."""
+"""KinematicLinear3D27N: twenty-seven-node hexahedron, exact for quadratics on distorted cells."""
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import hexahedron

@@ -1,7 +1,7 @@
 """Document: what a file says, before anything is made of it.
 
 The readers of `.mdpa` and `.elem` fill one, the `.mdpa` writer writes one, and
-``kratos_lite.io.kratos`` turns it into a Model.
+``kratos_lite.io.kratos.to_model`` turns it into a Model.
 """
 
 from __future__ import annotations

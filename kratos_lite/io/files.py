@@ -6,49 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
+from kratos_lite.io.documents import ELEM_SET, ending, read_document
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
     from kratos_lite.model import Model
-
-ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
-
-
-def ending(path: str | Path) -> str:
-    """Return the ending of a path in lower case, without ``.gz``.
-
-    >>> ending("beam.MDPA.gz")
-    '.mdpa'
-    """
-    suffixes = [s.lower() for s in Path(path).suffixes]
-    if suffixes and suffixes[-1] == ".gz":
-        suffixes.pop()
-    return suffixes[-1] if suffixes else ""
-
-
-def read_document(path: str | Path, *, strict: bool = True) -> Document:
-    """Return what a model file says: .mdpa, any file of an .elem set or its stem, or what meshio reads.
-
-    `strict` refuses `.mdpa` rows that do not stand on lines of their own.
-    """
-    path = Path(path)
-    kind = ending(path)
-    if kind == ".mdpa":
-        from kratos_lite.io.mdpa import read_mdpa
-
-        return read_mdpa(path, strict=strict)
-    is_stem = not path.is_file() and any(path.with_name(path.name + s).is_file() for s in (".elem", ".node"))
-    if kind in ELEM_SET or is_stem:
-        from kratos_lite.io.elem import read_elem
-
-        return read_elem(path)
-    if not path.exists():
-        raise InputError(f"{path}: there is no such file")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
-    from kratos_lite.io.bridge import read_meshio
-
-    return read_meshio(path)
 
 
 def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Model:
@@ -89,7 +51,7 @@ def write(path: str | Path, thing: Any) -> None:
     if isinstance(thing, Result):
         thing.save(path)
     elif isinstance(thing, Model):
-        from kratos_lite.io.export import document_from
+        from kratos_lite.io.kratos import document_from
 
         write_document(path, document_from(thing))
     elif isinstance(thing, Mesh):
@@ -104,7 +66,7 @@ def write_document(path: str | Path, document: Document) -> list[str]:
     """Write a document by the ending of `path`; return notes on what the format cannot hold."""
     kind = ending(path)
     if kind == ".mdpa":
-        from kratos_lite.io.mdpa_write import write_mdpa
+        from kratos_lite.io.mdpa import write_mdpa
 
         write_mdpa(path, document)
         return []
@@ -125,6 +87,14 @@ def write_document(path: str | Path, document: Document) -> list[str]:
         from kratos_lite.io.bridge import write_meshio
 
         write_meshio(path, document.mesh, points, cells)
-    lost = ["properties", "nodal_data", "element_data", "condition_data", "constraints", "tables", "model_data"]
+    lost = [
+        "properties",
+        "nodal_data",
+        "element_data",
+        "condition_data",
+        "constraints",
+        "tables",
+        "model_data",
+    ]
     kept = [name for name in lost if getattr(document, name)]
     return [f"{kind} files hold meshes only; left out: {', '.join(kept)}"] if kept else []

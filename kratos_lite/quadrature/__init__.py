@@ -116,7 +116,10 @@ def tetrahedron(degree: int) -> Rule:
         return Rule(*_orbits(3, [(1 / 4, (1 - 3 * a, a, a, a))]), 2, "Stroud T3:2-1")
     if degree in (4, 5):
         c = (10 - 2 * sqrt(15)) / 40
-        orbits: list[tuple[float, tuple[float, ...]]] = [(16 / 135, (1 / 4,) * 4), (10 / 189, (c, c, 1 / 2 - c, 1 / 2 - c))]
+        orbits: list[tuple[float, tuple[float, ...]]] = [
+            (16 / 135, (1 / 4,) * 4),
+            (10 / 189, (c, c, 1 / 2 - c, 1 / 2 - c)),
+        ]
         for s in (1, -1):
             a = (7 - s * sqrt(15)) / 34
             orbits.append(((2665 + s * 14 * sqrt(15)) / 37800, (1 - 3 * a, a, a, a)))

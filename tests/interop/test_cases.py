@@ -78,7 +78,9 @@ def test_displacements_reactions_and_stresses_are_those_of_kratos(shared, name):
         assert np.abs(result.reaction().sum(axis=0) - total).max() <= 1e-9 * scale
         volume = sum(float(batch.at(model.mesh.points).volume().sum()) for batch in result.batches)
         assert abs(volume / reference["volume"] - 1) <= 1e-9
-        if "TotalLagrangian" not in model.mesh.blocks[0].name:  # Kratos gives their stress before the solution
+        if (
+            "TotalLagrangian" not in model.mesh.blocks[0].name
+        ):  # Kratos gives their stress before the solution
             stress = np.concatenate(list(result.stress("gauss")))
             for extreme, of in (("stress_max", stress.max(axis=0)), ("stress_min", stress.min(axis=0))):
                 kratos = np.array(reference["summary"][extreme])

@@ -309,7 +309,6 @@ def test_the_same_folder_runs_in_kratos_and_here(folder, content):
         assert [line.split()[4] for line in lines.evaluate(result)] == ["passed"] * 4
 
 
-@pytest.mark.xfail(reason="nodal loads of points also load the faces that share the nodes")
 def test_nodal_point_load_acts_once_where_faces_share_the_node(folder):
     load = process("assign_scalar_variable_process", "Tips", "POINT_LOAD_Y", value=7.0, constrained=False)
     report = solved(folder, run_file([CLAMP], [load])).report

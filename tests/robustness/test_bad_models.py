@@ -289,3 +289,21 @@ def test_one_gauss_point_still_gives_a_constant_stress_at_the_nodes(nodes):
     model.use_rule(1)
     model.fix(np.arange(mesh.n_nodes), "xyz", 1e-3 * mesh.points)
     np.testing.assert_allclose(model.solve().stress("node")[:, :3], 525e3, rtol=1e-10)
+
+
+def test_a_square_that_meets_two_triangles_is_reported():
+    low, high = kl.box(), kl.box(element=kind(4), origin=(0, 0, 1))
+    points = np.vstack([low.points, high.points])
+    unique, merged = np.unique(points, axis=0, return_inverse=True)
+    merged = merged.ravel()
+    blocks = [block(merged[low.blocks[0].nodes]), block(merged[high.blocks[0].nodes + 8], 4)]
+    warnings = model_of(kl.Mesh(unique, blocks)).solve().report.warnings
+    assert any("1 four-sided faces (the first of element 1) meet triangles" in text for text in warnings)
+
+
+@pytest.mark.parametrize("nodes", KINDS)
+def test_sound_meshes_of_every_kind_give_no_warning(nodes):
+    assert model_of(kl.box(cells=(2, 2, 2), element=kind(nodes))).check() == []
+    wheel = kl.Model(kl.annulus(1.0, 2.0, 0.5, (1, 5, 1), kind(nodes)), STEEL)
+    wheel.fix("inner")
+    assert wheel.check() == []

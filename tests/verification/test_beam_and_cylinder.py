@@ -61,7 +61,6 @@ CYLINDER = {
 EXACT = {0.3: 4.5825e-3, 0.4999: 5.062275e-3}
 
 
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 @pytest.mark.parametrize("nodes", [8, 4, 10, 20, 27])
 def test_thick_cylinder(nodes, nu):

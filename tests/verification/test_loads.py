@@ -103,12 +103,10 @@ def test_pressure_follows_the_node_order_of_conditions_only_if_told_so(flip):
 def test_pressure_on_a_face_inside_the_body_is_refused():
     mesh = kl.box(cells=(1, 1, 2))
     inside = np.flatnonzero(mesh.points[:, 2] == 0.5)[[0, 1, 3, 2]]
-    shape = kl.KinematicLinear3D8N.shape
     quad = mesh.boundary[0].shape
     skin = kl.Block("Surface", inside[None].astype(np.int32), np.array([9]), np.array([0]), quad)
     part = kl.Part(nodes=inside, conditions=np.array([0]))
     mesh = kl.Mesh(mesh.points, mesh.blocks, conditions=[skin], parts={"cut": part})
-    assert shape.corners == 8
     with pytest.raises(kl.ModelError, match=r"face 9 \(Surface\) is not on the boundary"):
         nodal(mesh, kl.Pressure("cut", 1.0))
 
@@ -169,7 +167,7 @@ def test_a_point_load_acts_on_each_node_once_and_loads_add_up():
     np.testing.assert_allclose(result.report.total_reaction, (-4, -4, -24), rtol=1e-12)
 
 
-def test_faces_of_mixed_cells_carry_the_whole_load(split):
+def test_faces_of_mixed_cells_carry_the_whole_load():
     """Two wedges and a brick share a square; the traction covers the squares and triangles of a side."""
     brick, wedge = kl.box(), kl.box(element=kind(6), origin=(0, 1, 0))
     points = np.vstack([brick.points, wedge.points])
@@ -216,7 +214,19 @@ def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
     mesh = faces_as_conditions(kl.box(), "z+", flip=False)
     own, at_nodes = np.array([[1.0, 0, 0]]), np.zeros((8, 3))
     at_nodes[:, 1] = 2 * mesh.points[:, 0]
-    load = ConditionLoads((own, at_nodes), (np.array([3.0]), np.zeros(8)))
+    load = ConditionLoads(own, {"quadrilateral": at_nodes}, np.array([3.0]), np.zeros(8))
     forces = nodal(mesh, load)
     np.testing.assert_allclose(forces.sum(axis=0), (1, 1, -3), atol=1e-14)
     assert (mesh.points * forces[:, 1:2]).sum(axis=0)[0] == pytest.approx(2 / 3, rel=1e-13)
+
+
+def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
+    from kratos_lite.loads import ConditionLoads
+    from kratos_lite.shapes import Line2
+
+    box = kl.box()
+    line = kl.Block("Line", np.array([[1, 3]], dtype=np.int32), np.array([1]), np.array([0]), Line2)
+    mesh = kl.Mesh(box.points, box.blocks, conditions=[line])
+    load = ConditionLoads(np.zeros((1, 3)), {"line": np.zeros((8, 3))}, np.ones(1), np.zeros(8))
+    with pytest.raises(kl.ModelError, match="a pressure acts on faces; Line is not one"):
+        nodal(mesh, load)

@@ -7,9 +7,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from kratos_lite.io.document import Data, Properties
-from kratos_lite.io.elem_files import FIX, INIT, MATRIX, VECTOR, ElemFiles
-from kratos_lite.io.elem_grammar import Form, Run, Source
-from kratos_lite.io.elem_mesh import twice
+from kratos_lite.io.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
+from kratos_lite.io.elem.grammar import Form, Run, Source
+from kratos_lite.io.elem.mesh import twice
 from kratos_lite.mesh import Floats, Mesh
 
 VECTORS = frozenset((b"DISPLACEMENT", b"VELOCITY", b"ACCELERATION", b"ROTATION", b"REACTION"))

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.mdpa_rows import TRUTH, Layout, read_rows
-from kratos_lite.io.mdpa_scan import NAME, WORD, Frame, Source, Span
+from kratos_lite.io.mdpa.rows import TRUTH, Layout, read_rows
+from kratos_lite.io.mdpa.scan import NAME, WORD, Frame, Source, Span
 from kratos_lite.io.text import real, shown
 from kratos_lite.materials import MATERIALS
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.io.document import Note
-from kratos_lite.io.mdpa_rows import Layout, read_rows
-from kratos_lite.io.mdpa_scan import LISTS, Frame, Source
-from kratos_lite.io.mdpa_values import read_values
+from kratos_lite.io.mdpa.rows import Layout, read_rows
+from kratos_lite.io.mdpa.scan import LISTS, Frame, Source
+from kratos_lite.io.mdpa.values import read_values
 from kratos_lite.mesh import Part
 
 Ints = NDArray[np.int64]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.document import Note
-from kratos_lite.io.elem_grammar import Form, Run, Source
+from kratos_lite.io.elem.grammar import Form, Run, Source
 
 ENDINGS = (".node", ".elem", ".cond", ".prop", ".init")
 REQUIRED = (".node", ".elem")

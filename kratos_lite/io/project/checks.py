@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.case import Case, interval_of
-from kratos_lite.io.expressions import evaluate
-from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
+from kratos_lite.io.project.case import Case, interval_of
+from kratos_lite.io.project.expressions import evaluate
+from kratos_lite.io.project.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.result import Result
 
 Array = NDArray[np.float64]

@@ -14,7 +14,12 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model import Model
 
 Array = NDArray[np.float64]
-LOADS = {"point": "POINT_LOAD", "line": "LINE_LOAD", "triangle": "SURFACE_LOAD", "quadrilateral": "SURFACE_LOAD"}
+LOADS = {
+    "point": "POINT_LOAD",
+    "line": "LINE_LOAD",
+    "triangle": "SURFACE_LOAD",
+    "quadrilateral": "SURFACE_LOAD",
+}
 """Variable that loads a condition, by its cell."""
 PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
 VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
@@ -91,26 +96,25 @@ class Variables:
     def _condition_loads(self, model: Model) -> ConditionLoads | None:
         mesh = self.mesh
         force = np.zeros((mesh.n_conditions, 3))
-        nodal_force = np.zeros((mesh.n_nodes, 3))
+        nodal_force = {cell: self._vector(self.nodal, name, mesh.n_nodes) for cell, name in LOADS.items()}
         carried: set[str] = set()
         start = 0
         for block in mesh.conditions:
             rows = slice(start, start + len(block))
             start += len(block)
-            if block.shape is None or not len(block):
-                continue
-            variable = LOADS[block.shape.cell]
-            carried.add(variable)
-            force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
-            nodal_force[block.nodes] = self._vector(self.nodal, variable, mesh.n_nodes)[block.nodes]
+            if block.shape is not None and len(block):
+                variable = LOADS[block.shape.cell]
+                carried.add(variable)
+                force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
         self._note_idle(model, carried)
         zero, nodal_zero = np.zeros(mesh.n_conditions), np.zeros(mesh.n_nodes)
         positive, negative = PRESSURES
         pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
         nodal_pressure = self.nodal.get(positive, nodal_zero) - self.nodal.get(negative, nodal_zero)
-        if not (force.any() or nodal_force.any() or pressure.any() or nodal_pressure.any()):
+        values = (force, *nodal_force.values(), pressure, nodal_pressure)
+        if not carried or not any(value.any() for value in values):
             return None
-        return ConditionLoads((force, nodal_force), (pressure, nodal_pressure))
+        return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
 
     def _note_idle(self, model: Model, carried: set[str]) -> None:
         """Note load values that no condition carries."""

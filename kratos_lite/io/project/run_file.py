@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from kratos_lite.errors import InputError, KratosLiteError, Problems
-from kratos_lite.io.files import ending, read_document
-from kratos_lite.io.kratos import model_from
-from kratos_lite.io.run_checks import Check
-from kratos_lite.io.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.strict_json import Object
+from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.io.project.checks import Check
+from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
+from kratos_lite.io.project.strict_json import Object
 from kratos_lite.loads import Gravity, Load, PointLoad, Pressure, Traction
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model import Model
@@ -72,7 +72,7 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Project:
     """
     settings, folder = read_settings(path), Path(path).parent
     if "solver_settings" in settings or "problem_data" in settings:
-        from kratos_lite.io.kratos_project import read_kratos_project
+        from kratos_lite.io.project.kratos import read_kratos_project
 
         model, checks = read_kratos_project(settings, folder, allow_outside)
         return Project(model, checks=checks)

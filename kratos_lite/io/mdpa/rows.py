@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.io.mdpa_scan import Source, Span
+from kratos_lite.io.mdpa.scan import Source, Span
 from kratos_lite.io.text import MAX_ID, integer, real, shown
 
 BLANKS = b" \t\n\v\f"

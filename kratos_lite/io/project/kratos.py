@@ -8,14 +8,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from kratos_lite.errors import Problems, nearest
-from kratos_lite.io.case import Case, module_of, times_of
 from kratos_lite.io.document import Document
-from kratos_lite.io.files import read_document
-from kratos_lite.io.kratos import check_elements, model_from
-from kratos_lite.io.kratos_materials import materials_of
-from kratos_lite.io.processes import PROCESSES, Action, actions_of, run
-from kratos_lite.io.run_checks import CHECKS, Check
-from kratos_lite.io.settings import Settings, find_file, read_settings
+from kratos_lite.io.documents import read_document
+from kratos_lite.io.kratos.to_model import check_elements, model_from
+from kratos_lite.io.project.case import Case, module_of, times_of
+from kratos_lite.io.project.checks import CHECKS, Check
+from kratos_lite.io.project.materials import materials_of
+from kratos_lite.io.project.processes import PROCESSES, Action, actions_of, run
+from kratos_lite.io.project.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.model import Model
 

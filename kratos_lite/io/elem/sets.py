@@ -11,9 +11,9 @@ import numpy as np
 
 from kratos_lite.errors import Problems
 from kratos_lite.io.document import Data, Document, Note
-from kratos_lite.io.elem_data import read_nodal_data, read_properties, use_properties
-from kratos_lite.io.elem_files import ElemFiles, stem
-from kratos_lite.io.elem_mesh import read_mesh
+from kratos_lite.io.elem.data import read_nodal_data, read_properties, use_properties
+from kratos_lite.io.elem.files import ElemFiles, stem
+from kratos_lite.io.elem.mesh import read_mesh
 from kratos_lite.io.output import write_whole
 from kratos_lite.mesh import Block, Mesh
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Note
-from kratos_lite.io.mdpa_rows import Layout, Rows, read_rows, width_of_first_line
-from kratos_lite.io.mdpa_scan import Frame, Source
+from kratos_lite.io.mdpa.rows import Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import FACE_SHAPES

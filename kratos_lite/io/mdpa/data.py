@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.io.document import Constraint, Data, Note
-from kratos_lite.io.mdpa_rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
-from kratos_lite.io.mdpa_scan import WORD, Frame, Source
-from kratos_lite.io.mdpa_values import kind_of, note_unknown, value_at
+from kratos_lite.io.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.mdpa.scan import WORD, Frame, Source
+from kratos_lite.io.mdpa.values import kind_of, note_unknown, value_at
 from kratos_lite.io.text import integer, real, shown
 
 Ints = NDArray[np.int64]

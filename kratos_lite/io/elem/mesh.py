@@ -9,8 +9,8 @@ from itertools import groupby
 import numpy as np
 
 from kratos_lite.io.document import Note
-from kratos_lite.io.elem_files import ElemFiles
-from kratos_lite.io.elem_grammar import Run
+from kratos_lite.io.elem.files import ElemFiles
+from kratos_lite.io.elem.grammar import Run
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import Block, Ints, Mesh
 from kratos_lite.shapes import Shape

@@ -6,6 +6,7 @@ from dataclasses import fields as constants_of
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
@@ -14,6 +15,9 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.model import Model
 from kratos_lite.shapes import Point1
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": "LinearElasticOrthotropic3DLaw"}
 
@@ -40,7 +44,12 @@ def document_from(model: Model) -> Document:
         forces += load.forces(mesh, model.batches())
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
     copy = Mesh(
-        mesh.points, blocks, node_ids=mesh.node_ids, conditions=conditions, parts=_parts(mesh), source=mesh.source
+        mesh.points,
+        blocks,
+        node_ids=mesh.node_ids,
+        conditions=conditions,
+        parts=_parts(mesh),
+        source=mesh.source,
     )
     document = Document(copy, properties, nodal_data=[*_fixed(model), *data], constraints=_links(model))
     if mesh.conditions:
@@ -48,14 +57,14 @@ def document_from(model: Model) -> Document:
     return document
 
 
-def _split_loads(model: Model) -> tuple[np.ndarray[Any, Any], list[Any]]:
+def _split_loads(model: Model) -> tuple[Array, list[Any]]:
     """Return the gravity that acts on the whole body and the other loads."""
     whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and g.force.ndim == 1]
     gravity = sum((g.force for g in whole), np.zeros(3))
     return gravity, [load for load in model.loads if load not in whole]
 
 
-def _properties(model: Model, gravity: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], dict[int, Properties]]:
+def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:
     """Return the property id of each element, one per material, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
     found: dict[int, Properties] = {}
@@ -71,7 +80,7 @@ def _properties(model: Model, gravity: np.ndarray[Any, Any]) -> tuple[np.ndarray
     return numbers, found
 
 
-def _values(material: LinearMaterial, gravity: np.ndarray[Any, Any]) -> dict[str, Any]:
+def _values(material: LinearMaterial, gravity: Array) -> dict[str, Any]:
     name = type(material).__name__
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; .mdpa files hold {', '.join(KRATOS_LAW)}")
@@ -94,7 +103,7 @@ def _fixed(model: Model) -> list[Data]:
     return found
 
 
-def _point_loads(mesh: Mesh, forces: np.ndarray[Any, Any], properties: int) -> tuple[list[Block], list[Data]]:
+def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block], list[Data]]:
     rows = np.flatnonzero((forces != 0).any(axis=1))
     if not len(rows):
         return [], []

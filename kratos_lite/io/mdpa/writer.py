@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document
-from kratos_lite.io.mdpa_parts import PART_NAME
-from kratos_lite.io.mdpa_scan import NAME
-from kratos_lite.io.mdpa_values import Table, kind_of
+from kratos_lite.io.mdpa.parts import PART_NAME
+from kratos_lite.io.mdpa.scan import NAME
+from kratos_lite.io.mdpa.values import Table, kind_of
 from kratos_lite.io.output import write_whole
 from kratos_lite.mesh import NO_ROWS, Block, Ints, Mesh, Part
 

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
 from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.variables import Variables
+from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.loads import BodyForce, Gravity
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import Block
@@ -96,7 +96,9 @@ def _apply_properties(model: Model, properties: Properties, materials: bool, pro
         except KratosLiteError as error:
             line = _line_of(properties, str(error))
             unknown = [v for v in values if v not in ELASTIC | {"DENSITY"} and nearest(v, ELASTIC)]
-            hint = "".join(f"; found {v!r} at line {properties.lines.get(v, 0)}:{nearest(v, ELASTIC)}" for v in unknown)
+            hint = "".join(
+                f"; found {v!r} at line {properties.lines.get(v, 0)}:{nearest(v, ELASTIC)}" for v in unknown
+            )
             problems.add(f"Properties {where}: {error}{hint}", line)
             return
         if material is not None:
@@ -160,7 +162,7 @@ def _apply_volume_loads(model: Model, properties: Properties, problems: Problems
     where = properties.id
     if a.any() and g.any() and (a != g).any():
         problems.add(
-            f"Properties {where} has both VOLUME_ACCELERATION {a.tolist()} and GRAVITY {g.tolist()}; keep one",
+            f"Properties {where} has VOLUME_ACCELERATION {a.tolist()} and GRAVITY {g.tolist()}; keep one",
             properties.lines.get("GRAVITY"),
         )
         return
@@ -169,7 +171,7 @@ def _apply_volume_loads(model: Model, properties: Properties, problems: Problems
         model.add(Gravity(acceleration, where))
         if b.any():
             model.notes.append(
-                f"Properties {where}: BODY_FORCE is ignored because density × gravity is the body force already"
+                f"Properties {where}: BODY_FORCE is ignored: density × gravity is the body force already"
             )
     elif b.any():
         model.add(BodyForce(b, where))
@@ -187,7 +189,7 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
             values.fix(data.variable, rows[known & data.fixed])
         elif data.variable.startswith("DISPLACEMENT") and data.values.any():
             model.notes.append(
-                f"line {data.line}: initial values of {data.variable} do not matter to a static linear solution"
+                f"line {data.line}: initial values of {data.variable} do not matter in linear statics"
             )
     if document.condition_data:
         ids = np.concatenate([np.zeros(0, dtype=np.int64), *(block.ids for block in mesh.conditions)])
@@ -208,7 +210,9 @@ def _link(model: Model, document: Document) -> None:
     for constraint in document.constraints:
         dofs = [constraint.slave, *constraint.masters]
         if not all(name in ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z") for _, name in dofs):
-            model.notes.append(f"line {constraint.line}: constraint {constraint.id} is not on displacements; ignored")
+            model.notes.append(
+                f"line {constraint.line}: constraint {constraint.id} is not on displacements; ignored"
+            )
             continue
         slave, *masters = [(int(rows([node])[0]), name[-1].lower()) for node, name in dofs]
         weights: dict[tuple[int, str], float] = {}

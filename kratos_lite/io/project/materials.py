@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
-from kratos_lite.io.case import Case
 from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.kratos import ELASTIC, material_from
-from kratos_lite.io.settings import Settings, is_number, shown
+from kratos_lite.io.kratos.to_model import ELASTIC, material_from
+from kratos_lite.io.project.case import Case
+from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 
 USED = ELASTIC | {

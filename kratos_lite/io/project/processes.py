@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.case import Case, Interval, interval_of
-from kratos_lite.io.expressions import evaluate
-from kratos_lite.io.settings import Settings, is_number, shown
-from kratos_lite.io.variables import PRESSURES, VECTORS, Variables
+from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
+from kratos_lite.io.project.case import Case, Interval, interval_of
+from kratos_lite.io.project.expressions import evaluate
+from kratos_lite.io.project.settings import Settings, is_number, shown
 
 Array = NDArray[np.float64]
 Value = float | str

@@ -10,11 +10,11 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.mdpa_data import read_constraints, read_data
-from kratos_lite.io.mdpa_mesh import read_blocks, read_mesh, repeated
-from kratos_lite.io.mdpa_parts import PartReader
-from kratos_lite.io.mdpa_scan import TOP, Frame, Source, scan
-from kratos_lite.io.mdpa_values import Table, read_table, read_values
+from kratos_lite.io.mdpa.data import read_constraints, read_data
+from kratos_lite.io.mdpa.mesh import read_blocks, read_mesh, repeated
+from kratos_lite.io.mdpa.parts import PartReader
+from kratos_lite.io.mdpa.scan import TOP, Frame, Source, scan
+from kratos_lite.io.mdpa.values import Table, read_table, read_values
 from kratos_lite.io.text import blank_comments, integer, read_bytes
 from kratos_lite.mesh import NO_ROWS, Block, Ints
 
