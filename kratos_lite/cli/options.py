@@ -63,8 +63,8 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
         elif part is None:
             part = name
         else:
-            known = ", ".join(MATERIALS)
-            raise InputError(f"{option}: {name!r} is no material; have {known}.{nearest(name, MATERIALS)}")
+            laws = ", ".join(MATERIALS)
+            raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
     kind: Any = MATERIALS[law]
     known = list(kind.variables)
     values: dict[str, float] = {}

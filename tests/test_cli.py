@@ -1,0 +1,524 @@
+"""The command line as a person uses it: commands, options, files in and out, and what goes wrong."""
+
+import gzip
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.cli import commands, main
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+GRAVITY_CUBE = EXAMPLES / "gravity_cube.mdpa"
+SINKS = 7620 * 9.81 * 0.5 / (210e6 * 0.7 / (1.3 * 0.4))
+"""Displacement of the top of the gravity cube, m."""
+STEEL = "E=210e9,nu=0.3,density=7850"
+LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
+HELD = ("--material", STEEL, "--fix", "z-:xyz")
+COMMANDS = ("solve", "info", "check", "convert")
+
+
+class Outcome:
+    """Exit code, standard output and standard error of a command."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    def refuses(self, *fragments):
+        """Show that the command ends with one error that says all fragments, and nothing else."""
+        assert self.code == 2
+        assert self.out == ""
+        assert self.err.startswith("error: ")
+        assert "Traceback" not in self.err
+        for fragment in fragments:
+            assert fragment in self.err
+        return True
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command in this process: ``run("solve", path, …)``."""
+
+    def call(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as end:
+            code = end.code
+        return Outcome(code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return an empty folder, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def box(folder):
+    """Return a small mesh that lies in the folder as box.vtu, box.msh and box.mdpa."""
+    mesh = kl.box(cells=(2, 2, 2))
+    for ending in ("vtu", "msh"):
+        kl.write(f"box.{ending}", mesh)
+    kl.write("box.mdpa", kl.Model(mesh, LAW))
+    return mesh
+
+
+def held(mesh):
+    model = kl.Model(mesh, LAW)
+    model.fix("z-")
+    return model
+
+
+def process(*words, **options):
+    """Run a command in a process of its own."""
+    command = [sys.executable, "-m", "kratos_lite", *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+    return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def displacement(path):
+    return np.array(list(json.loads(Path(path).read_text())["displacement"].values()))
+
+
+def same(first, second, tolerance=1e-12):
+    return np.abs(first - second).max() <= tolerance * np.abs(second).max()
+
+
+def rows_of(text):
+    """Return a table as a dictionary from the first words of its lines."""
+    return {line[:22].strip(): line[22:] for line in text.splitlines()}
+
+
+# ---- solve ---------------------------------------------------------------------------------------
+
+
+def test_gravity_cube_from_the_shell(tmp_path):
+    done = process("solve", GRAVITY_CUBE, "-o", "cube.vtu", "--json", "cube.json", cwd=tmp_path)
+    assert (done.code, done.err) == (0, "")
+    table = rows_of(done.out)
+    assert table["nodes"] == "125"
+    assert table["elements"] == "64 KinematicLinear3D8N"
+    assert table["unknowns"] == "250"
+    assert table["total load"] == "(0, 0, -74752.2) N"
+    assert table["total reaction"] == "(0, 0, 74752.2) N"
+    assert table["largest displacement"].startswith("1.322148e-04 m at node")
+    assert "written               cube.vtu" in done.out
+    found = json.loads((tmp_path / "cube.json").read_text())
+    assert found["largest_displacement"]["value"] == pytest.approx(SINKS, rel=1e-12)
+    assert found["total_reaction"][2] == pytest.approx(7620 * 9.81, rel=1e-12)
+    assert len(found["displacement"]) == found["nodes"] == 125
+    assert found["units"] == "SI"
+    assert found["warnings"] == []
+    assert kl.read(tmp_path / "cube.vtu", materials=False).mesh.n_elements == 64
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "cube.vtu"]
+
+
+def test_vtu_holds_the_fields_under_their_names(run, folder):
+    meshio = pytest.importorskip("meshio")
+    assert run("solve", GRAVITY_CUBE, "-o", "cube.vtu", "-q").code == 0
+    found = meshio.read("cube.vtu")
+    assert found.point_data["DISPLACEMENT"][:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+    fields = {"REACTION", "CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "NODE_ID"}
+    assert fields <= found.point_data.keys()
+    assert {"CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "ELEMENT_ID"} <= found.cell_data.keys()
+
+
+def test_picture_is_a_png(run, folder):
+    pytest.importorskip("matplotlib")
+    done = run("solve", GRAVITY_CUBE, "--picture", "cube.png")
+    assert done.code == 0
+    assert "written               cube.png" in done.out
+    assert Path("cube.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_quiet_prints_nothing(run, folder):
+    done = run("solve", GRAVITY_CUBE, "-q", "--json", "cube.json")
+    assert (done.code, done.out, done.err) == (0, "", "")
+    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh", "mdpa"])
+def test_options_say_the_same_as_a_script(run, box, ending):
+    words = [
+        "--gravity", "-1,0,-9.81", "--traction", "z+:0,0,-1e5", "--pressure", "x+:2e5", "--point-load", "y+:-1,2,3",
+    ]  # fmt: skip
+    done = run("solve", f"box.{ending}", *HELD, "--fix", "z+:x=-1e-6", *words, "--json", "out.json")
+    assert (done.code, done.err) == (0, "")
+    model = held(box)
+    model.fix("z+", "x", -1e-6)
+    for load in (
+        kl.Gravity((-1.0, 0.0, -9.81)),
+        kl.Traction("z+", (0.0, 0.0, -1e5)),
+        kl.Pressure("x+", 2e5),
+        kl.PointLoad("y+", (-1.0, 2.0, 3.0)),
+    ):
+        model.add(load)
+    assert same(displacement("out.json"), model.solve().displacement())
+
+
+def test_material_by_property_and_by_law(run, box):
+    wood = (
+        "Orthotropic3D:E_x=11e9,E_y=2e9,E_z=1e9,nu_xy=0.4,nu_yz=0.3,nu_xz=0.35,"
+        "G_xy=0.7e9,G_yz=0.2e9,YOUNG_MODULUS_X=11e9,G_xz=0.6e9"
+    )
+    assert run("solve", "box.vtu", "--material", wood).refuses("E_x is given twice")
+    wood = wood.replace(",YOUNG_MODULUS_X=11e9", "")
+    words = ["--fix", "z-:xyz", "--point-load", "z+:1,0,0", "--json", "out.json"]
+    assert run("solve", "box.vtu", "--material", f"1:{wood}", *words).code == 0
+    model = kl.Model(box, kl.Orthotropic3D(11e9, 2e9, 1e9, 0.4, 0.3, 0.35, 0.7e9, 0.2e9, 0.6e9))
+    model.fix("z-")
+    model.add(kl.PointLoad("z+", (1.0, 0.0, 0.0)))
+    assert same(displacement("out.json"), model.solve().displacement())
+
+
+@pytest.mark.parametrize("solver", ["auto", "dense", "direct", "amg"])
+def test_all_solvers_agree(run, box, solver):
+    words = ["--gravity", "0,0,-9.81", "--solver", solver, "--tolerance", "1e-12", "--json", "out.json"]
+    assert run("solve", "box.vtu", *HELD, *words).code == 0
+    model = held(box)
+    model.add(kl.Gravity((0.0, 0.0, -9.81)))
+    assert same(displacement("out.json"), model.solve().displacement(), 1e-9)
+
+
+def test_elem_set_by_hand_by_any_of_its_files_or_its_stem(run, folder):
+    X = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    rows = ", ".join(f"[{i}, {x}, {y}, {z}]" for i, (x, y, z) in enumerate(X, start=1))
+    Path("tet.node").write_text(f"NODES = NodesList([{rows}])\n")
+    Path("tet.elem").write_text("ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n")
+    Path("tet.prop").write_text(
+        "PROPERTIES[1][DENSITY] = 1200.0;\nPROPERTIES[1][YOUNG_MODULUS] = 1e6;\n"
+        "PROPERTIES[1][POISSON_RATIO] = 0.25;\nPROPERTIES[1][GRAVITY] = [3](0,0,-10);\n"
+    )
+    fixed = [f"NODES[{n}].Fix(DISPLACEMENT_{axis});\n" for n in (1, 2, 3) for axis in "XYZ"]
+    Path("tet.cond").write_text("".join(fixed))
+    Path("tet.init").write_text("")
+    weight = 1200 * 10 / 6
+    for name in ("tet", "tet.elem", "tet.node"):
+        done = run("solve", name, "--json", "tet.json")
+        assert (done.code, done.err) == (0, "")
+        found = json.loads(Path("tet.json").read_text())
+        assert found["total_load"][2] == pytest.approx(-weight, rel=1e-12)
+        # K_zz of the apex is (λ + 2μ) V = 1.2e6 / 6 with λ = μ = 0.4e6; it carries a quarter of the weight.
+        assert found["displacement"]["4"][2] == pytest.approx(-weight / 4 / (1.2e6 / 6), rel=1e-12)
+
+
+def test_run_file_says_the_same_as_options(run, box):
+    Path("run.json").write_text(
+        json.dumps(
+            {
+                "model": "box.vtu",
+                "material": {"E": 210e9, "nu": 0.3, "density": 7850},
+                "fix": {"z-": "xyz"},
+                "gravity": [0, 0, -9.81],
+                "json": "by_file.json",
+            }
+        )
+    )
+    done = run("solve", "run.json")
+    assert (done.code, done.err) == (0, "")
+    assert run("solve", "box.vtu", *HELD, "--gravity", "0,0,-9.81", "--json", "by_options.json").code == 0
+    assert same(displacement("by_file.json"), displacement("by_options.json"), 1e-14)
+    told = run("info", "run.json")
+    assert told.code == 0
+    assert "DISPLACEMENT_Z: 9 values, 9 fixed" in told.out
+    assert "YOUNG_MODULUS 2.1e+11" in told.out
+    assert run("check", "run.json").out.startswith("run.json: 27 nodes, 8 elements, no errors")
+    assert run("convert", "run.json", "run.mdpa").code == 0
+    assert run("solve", "run.mdpa", "--json", "again.json").code == 0
+    assert same(displacement("again.json"), displacement("by_options.json"))
+
+
+def test_options_win_over_the_run_file(run, box):
+    text = {"model": "box.mdpa", "fix": {"z-": "xyz"}, "gravity": [0, 0, -1], "solver": "dense", "json": "file.json"}
+    Path("run.json").write_text(json.dumps(text))
+    assert run("solve", "run.json", "--solver", "direct", "--json", "option.json").code == 0
+    assert json.loads(Path("option.json").read_text())["solver"].startswith("direct")
+    assert not Path("file.json").exists()
+
+
+def test_gzipped_input(run, folder):
+    Path("cube.mdpa.gz").write_bytes(gzip.compress(GRAVITY_CUBE.read_bytes()))
+    done = run("solve", "cube.mdpa.gz", "--json", "cube.json")
+    assert (done.code, done.err) == (0, "")
+    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+
+
+def test_broken_rows_are_read_when_asked_for(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    1 0 0 0\n", "    1 0 0\n    0\n")
+    Path("broken.mdpa").write_text(text)
+    assert run("solve", "broken.mdpa").refuses("broken.mdpa:15:")
+    assert run("solve", "broken.mdpa", "--lenient", "-q").code == 0
+
+
+# ---- info, check, convert --------------------------------------------------------------------------
+
+
+def test_info_tells_what_is_in_a_file(run, folder):
+    done = run("info", GRAVITY_CUBE)
+    assert (done.code, done.err) == (0, "")
+    for text in (
+        "nodes       125",
+        "extent      [0, 1] × [0, 1] × [0, 1] m",
+        "elements    64 ",
+        "DENSITY 7620, YOUNG_MODULUS 2.1e+08, POISSON_RATIO 0.3, VOLUME_ACCELERATION [0, 0, -9.81] (line 6)",
+    ):
+        assert text in done.out
+
+
+def test_check_of_a_good_file(run, folder):
+    done = run("check", GRAVITY_CUBE)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines()[0] == f"{GRAVITY_CUBE}: 125 nodes, 64 elements, no errors"
+    assert "to solve" not in done.out
+
+
+def test_check_tells_warnings_and_what_is_missing(run, folder):
+    text = GRAVITY_CUBE.read_text()
+    start = text.index("Begin NodalData")
+    Path("loose.mdpa").write_text(text[:start].replace("Begin Nodes", "Begin Nodes\n    999 3 3 3"))
+    done = run("check", "loose.mdpa")
+    assert (done.code, done.err) == (0, "")
+    assert "note     1 nodes belong to no element and carry no equations: 999" in done.out
+    assert "to solve the supports leave rigid motions free: the body (125 nodes) can still move: " in done.out
+    assert "translation x, y, z; rotation about x, y, z" in done.out
+
+
+def test_check_of_an_element_in_a_python_file(run, folder):
+    good = (EXAMPLES / "my_wedge.py").read_text()
+    Path("good.py").write_text(good)
+    done = run("check", "good.py")
+    assert (done.code, done.err) == (0, "")
+    assert "MyWedge3D6N: " in done.out
+    Path("bad.py").write_text(good.replace("L * (1 + t)", "L * (1 - t)"))
+    done = run("check", "bad.py")
+    assert (done.code, done.err) == (2, "")
+    assert "MyWedge3D6N: " in done.out
+    Path("empty.py").write_text("x = 1\n")
+    assert run("check", "empty.py").refuses("empty.py")
+    Path("wrong.py").write_text("x = (\n")
+    assert run("check", "wrong.py").refuses("wrong.py")
+
+
+def test_conversions_keep_the_mesh_and_the_model(run, folder):
+    shutil.copy(GRAVITY_CUBE, "a.mdpa")
+    for first, second in (("a.mdpa", "b.elem"), ("b.elem", "c.mdpa"), ("c.mdpa", "d.vtu")):
+        done = run("convert", first, second)
+        assert (done.code, done.err) == (0, "")
+        assert done.out.startswith(f"{second}: 125 nodes, 64 elements")
+    assert "left out: properties" in done.out
+    first = kl.read("a.mdpa")
+    for name in ("b.elem", "c.mdpa", "d.vtu"):
+        again = kl.read(name, materials=False)
+        assert np.array_equal(again.mesh.points, first.mesh.points)
+        assert np.array_equal(again.mesh.blocks[0].nodes, first.mesh.blocks[0].nodes)
+    for name in ("b.elem", "c.mdpa"):
+        assert same(kl.read(name).solve().displacement(), first.solve().displacement(), 1e-14)
+
+
+# ---- help ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_shows_an_example(run, command):
+    done = run(command, "--help")
+    assert (done.code, done.err) == (0, "")
+    assert f"examples:\n  kratos-lite {command} " in done.out
+
+
+def test_help_names_all_commands_and_version_is_told(run):
+    told = run("--help")
+    assert told.code == 0
+    for command in COMMANDS:
+        assert f"\n    {command} " in told.out
+    assert run("--version").out == f"kratos-lite {kl.__version__}\n"
+
+
+# ---- what goes wrong -------------------------------------------------------------------------------
+
+WRONG_OPTIONS = {
+    "material without a constant": (["--material", "E=1e9"], "Isotropic3D also needs nu"),
+    "unknown constant": (["--material", "E=1e9,nu=0.3,rho=1"], "constants of Isotropic3D are E, nu, density"),
+    "constant twice": (["--material", "E=1e9,E=1e9,nu=0.3"], "E is given twice"),
+    "unknown law": (["--material", "x:Wood:E=1e9,nu=0.3"], "'Wood' is no material; have Isotropic3D"),
+    "constant out of bounds": (["--material", "E=1e9,nu=0.5"], "nu (POISSON_RATIO) 0.5 must be < 0.5"),
+    "unknown property": (["--material", "7:" + STEEL], "no element has property 7"),
+    "no number": ([*HELD, "--gravity", "0,0,down"], "--gravity: 'down' is not a finite number"),
+    "underscore": ([*HELD, "--gravity", "0,0,9_81"], "'9_81' is not a finite number"),
+    "infinite": ([*HELD, "--traction", "z+:0,0,inf"], "--traction: 'inf' is not a finite number"),
+    "two numbers": ([*HELD, "--gravity", "0,1"], "--gravity: three numbers X,Y,Z are needed; got '0,1'"),
+    "no part": ([*HELD, "--pressure", "1e5"], "--pressure: expected PART:P; got '1e5'"),
+    "unknown axis": (["--material", STEEL, "--fix", "z-:w"], "axes must be some of x, y, z"),
+    "two values": ([*HELD, "--fix", "z-:z=1"], "z"),
+    "unknown part": ([*HELD, "--fix", "Top:xyz"], "there is no part 'Top'"),
+    "tolerance zero": ([*HELD, "--tolerance", "0"], "tolerance must be a number between 0 and 1; got 0.0"),
+    "no faces": ([*HELD, "--traction", "one:0,0,1"], "'one'"),
+    "no folder": ([*HELD, "-o", "none/out.vtu"], "none/out.vtu: the folder none does not exist"),
+    "unknown ending": ([*HELD, "-o", "out.foo"], "out.foo: unknown ending '.foo'"),
+    "no ending": ([*HELD, "-o", "out"], "out: give the file an ending"),
+    "output is a folder": ([*HELD, "-o", "sub.vtu"], "sub.vtu: cannot be written: it is a folder"),
+    "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_OPTIONS)
+def test_a_wrong_option_is_named_and_nothing_is_written(run, box, name):
+    Path("sub.vtu").mkdir()
+    before = sorted(Path().iterdir())
+    words, text = WRONG_OPTIONS[name]
+    assert run("solve", "box.vtu", *words).refuses(text)
+    assert sorted(Path().iterdir()) == before
+
+
+def test_words_that_are_no_options_are_refused_with_the_usage(run, box):
+    for words, text in (
+        (["solve", "box.vtu", "--solver", "magic"], "invalid choice: 'magic'"),
+        (["solve", "box.vtu", "--tolerance", "small"], "invalid float value: 'small'"),
+        (["solve"], "the following arguments are required: input"),
+        (["dance"], "invalid choice: 'dance'"),
+        ([], "the following arguments are required: COMMAND"),
+    ):
+        done = run(*words)
+        assert done.code == 2
+        assert text in done.err
+        assert done.err.startswith("usage: kratos-lite")
+
+
+def test_missing_supports_are_named_by_their_motions(run, box):
+    done = run("solve", "box.vtu", "--material", STEEL, "--fix", "z-:z", "--fix", "x-:x")
+    assert done.refuses("can still move: translation y")
+    assert "rotation" not in done.err
+
+
+def test_an_unknown_part_is_answered_with_the_nearest_name(run, folder):
+    mesh = kl.box()
+    mesh.parts["Clamped"] = mesh.parts.pop("z-")
+    kl.write("a.mdpa", kl.Model(mesh, LAW))
+    done = run("solve", "a.mdpa", "--fix", "Clampd:xyz")
+    assert done.refuses("there is no part 'Clampd'", "Did you mean Clamped?")
+
+
+@pytest.mark.parametrize("command", ["solve", "info", "check", "convert"])
+def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command):
+    rest = ["out.mdpa"] if command == "convert" else []
+    for name in ("none.mdpa", "none.elem", "none.vtu", "none.json", "none"):
+        assert run(command, name, *rest).refuses("none")
+    Path("sub").mkdir()
+    for name in (".", "sub", ".."):
+        assert run(command, name, *rest).refuses("folder")
+    assert not Path("out.mdpa").exists()
+
+
+@pytest.mark.parametrize("target", ["out", "out.json", "out.foo", "none/out.vtu"])
+def test_a_conversion_to_nowhere_is_refused(run, box, target):
+    assert run("convert", "box.mdpa", target).refuses(target)
+    assert not list(Path().glob("out*"))
+
+
+def test_a_folder_without_permission_is_refused(run, box):
+    Path("shut").mkdir(mode=0o500)
+    if os.access("shut", os.W_OK):
+        pytest.skip("this user may write everywhere")
+    assert run("solve", "box.vtu", *HELD, "-o", "shut/out.vtu").refuses("shut/out.vtu: cannot be written")
+
+
+def test_debug_shows_where_an_error_came_from(box):
+    done = process("solve", "none.mdpa", "--debug")
+    assert done.code == 1
+    assert "Traceback" in done.err
+
+
+def test_a_defect_is_told_apart_from_bad_input(run, box, monkeypatch):
+    monkeypatch.setattr(kl.Model, "solve", lambda *_: 1 / 0)
+    done = run("solve", "box.vtu", *HELD)
+    assert done.code == 1
+    assert done.err.startswith("internal error: ZeroDivisionError: division by zero\n")
+    assert "report" in done.err
+
+
+def test_want_of_memory_is_told(run, box, monkeypatch):
+    def greedy(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(kl.Model, "solve", greedy)
+    assert run("solve", "box.vtu", *HELD).refuses("not enough memory", "--solver amg")
+
+
+def interrupt(*_):
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_while_solving_ends_with_130(run, box, monkeypatch):
+    monkeypatch.setattr("kratos_lite.model.solve_static", interrupt)
+    done = run("solve", "box.vtu", *HELD, "-o", "out.vtu")
+    assert (done.code, done.out) == (130, "")
+    assert done.err == "interrupted; nothing half-written is left\n"
+    assert not Path("out.vtu").exists()
+
+
+def test_ctrl_c_while_writing_leaves_the_old_file(run, box, monkeypatch):
+    Path("out.vtu").write_text("old")
+    before = sorted(Path().iterdir())
+    monkeypatch.setattr(os, "fsync", interrupt)
+    assert run("solve", "box.vtu", *HELD, "-o", "out.vtu").code == 130
+    assert Path("out.vtu").read_text() == "old"
+    assert sorted(Path().iterdir()) == before
+
+
+def test_a_reader_that_goes_away_is_no_error(folder):
+    mesh = kl.box()
+    mesh.parts = {f"part_{i}": kl.Part(nodes=np.arange(8)) for i in range(5000)}
+    kl.write("parts.mdpa", mesh)
+    command = [sys.executable, "-m", "kratos_lite", "info", "parts.mdpa"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        running.stdout.close()
+        told = running.stderr.read()
+        running.wait(timeout=120)
+    assert (running.returncode, told) == (0, b"")
+
+
+# ---- progress ----------------------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    def __init__(self, is_terminal):
+        super().__init__()
+        self.is_terminal = is_terminal
+
+    def isatty(self):
+        return self.is_terminal
+
+
+def shown(monkeypatch, is_terminal, calls):
+    """Return what is shown of calls (second, phase, share)."""
+    screen, now = Terminal(is_terminal), [0.0]
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(commands, "perf_counter", lambda: now[0])
+    progress = commands.TerminalProgress()
+    for now[0], phase, share in calls:
+        progress(phase, share)
+    progress.close()
+    return screen.getvalue()
+
+
+CALLS = [(1.0, "assemble", 0.1), (2.5, "assemble", 0.5), (2.6, "assemble", 0.6), (3.0, "solve", 0.25)]
+
+
+def test_progress_shows_after_two_seconds_five_times_a_second_and_is_wiped(monkeypatch):
+    lines = shown(monkeypatch, True, CALLS).split("\r")
+    assert lines == ["", "assemble     50%     2.5 s", "solve        25%     3.0 s", " " * 40, ""]
+
+
+def test_progress_of_a_short_work_or_without_a_terminal_is_not_shown(monkeypatch):
+    assert shown(monkeypatch, True, CALLS[:1]) == ""
+    assert shown(monkeypatch, False, CALLS) == ""
