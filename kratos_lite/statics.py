@@ -159,28 +159,71 @@ def solve_reduced(
 ) -> solvers.Solution:
     """Solve T^T K T q = T^T (f - K c); fall back from multigrid to a factorisation if need be."""
     b = reduced.reduce(f - K @ reduced.c)
+    if not len(b):
+        return solvers.Solution(b, method, "", 0, 0.0)
     if method == "dense":
         A = K[np.ix_(reduced.free, reduced.free)] if reduced.T is None else reduced.T.T @ K @ reduced.T
         A = np.asarray(A)
-        q = solvers.solve_dense(A, b) if len(b) else b
+        q = solvers.solve_dense(A, b)
         return solvers.Solution(q, method, "", 0, solvers.backward_error(A, q, b))
-    A = reduced_matrix(K, reduced)
-    if not len(b):
-        return solvers.Solution(b, method, "", 0, 0.0)
     why = ""
     if method == "amg":
-        precondition = solvers.multigrid(A, rigid_modes(points)[reduced.free])
-        q, iterations, ok = solvers.conjugate_gradients(A, b, precondition, tolerance, progress=progress)
-        if ok:
-            return solvers.Solution(q, method, "", iterations, solvers.backward_error(A, q, b))
-        why = f"multigrid stopped after {iterations} iterations without reaching {tolerance:g}"
+        solution = iterate(K, b, reduced, tolerance, points, progress)
+        if not solution.reason:
+            return solution
+        why = solution.reason
         if len(b) > solvers.FALLBACK_LIMIT:
             raise SolveError(
                 f"{why}; {len(b)} unknowns are too many to factorise instead; look for thin elements or "
                 "ν near 0.5, use quadratic elements, or ask for solver='direct'"
             )
+    A = reduced_matrix(K, reduced)
     q = solvers.solve_direct(A, b)
     return solvers.Solution(q, "direct", why, 0, solvers.backward_error(A, q, b))
+
+
+def iterate(
+    K: Any, b: Array, reduced: Reduction, tolerance: float, points: Array, progress: Progress | None
+) -> solvers.Solution:
+    """Solve by multigrid; a solution with a reason is one that did not converge, and why.
+
+    Without links the fixed degrees of freedom stay in the matrix, uncoupled, so that it keeps its
+    3x3 blocks.
+    """
+    modes = rigid_modes(points)
+    if reduced.T is None:
+        free = np.zeros(len(reduced.c), dtype=bool)
+        free[reduced.free] = True
+        A, modes = uncoupled(K, free), modes * free[:, None]
+        rhs = np.zeros(len(free))
+        rhs[reduced.free] = b
+    else:
+        A, modes, rhs = reduced_matrix(K, reduced), modes[reduced.free], b
+    norm = solvers.matrix_norm(A)
+    x, iterations, converged = solvers.conjugate_gradients(
+        A, rhs, solvers.multigrid(A, modes), tolerance, norm, progress=progress
+    )
+    error = solvers.backward_error(A, x, rhs, norm)
+    q = x[reduced.free] if reduced.T is None else x
+    reason = "" if converged else f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
+    return solvers.Solution(q, "amg", reason, iterations, error)
+
+
+def uncoupled(K: Any, free: NDArray[np.bool_]) -> Any:
+    """Return a copy of K in 3x3 blocks with the rows and columns of fixed degrees of freedom cleared.
+
+    Their diagonal entries stay, so that the matrix keeps its scale.
+    """
+    from scipy.sparse import bsr_array
+
+    mask = free.reshape(-1, 3)
+    rows = np.repeat(np.arange(len(mask)), np.diff(K.indptr))
+    data = K.data * mask[rows][:, :, None] * mask[K.indices][:, None, :]
+    diagonal = np.flatnonzero(rows == K.indices)
+    for axis in range(3):
+        fixed = diagonal[~mask[rows[diagonal], axis]]
+        data[fixed, axis, axis] = K.data[fixed, axis, axis]
+    return bsr_array((data, K.indices, K.indptr), shape=K.shape)
 
 
 def reduced_matrix(K: Any, reduced: Reduction) -> Any:

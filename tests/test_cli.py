@@ -150,9 +150,7 @@ def test_quiet_prints_nothing(run, folder):
 
 @pytest.mark.parametrize("ending", ["vtu", "msh", "mdpa"])
 def test_options_say_the_same_as_a_script(run, box, ending):
-    words = [
-        "--gravity", "-1,0,-9.81", "--traction", "z+:0,0,-1e5", "--pressure", "x+:2e5", "--point-load", "y+:-1,2,3",
-    ]  # fmt: skip
+    words = "--gravity -1,0,-9.81 --traction z+:0,0,-1e5 --pressure x+:2e5 --point-load y+:-1,2,3".split()
     done = run("solve", f"box.{ending}", *HELD, "--fix", "z+:x=-1e-6", *words, "--json", "out.json")
     assert (done.code, done.err) == (0, "")
     model = held(box)
@@ -198,7 +196,7 @@ def test_elem_set_by_hand_by_any_of_its_files_or_its_stem(run, folder):
     Path("tet.elem").write_text("ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n")
     Path("tet.prop").write_text(
         "PROPERTIES[1][DENSITY] = 1200.0;\nPROPERTIES[1][YOUNG_MODULUS] = 1e6;\n"
-        "PROPERTIES[1][POISSON_RATIO] = 0.25;\nPROPERTIES[1][GRAVITY] = [3](0,0,-10);\n"
+        "PROPERTIES[1][POISSON_RATIO] = 0.25;\nPROPERTIES[1][GRAVITY] = [0, 0, -10];\n"
     )
     fixed = [f"NODES[{n}].Fix(DISPLACEMENT_{axis});\n" for n in (1, 2, 3) for axis in "XYZ"]
     Path("tet.cond").write_text("".join(fixed))
@@ -240,7 +238,13 @@ def test_run_file_says_the_same_as_options(run, box):
 
 
 def test_options_win_over_the_run_file(run, box):
-    text = {"model": "box.mdpa", "fix": {"z-": "xyz"}, "gravity": [0, 0, -1], "solver": "dense", "json": "file.json"}
+    text = {
+        "model": "box.mdpa",
+        "fix": {"z-": "xyz"},
+        "gravity": [0, 0, -1],
+        "solver": {"type": "dense", "tolerance": 1e-8},
+        "json": "file.json",
+    }
     Path("run.json").write_text(json.dumps(text))
     assert run("solve", "run.json", "--solver", "direct", "--json", "option.json").code == 0
     assert json.loads(Path("option.json").read_text())["solver"].startswith("direct")
@@ -324,6 +328,17 @@ def test_conversions_keep_the_mesh_and_the_model(run, folder):
         assert np.array_equal(again.mesh.blocks[0].nodes, first.mesh.blocks[0].nodes)
     for name in ("b.elem", "c.mdpa"):
         assert same(kl.read(name).solve().displacement(), first.solve().displacement(), 1e-14)
+
+
+def test_elements_that_a_format_cannot_hold_are_named(run, folder):
+    text = GRAVITY_CUBE.read_text()
+    (kind,) = {line.split()[2] for line in text.splitlines() if line.startswith("Begin Elements")}
+    Path("odd.mdpa").write_text(text.replace(kind, "OddElement"))
+    done = run("convert", "odd.mdpa", "odd.vtu")
+    assert done.code == 0
+    assert "note     left out, for their shape is unknown: 64 OddElement" in done.out
+    assert run("convert", "odd.mdpa", "same.mdpa").code == 0
+    assert "Begin Elements OddElement\n1 1 " in Path("same.mdpa").read_text()
 
 
 # ---- help ------------------------------------------------------------------------------------------
@@ -485,6 +500,147 @@ def test_a_reader_that_goes_away_is_no_error(folder):
         told = running.stderr.read()
         running.wait(timeout=120)
     assert (running.returncode, told) == (0, b"")
+
+
+# ---- files that are wrong on purpose -------------------------------------------------------------------
+
+ACCEPTED = {
+    "00_good.mdpa": "",
+    "06_duplicate_node_id_same_coords.mdpa": "line 19: node 8 stands at line 18 already, the same",
+    "17_fortran_exponent.mdpa": "",
+    "31_crlf.mdpa": "",
+    "32_tabs.mdpa": "",
+    "33_bom.mdpa": "",
+    "34_non_utf8.mdpa": "",
+    "38_comment_everywhere.mdpa": "",
+    "41_elements_before_nodes.mdpa": "",
+    "43_unknown_block.mdpa": "line 33: block Wibble is skipped",
+    "44_cr_only.mdpa": "",
+    "47_unreferenced_node.mdpa": "1 nodes belong to no element and carry no equations: 9",
+    "48_coincident_nodes.mdpa": "1 nodes belong to no element and carry no equations: 9",
+    "49_long_line.mdpa": "",
+    "60_good.json": "",
+}
+"""Files to be read, with what is noted about them."""
+
+REFUSED = {
+    "01_truncated_in_nodes.mdpa": ":15:7: the file ends inside 'Begin Nodes' of line 10",
+    "02_missing_end_nodes.mdpa": ":20:1: 'Begin Elements' inside 'Begin Nodes' of line 10",
+    "03_end_mismatch.mdpa": ":19:1: 'End Elements' closes 'Begin Nodes' of line 10",
+    "05_duplicate_node_id.mdpa": ":18: node 7 stands at line 17 already",
+    "07_missing_node_ref.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): there is no node 99",
+    "08_nan_coord.mdpa": ":18:8: node 8: 'nan' is not a number",
+    "09_inf_coord.mdpa": ":18:8: node 8: '1e999' is too large",
+    "10_too_few_nodes_in_element.mdpa": ":22:2: element 1 has 7 nodes; SmallDisplacementElement3D8N needs 8",
+    "11_too_many_nodes_in_element.mdpa": ":22:2: element 1 has 9 nodes; SmallDisplacementElement3D8N needs 8",
+    "15_E_text.mdpa": ":6:16: YOUNG_MODULUS: 'steel' is not a number",
+    "16_decimal_comma.mdpa": ":12:4: node 2: '1,0' is not a number; decimal comma? write 1.0",
+    "18_missing_property.mdpa": ":22: element 1 uses Properties 7",
+    "19_property_redefined.mdpa": ":10:1: Properties 1 stands at line 4 already",
+    "21_duplicate_element_id.mdpa": ":23: element 1 stands at line 22 already",
+    "22_repeated_node_in_element.mdpa": ":22: element 1 (SmallDisplacementElement3D8N) names node 7 twice",
+    "24_submodelpart_missing_node.mdpa": ":30: SubModelPart Bottom lists node 44",
+    "25_submodelpart_duplicate_name.mdpa": ":33:1: SubModelPart Bottom stands at line 25 already",
+    "26_submodelpart_deep.mdpa": ":97:1: blocks are nested more than 64 deep",
+    "27_negative_id.mdpa": ":18:2: '-8' is not an id; ids are 1 … 2^63-1",
+    "28_zero_id.mdpa": ":11:2: '0' is not an id",
+    "29_float_id.mdpa": ":12:2: '2.5' is not an id",
+    "30_huge_id.mdpa": ":18:2: '99999999999999999999' is not an id",
+    "35_nul_byte.mdpa": ":13:7: NUL byte",
+    "36_empty.mdpa": ": there are no nodes",
+    "37_only_comment.mdpa": ": there are no nodes",
+    "39_mixed_case.mdpa": ":10:1: 'begin' stands outside any block; expected 'Begin <block>'",
+    "40_two_values_on_line.mdpa": ":11:2: node 1 has 7 coordinates; expected id x y z",
+    "42_two_coords.mdpa": ":13:2: node 3 has 2 coordinates; expected id x y z",
+    "45_ctrl_chars_in_name.mdpa": ":25:1: SubModelPart '../../etc/passwd' is no name",
+    "46_no_nodes_block.mdpa": ": there are no nodes",
+    "50_unicode_digits.mdpa": ":18:2: '８' is not an id",
+    "51_underscore_number.mdpa": ":6:16: YOUNG_MODULUS: '2_1e8' is not a number",
+    "52_hex_number.mdpa": ":6:16: YOUNG_MODULUS: '0x10' is not a number",
+    "53_self_nested_begin.mdpa": ":11:1: 'Begin Nodes' inside 'Begin Nodes' of line 10",
+    "61_trailing_comma.json": ":1:9: trailing comma before '}'",
+    "62_nan_literal.json": ":1:15: NaN is not a number in JSON",
+    "63_duplicate_key.json": ":1:12: duplicate key 'E', first given in line 1",
+    "64_unknown_key.json": "unknown key 'sovler'. Did you mean solver?",
+    "65_wrong_type.json": "tolerance must be a number; got '1e-8'",
+    "66_path_traversal.json": "path '../../../../etc/cron.d/x' leaves the folder of the run file",
+    "67_deep.json": ":1:65: nesting deeper than 64",
+    "68_missing_input.json": "does_not_exist.mdpa",
+    "69_directory_as_input.json": "is a folder; name a file in it",
+    "70_bigint.json": ":1:11: integer of 5001 digits is too long",
+    "80_ragged.elem": ":1:1: unknown statement 'NODES'",
+    "81_unknown_keyword.elem": ":1:1: unknown statement 'KinematicLinear3D11N'",
+    "90_pickle_in_npz.npz": ": unknown ending '.npz'",
+    "91_pickle_named_restart.rest": ": unknown ending '.rest'",
+}
+"""Files that no command takes, with place and error."""
+
+DESCRIBED = {
+    "04_unknown_element.mdpa": ":22: unknown element 'SmallDisplacementElement3D9N'",
+    "12_negative_density.mdpa": ":5: Properties 1: density (DENSITY) -7620 must be ≥ 0",
+    "13_nu_half.mdpa": ":7: Properties 1: nu (POISSON_RATIO) 0.5 must be < 0.5",
+    "14_E_zero.mdpa": ":6: Properties 1: E (YOUNG_MODULUS) 0 must be > 0 Pa",
+    "20_unknown_variable.mdpa": "found 'YOUNGS_MODULUS' at line 6: Did you mean YOUNG_MODULUS",
+    "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 4",
+}
+"""Files that read well and mean nonsense: ``info`` describes them, nothing else takes them."""
+
+
+@pytest.fixture
+def bad(shared, tmp_path, monkeypatch):
+    """Return the folder of bad files; a command on one of them that takes 5 s is an error."""
+
+    def late(*_):
+        raise TimeoutError("a bad file took more than 5 s")
+
+    monkeypatch.chdir(tmp_path)
+    old = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, 5)
+    yield shared / "bad"
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, old)
+
+
+def test_every_bad_file_is_in_a_table(shared):
+    names = {path.name for path in (shared / "bad").iterdir() if path.is_file()}
+    assert names == ACCEPTED.keys() | REFUSED.keys() | DESCRIBED.keys()
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+@pytest.mark.parametrize(
+    "words", [["solve", "--fix", "z-:xyz"], ["check"], ["info"]], ids=lambda words: words[0]
+)
+def test_an_odd_file_that_can_be_read_is_read(run, bad, name, words):
+    done = run(*words, bad / name)
+    assert (done.code, done.err) == (0, "")
+    if words[0] != "info" or "line" in ACCEPTED[name]:
+        assert ACCEPTED[name] in done.out
+    if words[0] == "solve":
+        assert rows_of(done.out)["unknowns"] == "12"
+
+
+@pytest.mark.parametrize("name", REFUSED | DESCRIBED)
+@pytest.mark.parametrize("words", [["solve", "--fix", "z-:xyz"], ["check"]], ids=lambda words: words[0])
+def test_a_bad_file_is_refused_with_place_and_cause(run, bad, name, words):
+    assert run(*words, bad / name).refuses(name, (REFUSED | DESCRIBED)[name])
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_bad_file_is_not_described_either(run, bad, name):
+    assert run("info", bad / name).refuses(name, REFUSED[name])
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_a_file_that_means_nonsense_is_described(run, bad, name):
+    done = run("info", bad / name)
+    assert (done.code, done.err) == (0, "")
+    assert "nodes       8\n" in done.out
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_bad_file_is_not_converted(run, bad, name):
+    assert run("convert", bad / name, "out.vtu").refuses(name, REFUSED[name])
+    assert not list(Path().iterdir())
 
 
 # ---- progress ----------------------------------------------------------------------------------------

@@ -97,4 +97,8 @@ def write_document(path: str | Path, document: Document) -> list[str]:
         "model_data",
     ]
     kept = [name for name in lost if getattr(document, name)]
-    return [f"{kind} files hold meshes only; left out: {', '.join(kept)}"] if kept else []
+    notes = [f"{kind} files hold meshes only; left out: {', '.join(kept)}"] if kept else []
+    unknown = [
+        f"{len(block)} {block.name}" for block in document.mesh.blocks if block.shape is None and len(block)
+    ]
+    return [*notes, f"left out, for their shape is unknown: {', '.join(unknown)}"] if unknown else notes

@@ -1,20 +1,19 @@
-"""Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
+"""Mesh: points, blocks and named parts, and how to choose among them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.mesh import topology
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, select
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
 WhereElements: TypeAlias = "str | int | ArrayLike | None"
@@ -22,49 +21,6 @@ WhereElements: TypeAlias = "str | int | ArrayLike | None"
 
 SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
 """Names of the sides of the bounding box: axis and end."""
-NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
-
-
-@dataclass(eq=False)
-class Block:
-    """Cells of one kind: elements, or the conditions that carry loads.
-
-    Attributes
-    ----------
-    name : kind as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
-    nodes : (m, k) int, rows of ``mesh.points``, in Kratos order.
-    ids : (m,) int, ids of the cells.
-    properties : (m,) int, property id of each cell.
-    shape : the reference cell, or None for a kind that kratos_lite does not know.
-    lines : (m,) int, line of each cell in the file it came from, or None.
-    """
-
-    name: str
-    nodes: NDArray[np.int32]
-    ids: Ints
-    properties: Ints
-    shape: type[Shape] | None
-    lines: NDArray[np.int32] | None = None
-
-    def __len__(self) -> int:
-        return len(self.ids)
-
-
-@dataclass(eq=False)
-class Part:
-    """A named part (Kratos: SubModelPart): rows of nodes, elements and conditions.
-
-    Element and condition rows count through all blocks in order.
-    """
-
-    nodes: Ints = field(default_factory=lambda: NO_ROWS)
-    elements: Ints = field(default_factory=lambda: NO_ROWS)
-    conditions: Ints = field(default_factory=lambda: NO_ROWS)
-    geometries: Ints = field(default_factory=lambda: NO_ROWS)
-    constraints: Ints = field(default_factory=lambda: NO_ROWS)
-    properties: tuple[int, ...] = ()
-    tables: tuple[int, ...] = ()
-    data: dict[str, Any] = field(default_factory=dict)
 
 
 class Mesh:
@@ -90,18 +46,39 @@ class Mesh:
         parts: dict[str, Part] | None = None,
         source: str = "",
     ) -> None:
-        self.points: Floats = np.ascontiguousarray(points, dtype=float)
+        try:
+            self.points: Floats = np.ascontiguousarray(points, dtype=float)
+        except (TypeError, ValueError):
+            raise MeshError(f"points must be real numbers of shape (n, 3); got {points!r:.80}") from None
         if self.points.ndim != 2 or self.points.shape[1] != 3:
             raise MeshError(f"points must have shape (n, 3); got {self.points.shape}")
         n = len(self.points)
-        ids = np.arange(1, n + 1) if node_ids is None else node_ids
-        self.node_ids: Ints = np.asarray(ids, dtype=np.int64)
-        if self.node_ids.shape != (n,):
-            raise MeshError(f"node_ids must have shape ({n},); got {self.node_ids.shape}")
+        ids = np.asarray(np.arange(1, n + 1) if node_ids is None else node_ids)
+        if ids.shape != (n,) or (n and ids.dtype.kind not in "iu"):
+            raise MeshError(f"node_ids must be whole numbers of shape ({n},); got {ids.dtype} {ids.shape}")
+        self.node_ids: Ints = ids.astype(np.int64)
         self.blocks = list(blocks)
         self.conditions = list(conditions)
         self.parts = dict(parts or {})
         self.source = source
+        self._check()
+
+    def _check(self) -> None:
+        """Raise MeshError for ids that occur twice and for parts whose rows do not exist."""
+        if not self._is_counting:
+            ordered = self.node_ids[self._node_order]
+            twice = ordered[1:][ordered[1:] == ordered[:-1]]
+            if len(twice):
+                raise MeshError(f"node id {twice[0]} occurs more than once; give every node its own")
+        sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
+        for name, part in self.parts.items():
+            for what, size in sizes.items():
+                rows = getattr(part, what)
+                if len(rows) and not (0 <= rows.min() and rows.max() < size):
+                    raise MeshError(
+                        f"part {name!r}: rows of {what} must lie in 0 … {size - 1}; "
+                        f"got {rows.min()} … {rows.max()}"
+                    )
 
     # ---- sizes and ids ---------------------------------------------------------------------
 
@@ -134,7 +111,7 @@ class Mesh:
         ids = np.asarray(ids, dtype=np.int64)
         if self.n_nodes == 0:
             return np.full(ids.shape, -1, dtype=np.int64)
-        if self.node_ids[0] == 1 and self.node_ids[-1] == self.n_nodes and self._is_counting:
+        if self._is_counting:
             return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
         order = self._node_order
         place = np.searchsorted(self.node_ids, ids, sorter=order)
@@ -143,7 +120,8 @@ class Mesh:
 
     @cached_property
     def _is_counting(self) -> bool:
-        return bool((np.diff(self.node_ids) == 1).all())
+        """Whether the ids are 1 … n in order."""
+        return bool((self.node_ids == np.arange(1, self.n_nodes + 1)).all())
 
     def place(self, block: Block, cell: int) -> str:
         """Return a readable place of a cell for messages: ``cube.mdpa:22: element 1 (…3D8N)``."""
@@ -177,10 +155,12 @@ class Mesh:
         x = self.points[:, axis]
         low, high = float(x.min()), float(x.max())
         goal = high if end else low
-        return np.flatnonzero(np.abs(x - goal) <= 1e-6 * float(np.ptp(self.points, axis=0).max()))
+        return np.flatnonzero(np.abs(x - goal) <= 1e-6 * (high - low))
 
     def nodes(self, where: Where) -> Ints:
         """Return the node rows of a part, of a predicate on the points, or of an array of rows.
+
+        Rows keep the order in which they are given; a row that is given twice counts once.
 
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0]])
         >>> mesh.nodes(lambda X: X[:, 0] > 0.5)
@@ -195,10 +175,11 @@ class Mesh:
             return np.flatnonzero(chosen)
         if chosen.dtype.kind not in "iu":
             raise MeshError("nodes are chosen by part name, predicate, mask or integer rows")
-        rows = np.unique(chosen.astype(np.int64))
-        if len(rows) and (rows[0] < 0 or rows[-1] >= self.n_nodes):
-            raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows[0]} … {rows[-1]}")
-        return rows
+        rows = chosen.astype(np.int64).ravel()
+        if len(rows) and (rows.min() < 0 or rows.max() >= self.n_nodes):
+            raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows.min()} … {rows.max()}")
+        _, first = np.unique(rows, return_index=True)
+        return rows[np.sort(first)]
 
     def used_nodes(self) -> NDArray[np.bool_]:
         """Return a mask (n,) of the nodes that belong to an element."""
@@ -252,33 +233,25 @@ class Mesh:
 
         ``ids`` holds the row of the parent element.
         """
-        by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
-        start = 0
+        return topology.boundary(self.blocks, self.n_nodes)
+
+    def reoriented(self) -> Mesh:
+        """Return the mesh with the node order of elements that are inside out turned around."""
+        blocks = []
         for block in self.blocks:
-            if block.shape is not None:
-                parents = np.arange(start, start + len(block))
-                for face in block.shape.faces:
-                    by_size.setdefault(len(face), []).append((block.nodes[:, list(face)], parents))
-            start += len(block)
-        corners: list[NDArray[np.int32]] = []
-        for size, groups in by_size.items():
-            c = len(FACE_SHAPES[size].nodes) if size < 6 else FACE_SHAPES[size].corners
-            corners += [
-                np.sort(np.pad(f[:, :c], ((0, 0), (0, 4 - c)), constant_values=-1)) for f, _ in groups
-            ]
-        if not corners:
-            return []
-        _, inverse, counts = np.unique(np.vstack(corners), axis=0, return_inverse=True, return_counts=True)
-        single = counts[inverse.ravel()] == 1
-        faces, first = [], 0
-        for size, groups in by_size.items():
-            nodes = np.vstack([f for f, _ in groups])
-            parents = np.concatenate([p for _, p in groups])
-            keep = single[first : first + len(nodes)]
-            first += len(nodes)
-            shape = FACE_SHAPES[size]
-            faces.append(Block(shape.__name__, nodes[keep], parents[keep], 0 * parents[keep], shape))
-        return [block for block in faces if len(block)]
+            turn = topology.inside_out(block, self.points)
+            nodes = block.nodes.copy()
+            if turn.any() and block.shape is not None:
+                nodes[turn] = nodes[turn][:, topology.mirror(block.shape)]
+            blocks.append(replace(block, nodes=nodes))
+        return Mesh(
+            self.points,
+            blocks,
+            node_ids=self.node_ids,
+            conditions=self.conditions,
+            parts=self.parts,
+            source=self.source,
+        )
 
     def faces(self, where: Where) -> list[Block]:
         """Return the faces of a part: its conditions, or else the boundary faces among its nodes."""
@@ -286,27 +259,5 @@ class Mesh:
             return select(self.conditions, rows)
         inside = np.zeros(self.n_nodes, dtype=bool)
         inside[self.nodes(where)] = True
-        found = []
-        for block in self.boundary:
-            keep = inside[block.nodes].all(axis=1)
-            if keep.any():
-                found.append(
-                    Block(block.name, block.nodes[keep], block.ids[keep], block.properties[keep], block.shape)
-                )
-        return found
-
-
-def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
-    """Return the cells with these rows (counted through all blocks), block by block."""
-    chosen, start = [], 0
-    for block in blocks:
-        keep = rows[(rows >= start) & (rows < start + len(block))] - start
-        start += len(block)
-        if len(keep):
-            lines = None if block.lines is None else block.lines[keep]
-            chosen.append(
-                Block(
-                    block.name, block.nodes[keep], block.ids[keep], block.properties[keep], block.shape, lines
-                )
-            )
-    return chosen
+        chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
+        return [block for block in chosen if len(block)]

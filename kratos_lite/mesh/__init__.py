@@ -1,0 +1,6 @@
+"""Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
+
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, select
+from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
+
+__all__ = ["NO_ROWS", "Block", "Floats", "Ints", "Mesh", "Part", "Where", "WhereElements", "select"]

@@ -1,0 +1,76 @@
+"""Blocks of cells of one kind, and named parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.shapes import Shape
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(eq=False)
+class Block:
+    """Cells of one kind: elements, or the conditions that carry loads.
+
+    Attributes
+    ----------
+    name : kind as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
+    nodes : (m, k) int, rows of ``mesh.points``, in Kratos order.
+    ids : (m,) int, ids of the cells.
+    properties : (m,) int, property id of each cell.
+    shape : the reference cell, or None for a kind that kratos_lite does not know.
+    lines : (m,) int, line of each cell in the file it came from, or None.
+    """
+
+    name: str
+    nodes: NDArray[np.int32]
+    ids: Ints
+    properties: Ints
+    shape: type[Shape] | None
+    lines: NDArray[np.int32] | None = None
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, chosen: NDArray[Any]) -> Block:
+        """Return the block of the chosen cells (rows or a mask)."""
+        lines = None if self.lines is None else self.lines[chosen]
+        return Block(
+            self.name, self.nodes[chosen], self.ids[chosen], self.properties[chosen], self.shape, lines
+        )
+
+
+@dataclass(eq=False)
+class Part:
+    """A named part (Kratos: SubModelPart): rows of nodes, elements and conditions.
+
+    Element and condition rows count through all blocks in order.
+    """
+
+    nodes: Ints = field(default_factory=lambda: NO_ROWS)
+    elements: Ints = field(default_factory=lambda: NO_ROWS)
+    conditions: Ints = field(default_factory=lambda: NO_ROWS)
+    geometries: Ints = field(default_factory=lambda: NO_ROWS)
+    constraints: Ints = field(default_factory=lambda: NO_ROWS)
+    properties: tuple[int, ...] = ()
+    tables: tuple[int, ...] = ()
+    data: dict[str, Any] = field(default_factory=dict)
+
+
+def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
+    """Return the cells with these rows (counted through all blocks), block by block."""
+    chosen, start = [], 0
+    for block in blocks:
+        keep = rows[(rows >= start) & (rows < start + len(block))] - start
+        start += len(block)
+        if len(keep):
+            chosen.append(block.take(keep))
+    return chosen

@@ -1,0 +1,80 @@
+"""Mesh: choosing nodes and elements, faces, orientation."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+
+def test_rows_keep_their_order_so_that_values_meet_their_nodes():
+    mesh = kl.box(cells=(2, 1, 1))
+    assert mesh.nodes([7, 5, 7]).tolist() == [7, 5]
+    model = kl.Model(mesh, kl.Isotropic3D(1.0, 0.3))
+    model.fix([7, 5], "z", [[1.0], [2.0]])
+    assert model.supports.values[[7, 5], 2].tolist() == [1.0, 2.0]
+
+
+def test_sides_are_measured_along_their_own_axis():
+    mesh = kl.box((1, 1, 1e-7))
+    mesh.parts.clear()
+    assert len(mesh.nodes("z-")) == len(mesh.nodes("z+")) == 4
+    assert not set(mesh.nodes("z-")) & set(mesh.nodes("z+"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("abc",), "real numbers"),
+        (([[0, 0]],), r"shape \(n, 3\)"),
+        (([[0, 0, 0]], [], {"node_ids": ["a"]}), "whole numbers"),
+        (([[0, 0, 0], [1, 0, 0]], [], {"node_ids": [4, 4]}), "node id 4 occurs more than once"),
+        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([1]))}}), "'A': rows of nodes"),
+        (([[0, 0, 0]], [], {"parts": {"A": kl.Part(nodes=np.array([-1]))}}), "'A': rows of nodes"),
+    ],
+)
+def test_wrong_arguments_are_mesh_errors(arguments, text):
+    points, blocks, more = (*arguments, [], {})[:3] if len(arguments) < 3 else arguments
+    with pytest.raises(kl.MeshError, match=text):
+        kl.Mesh(points, blocks, **more)
+
+
+@pytest.mark.parametrize("element", list(kl.ELEMENTS))
+def test_elements_that_are_inside_out_are_turned(element):
+    mesh = kl.box((1.0, 2.0, 3.0), (2, 1, 1), element)
+    broken = kl.Mesh(mesh.points * [-1, 1, 1], mesh.blocks)
+    model = kl.Model(broken, kl.Isotropic3D(1.0, 0.3))
+    with pytest.raises(kl.MeshError, match="inside out"):
+        model.check_geometry()
+    mended = broken.reoriented()
+    assert kl.Model(mended, kl.Isotropic3D(1.0, 0.3)).check_geometry() == []
+    kind = kl.ELEMENTS[element]
+    volume = kind(mended.points[mended.blocks[0].nodes]).volume().sum()
+    assert abs(volume - 6) < 1e-12
+
+
+@pytest.mark.parametrize("element", list(kl.ELEMENTS))
+def test_boundary_of_a_box_has_its_area_outward(element):
+    from kratos_lite.elements.surface import area_vectors
+
+    mesh = kl.box((1.0, 2.0, 3.0), (2, 2, 2), element)
+    area = [area_vectors(block.shape, mesh.points[block.nodes]) for block in mesh.boundary]
+    assert abs(sum(np.linalg.norm(a, axis=-1).sum() for a in area) - 22) < 1e-12
+    assert np.abs(sum(a.sum(axis=(0, 1)) for a in area)).max() < 1e-12
+    for block, vectors in zip(mesh.boundary, area, strict=True):
+        outward = mesh.points[block.nodes].mean(axis=1) - [0.5, 1.0, 1.5]
+        assert ((vectors.sum(axis=1) * outward).sum(axis=1) > 0).all()
+
+
+def test_faces_between_different_cells_are_inside():
+    wedges, bricks = kl.box(element="KinematicLinear3D6N"), kl.box(origin=(1, 0, 0))
+    points = np.vstack([wedges.points, bricks.points])
+    unique, rows = np.unique(points.round(9), axis=0, return_inverse=True)
+    blocks = [
+        kl.Block(b.name, rows.ravel()[b.nodes + shift].astype(np.int32), b.ids, b.properties, b.shape)
+        for b, shift in ((wedges.blocks[0], 0), (bricks.blocks[0], wedges.n_nodes))
+    ]
+    mesh = kl.Mesh(unique, blocks)
+    assert sorted((block.name, len(block)) for block in mesh.boundary) == [
+        ("Quadrilateral4", 8),
+        ("Triangle3", 4),
+    ]
