@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from kratos_lite.model import Model
     from kratos_lite.result import Result
     from kratos_lite.shapes import Shape
+    from kratos_lite.view import element_picture, picture
 
 __version__ = "0.1.0"
 
@@ -58,6 +59,7 @@ _HOME = {
     "kratos_lite.model": "Model",
     "kratos_lite.result": "Result",
     "kratos_lite.shapes": "Shape",
+    "kratos_lite.view": "element_picture picture",
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
 __all__ = [
@@ -97,6 +99,8 @@ __all__ = [
     "__version__",
     "annulus",
     "box",
+    "element_picture",
+    "picture",
     "read",
     "write",
 ]

@@ -272,13 +272,28 @@ class Model:
         """
         return solve_static(self, solver, tolerance, progress)
 
-    def __repr__(self) -> str:
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of a summary: label and value."""
         mesh = self.mesh
-        kinds = (
-            ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block)) or "no elements"
-        )
-        return (
-            f"Model({mesh.source or 'mesh'}: {mesh.n_nodes} nodes; {kinds}; {len(mesh.parts)} parts; "
-            f"{int(self.supports.fixed.sum())} fixed components; {len(self.supports.links)} constraints; "
-            f"{len(self.loads)} loads)"
-        )
+        used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
+        without = int((self._material_of < 0).sum())
+        rows = [("nodes", str(mesh.n_nodes))]
+        rows += [("elements", f"{len(block)} {block.name}") for block in mesh.blocks if len(block)]
+        rows += [("material", str(material)) for material in used]
+        rows += [("material", f"none for {without} elements")] if without else []
+        rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))
+        if self.supports.links:
+            rows.append(("constraints", str(len(self.supports.links))))
+        rows += [("load", type(load).__name__) for load in self.loads]
+        for name, part in mesh.parts.items():
+            sizes = (
+                f"{len(part.nodes)} nodes, {len(part.elements)} elements, {len(part.conditions)} conditions"
+            )
+            rows.append(("part", f"{name}: {sizes}"))
+        return rows + [("note", note) for note in self.notes]
+
+    def __str__(self) -> str:
+        return "\n".join(f"{label:<12}{value}" for label, value in self.table())
+
+    def __repr__(self) -> str:
+        return f"Model({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"

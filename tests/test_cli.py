@@ -298,6 +298,13 @@ def test_check_tells_warnings_and_what_is_missing(run, folder):
     assert "translation x, y, z; rotation about x, y, z" in done.out
 
 
+def test_check_tells_all_that_is_missing_at_once(run, box):
+    needs = [line for line in run("check", "box.vtu").out.splitlines() if line.startswith("to solve")]
+    assert len(needs) == 2
+    assert "element 1 (KinematicLinear3D8N) has no material" in needs[0]
+    assert "can still move: translation x, y, z; rotation about x, y, z" in needs[1]
+
+
 def test_check_of_an_element_in_a_python_file(run, folder):
     good = (EXAMPLES / "my_wedge.py").read_text()
     Path("good.py").write_text(good)
@@ -382,6 +389,11 @@ WRONG_OPTIONS = {
     "unknown ending": ([*HELD, "-o", "out.foo"], "out.foo: unknown ending '.foo'"),
     "no ending": ([*HELD, "-o", "out"], "out: give the file an ending"),
     "output is a folder": ([*HELD, "-o", "sub.vtu"], "sub.vtu: cannot be written: it is a folder"),
+    "output twice": (
+        [*HELD, "-o", "out.json", "--json", "./out.json"],
+        "./out.json: is the input or another output",
+    ),
+    "output is the input": ([*HELD, "-o", "box.vtu"], "box.vtu: is the input or another output already"),
     "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
 }
 
@@ -434,8 +446,8 @@ def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command)
     assert not Path("out.mdpa").exists()
 
 
-@pytest.mark.parametrize("target", ["out", "out.json", "out.foo", "none/out.vtu"])
-def test_a_conversion_to_nowhere_is_refused(run, box, target):
+@pytest.mark.parametrize("target", ["out", "out.json", "out.foo", "none/out.vtu", "box.mdpa"])
+def test_a_conversion_to_nowhere_or_onto_itself_is_refused(run, box, target):
     assert run("convert", "box.mdpa", target).refuses(target)
     assert not list(Path().glob("out*"))
 

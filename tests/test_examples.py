@@ -1,5 +1,6 @@
 """Every example runs as a script and prints the numbers that are known."""
 
+import json
 import re
 import subprocess
 import sys
@@ -39,3 +40,20 @@ def test_python_of_the_readme_runs(number, tmp_path):
     out = run(sys.executable, "-c", python_blocks(README)[number], cwd=tmp_path)
     if "0.1322" in python_blocks(README)[number]:
         assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
+
+
+def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
+    out = tmp_path / "r.json"
+    folder = EXAMPLES / "cantilever"
+    run(sys.executable, "-m", "kratos_lite", "solve", folder / "ProjectParameters.json", "--json", out)
+    result = json.loads(out.read_text())
+    F, L, b, E, nu = 1e5 * 0.1**2, 1.0, 0.1, 210e9, 0.3
+    beam = F * L**3 / (3 * E * b**4 / 12) + F * L / (5 / 6 * E / (2 * (1 + nu)) * b**2)
+    work = result["strain_energy"]
+    assert abs(work / (F * beam / 2) - 1) < 0.02  # clamped edge and 10 x 2 x 2 bricks: 1.5 % stiff
+    assert result["total_reaction"][2] == pytest.approx(F, rel=1e-9)
+
+
+def test_own_element_passes_its_conformance_kit():
+    out = run(sys.executable, "-m", "kratos_lite", "check", EXAMPLES / "my_wedge.py")
+    assert "0 failed" in out

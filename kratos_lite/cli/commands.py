@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -43,9 +44,7 @@ class TerminalProgress:
 def solve(options: Namespace) -> int:
     """Solve a file, write what was asked for, print the summary."""
     start = perf_counter()
-    for path in (options.output, options.json, options.picture):
-        if path and not Path(path).parent.is_dir():
-            raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
+    _check_targets(options.input, options.output, options.json, options.picture)
     solver, tolerance = options.solver or "auto", 1e-10
     project = None
     if Path(options.input).suffix.lower() == ".json":
@@ -78,6 +77,18 @@ def solve(options: Namespace) -> int:
         for line in project.evaluate(result):
             print(line)
     return 0
+
+
+def _check_targets(source: str, *targets: str | None) -> None:
+    """Refuse, before any work is done, a target without a folder, given twice, or that is the input."""
+    taken = {Path(source).resolve()}
+    for target in filter(None, targets):
+        path = Path(target)
+        if not path.parent.is_dir():
+            raise InputError(f"{target}: the folder {path.parent} does not exist")
+        if path.resolve() in taken:
+            raise InputError(f"{target}: is the input or another output already; choose another name")
+        taken.add(path.resolve())
 
 
 def _write(result: Result, options: Namespace, project: object) -> list[str]:
@@ -137,13 +148,7 @@ def check(options: Namespace) -> int:
         from kratos_lite.io.kratos import model_from
 
         model = model_from(_document(options))
-    model.check_geometry()
-    needs = []
-    try:
-        warnings = model.check()
-    except ModelError as error:
-        needs.append(str(error))
-        warnings = _warnings_when_held(model)
+    needs, warnings = _needs(model)
     print(f"{path}: {model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements, no errors")
     for text in (*warnings, *model.notes):
         print(f"note     {text}")
@@ -152,13 +157,24 @@ def check(options: Namespace) -> int:
     return 0
 
 
-def _warnings_when_held(model: Model) -> list[str]:
-    """Return the warnings of a model that cannot be solved yet: they do not depend on what it lacks."""
+def _needs(model: Model) -> tuple[list[str], list[str]]:
+    """Return what a model lacks for a solution, and its warnings; the model gets all it lacks on the way."""
     from kratos_lite.materials import Isotropic3D
 
-    held = type(model)(model.mesh, Isotropic3D(E=1.0, nu=0.0))
-    held.fix(range(model.mesh.n_nodes))
-    return held.check()
+    needs: list[str] = []
+    warnings = model.check_geometry()
+    cures: tuple[Callable[[], None], ...] = (
+        lambda: model.assign(Isotropic3D(E=1.0, nu=0.0)),
+        lambda: model.fix(range(model.mesh.n_nodes), override=True),
+        lambda: None,
+    )
+    for cure in cures:
+        try:
+            return needs, model.check()
+        except ModelError as error:
+            needs += [str(error)] if str(error) not in needs else []
+            cure()
+    return needs, warnings
 
 
 def _check_python(path: Path) -> int:
@@ -181,6 +197,7 @@ def convert(options: Namespace) -> int:
     """Convert a file."""
     from kratos_lite.io.files import write_document
 
+    _check_targets(options.input, options.output)
     document = _document(options)
     lost = write_document(options.output, document)
     mesh = document.mesh

@@ -87,6 +87,4 @@ def _data(data: Data) -> str:
 def _parts(document: Document) -> Iterable[str]:
     for name, part in document.mesh.parts.items():
         indent = "  " * name.count(".")
-        sizes = {"nodes": part.nodes, "elements": part.elements, "conditions": part.conditions}
-        words = ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
-        yield f"{'part':<12}{indent}{name.rsplit('.', 1)[-1]}: {words}"
+        yield f"{'part':<12}{indent}{name.rsplit('.', 1)[-1]}: {part}"

@@ -18,10 +18,10 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
 
     Parameters
     ----------
-    path : .mdpa, any file of an .elem set or its stem, a .json run file, or any format of meshio;
-        also gzipped.
-    materials : take the materials from the file; False leaves them to the caller.
-    strict : refuse `.mdpa` rows that do not stand on lines of their own.
+    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, or
+        any format of meshio.
+    materials : take the materials from the file; False leaves them to the caller (but for run files).
+    strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
 
     Raises
     ------

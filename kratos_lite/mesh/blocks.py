@@ -64,6 +64,10 @@ class Part:
     tables: tuple[int, ...] = ()
     data: dict[str, Any] = field(default_factory=dict)
 
+    def __str__(self) -> str:
+        sizes = {"nodes": self.nodes, "elements": self.elements, "conditions": self.conditions}
+        return ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
+
 
 def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
     """Return the cells with these rows (counted through all blocks), block by block."""

@@ -981,8 +981,12 @@ def test_damaged_run_files_end_in_a_project_or_a_clear_error(folder):
 
 
 @pytest.mark.parametrize(("prefix", "count"), [("", 1), ("SmallDisplacement", 0)])
-def test_loads_that_kratos_lets_follow_the_faces_are_noted(folder, prefix, count):
+def test_pressures_that_kratos_lets_follow_the_faces_are_noted(folder, prefix, count):
     name = "SurfaceLoadCondition3D4N"
     (folder / "box.mdpa").write_text(box_mdpa().replace(f"SmallDisplacement{name}", prefix + name))
-    notes = read_project(write(folder, run_file([CLAMP], [push(1.0)]))).model.notes
-    assert sum(note.startswith(f"{name}: Kratos lets pressure follow") for note in notes) == count
+    scalar = "assign_scalar_variable_to_conditions_process"
+    pressure = process(scalar, "Structure.Top", "POSITIVE_FACE_PRESSURE", value=1.0)
+    notes = read_project(write(folder, run_file([CLAMP], [pressure]))).model.notes
+    assert (
+        sum(note.startswith(f"{name}: the pressure acts on the undeformed body") for note in notes) == count
+    )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
+from kratos_lite.io.kratos.to_model import USER_LAW
 from kratos_lite.loads import Gravity
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part
@@ -19,7 +20,7 @@ from kratos_lite.shapes import Point1
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": "LinearElasticOrthotropic3DLaw"}
+KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}
 
 
 def document_from(model: Model) -> Document:
@@ -87,6 +88,8 @@ def _values(material: LinearMaterial, gravity: Array) -> dict[str, Any]:
     constants = [item.name for item in constants_of(material)]  # type: ignore[arg-type]
     values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
+    if values["CONSTITUTIVE_LAW"] == USER_LAW:
+        values["ELASTICITY_TENSOR"] = material.C
     if gravity.any():
         values["VOLUME_ACCELERATION"] = gravity
     return values

@@ -18,6 +18,8 @@ from kratos_lite.model import Model
 
 ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}
 """Variables that say what material a Properties block means."""
+USER_LAW = "UserProvidedLinearElastic3DLaw"
+"""The law of Kratos that takes any ELASTICITY_TENSOR (6, 6) in Pa; it has no orthotropic one for solids."""
 
 
 def model_from(
@@ -137,7 +139,7 @@ def material_from(values: dict[str, Any]) -> LinearMaterial | None:
     if law is None and not ELASTIC & values.keys():
         return None
     name = "Isotropic3D" if law is None else str(law)
-    if law is None and "YOUNG_MODULUS_X" in values:
+    if law in (None, USER_LAW) and "YOUNG_MODULUS_X" in values:
         name = "Orthotropic3D"
     if name not in MATERIALS:
         known = [*MATERIALS, *(alias for m in MATERIALS for alias in MATERIALS.aliases(m))]
@@ -146,7 +148,14 @@ def material_from(values: dict[str, Any]) -> LinearMaterial | None:
             f"({', '.join(MATERIALS)} and their Kratos names);{nearest(name, known)} "
             "choose one of them, or give a material with --material"
         )
-    return MATERIALS[name].from_variables(values)
+    material = MATERIALS[name].from_variables(values)
+    if law == USER_LAW:
+        C = np.asarray(values.get("ELASTICITY_TENSOR"))
+        if C.shape != (6, 6) or not np.abs(C - material.C).max() <= 1e-9 * np.abs(material.C).max():
+            raise MaterialError(
+                f"ELASTICITY_TENSOR is not the one of the constants beside it for {name}; mend one"
+            )
+    return material
 
 
 def _apply_volume_loads(model: Model, properties: Properties, problems: Problems) -> None:

@@ -111,10 +111,24 @@ class Variables:
         positive, negative = PRESSURES
         pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
         nodal_pressure = self.nodal.get(positive, nodal_zero) - self.nodal.get(negative, nodal_zero)
+        if pressure.any() or nodal_pressure.any():
+            self._note_followers(model)
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         if not carried or not any(value.any() for value in values):
             return None
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
+
+    def _note_followers(self, model: Model) -> None:
+        """Note pressures that Kratos lets follow the deformed faces even in a linear analysis.
+
+        It adds the stiffness of the pressure to K; its small-displacement conditions do not.
+        """
+        names = {block.name for block in self.mesh.conditions if len(block)}
+        for name in sorted(n for n in names if n.startswith("SurfaceLoadCondition")):
+            model.notes.append(
+                f"{name}: the pressure acts on the undeformed body, as that of SmallDisplacement{name} in "
+                f"Kratos; {name} adds a pressure stiffness there"
+            )
 
     def _note_idle(self, model: Model, carried: set[str]) -> None:
         """Note load values that no condition carries."""

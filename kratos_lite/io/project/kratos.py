@@ -62,7 +62,6 @@ def read_kratos_project(
     document = _read_mesh(solver, folder, allow_outside, notes)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     case = Case(document.mesh, root, folder, times, moved, allow_outside)
-    notes += _followers(document)
     materials = _read_materials(solver, case, document, notes)
     actions, checks = _read_processes(settings, case, notes)
     model = model_from(
@@ -132,21 +131,6 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) 
         )
         document.constraints = []
     return document
-
-
-def _followers(document: Document) -> list[str]:
-    """Note loads that Kratos lets follow the deformed faces even in a linear analysis.
-
-    It adds the stiffness of their pressure and integrates over nodes that are moved already
-    (measured with 10.4.4); its small-displacement conditions do neither.
-    """
-    names = {block.name for block in document.mesh.conditions if len(block)}
-    return [
-        f"{name}: Kratos lets pressure follow the deformed faces; kratos_lite loads the undeformed body, "
-        f"as SmallDisplacement{name} does in Kratos"
-        for name in sorted(names)
-        if name.startswith("SurfaceLoadCondition")
-    ]
 
 
 def _read_materials(
