@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 
+collect_ignore = ["interop/kratos_driver.py"]
+"""Scripts that tests run in other processes."""
+
 
 @pytest.fixture(scope="session")
 def shared() -> Path:

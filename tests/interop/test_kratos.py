@@ -406,7 +406,7 @@ def test_orthotropic_body_is_that_of_kratos(tmp_path):
     again = kl.read(path)
     assert again.batches()[0].material == wood
     path.write_text(path.read_text().replace("YOUNG_MODULUS_X 11", "YOUNG_MODULUS_X 12"))
-    with pytest.raises(kl.InputError, match="a.mdpa:1[0-9]*: Properties 1: ELASTICITY_TENSOR is not the one"):
+    with pytest.raises(kl.InputError, match=r"a\.mdpa:1\d*: Properties 1: ELASTICITY_TENSOR is not"):
         kl.read(path)
 
 
