@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from kratos_lite.cli.options import apply
+from kratos_lite.cli.options import apply, material
 from kratos_lite.errors import InputError, ModelError
 
 if TYPE_CHECKING:
@@ -43,39 +43,32 @@ class TerminalProgress:
 
 def solve(options: Namespace) -> int:
     """Solve a file, write what was asked for, print the summary."""
-    start = perf_counter()
+    clock = perf_counter()
+    from kratos_lite.io.files import load
+
+    seconds = {"import": perf_counter() - clock}
+    clock = perf_counter()
     _check_targets(options.input, options.output, options.json, options.picture)
-    solver, tolerance = options.solver or "auto", 1e-10
-    project = None
-    if Path(options.input).suffix.lower() == ".json":
-        from kratos_lite.io.project import read_project
-
-        project = read_project(options.input)
-        model = project.model
-        solver = options.solver or project.solver
-        tolerance = project.tolerance
-    else:
-        from kratos_lite.io.files import read
-
-        model = read(options.input, materials=not options.material, strict=not options.lenient)
+    everywhere = any(material(text)[0] is None for text in options.material)
+    project = load(options.input, materials=not everywhere, strict=not options.lenient)
+    apply(project.model, options)
+    seconds["read"] = perf_counter() - clock
+    solver, tolerance = options.solver or project.solver, project.tolerance
     if options.tolerance is not None:
         tolerance = options.tolerance
-    apply(model, options)
-    read_seconds = perf_counter() - start
     progress = TerminalProgress()
     try:
-        result = model.solve(solver, tolerance, progress)
+        result = project.model.solve(solver, tolerance, progress)
     finally:
         progress.close()
-    result.report.seconds = {"read": read_seconds, **result.report.seconds}
-    outputs = _write(result, options, project)
+    result.report.seconds = {**seconds, **result.report.seconds}
+    outputs = _write(result, options, project.output)
     if not options.quiet:
         print(result)
         for path in outputs:
             print(f"{'written':<22}{path}")
-    if project is not None:
-        for line in project.evaluate(result):
-            print(line)
+    for line in project.evaluate(result):
+        print(line)
     return 0
 
 
@@ -91,10 +84,9 @@ def _check_targets(source: str, *targets: str | None) -> None:
         taken.add(path.resolve())
 
 
-def _write(result: Result, options: Namespace, project: object) -> list[str]:
+def _write(result: Result, options: Namespace, given: dict[str, str]) -> list[str]:
     """Write the files asked for on the command line or in the run file; return their names."""
     start = perf_counter()
-    given = getattr(project, "output", {}) or {}
     written = []
     for key, writer in (("output", result.save), ("json", result.save), ("picture", result.plot)):
         path = getattr(options, key) or given.get(key)
@@ -140,14 +132,9 @@ def check(options: Namespace) -> int:
     path = Path(options.input)
     if path.suffix == ".py":
         return _check_python(path)
-    if path.suffix.lower() == ".json":
-        from kratos_lite.io.project import read_project
+    from kratos_lite.io.files import read
 
-        model = read_project(path).model
-    else:
-        from kratos_lite.io.kratos import model_from
-
-        model = model_from(_document(options))
+    model = read(path, strict=not options.lenient)
     needs, warnings = _needs(model)
     print(f"{path}: {model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements, no errors")
     for text in (*warnings, *model.notes):

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
+from kratos_lite.io.kratos import model_from
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
+    from kratos_lite.io.project import Project
     from kratos_lite.model import Model
 
 
@@ -28,13 +30,16 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     InputError
         With file, line and cure of everything that is wrong.
     """
+    return load(path, materials=materials, strict=strict).model
+
+
+def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Project:
+    """Return the model that a file describes, and what a run file says beyond it; see `read`."""
+    from kratos_lite.io.project import Project, read_project
+
     if ending(path) == ".json":
-        from kratos_lite.io.project import read_project
-
-        return read_project(path).model
-    from kratos_lite.io.kratos import model_from
-
-    return model_from(read_document(path, strict=strict), materials=materials)
+        return read_project(path)
+    return Project(model_from(read_document(path, strict=strict), materials=materials))
 
 
 def write(path: str | Path, thing: Any) -> None:
