@@ -23,7 +23,7 @@ FLOORS = [
     {"result"},
     {"statics"},
     {"model"},
-    {"io.kratos", "io.describe"},
+    {"io.kratos", "io.describe", "io.scene"},
     {"io.project"},
     {"io.files"},
     {"cli"},

@@ -50,24 +50,24 @@ def solve(options: Namespace) -> int:
     clock = perf_counter()
     _check_targets(options.input, options.output, options.json, options.picture)
     everywhere = any(material(text)[0] is None for text in options.material)
-    project = load(options.input, materials=not everywhere, strict=not options.lenient)
-    apply(project.model, options)
+    scene = load(options.input, materials=not everywhere, strict=not options.lenient)
+    apply(scene.model, options)
     seconds["read"] = perf_counter() - clock
-    solver, tolerance = options.solver or project.solver, project.tolerance
+    solver, tolerance = options.solver or scene.solver, scene.tolerance
     if options.tolerance is not None:
         tolerance = options.tolerance
     progress = TerminalProgress()
     try:
-        result = project.model.solve(solver, tolerance, progress)
+        result = scene.model.solve(solver, tolerance, progress)
     finally:
         progress.close()
     result.report.seconds = {**seconds, **result.report.seconds}
-    outputs = _write(result, options, project.output)
+    outputs = _write(result, options, scene.output)
     if not options.quiet:
         print(result)
         for path in outputs:
             print(f"{'written':<22}{path}")
-    for line in project.evaluate(result):
+    for line in scene.evaluate(result):
         print(line)
     return 0
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from kratos_lite.errors import InputError
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
 from kratos_lite.io.kratos import model_from
+from kratos_lite.io.scene import Scene
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
-    from kratos_lite.io.project import Project
     from kratos_lite.model import Model
 
 
@@ -33,13 +33,13 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     return load(path, materials=materials, strict=strict).model
 
 
-def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Project:
+def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Scene:
     """Return the model that a file describes, and what a run file says beyond it; see `read`."""
-    from kratos_lite.io.project import Project, read_project
-
     if ending(path) == ".json":
+        from kratos_lite.io.project import read_project
+
         return read_project(path)
-    return Project(model_from(read_document(path, strict=strict), materials=materials))
+    return Scene(model_from(read_document(path, strict=strict), materials=materials))
 
 
 def write(path: str | Path, thing: Any) -> None:

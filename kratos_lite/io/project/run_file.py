@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.io.project.checks import Check
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
+from kratos_lite.io.scene import Scene
 from kratos_lite.loads import Gravity, Load, PointLoad, Pressure, Traction
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model import Model
-from kratos_lite.result import Result
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
@@ -28,31 +27,7 @@ LOADS: dict[str, Callable[[str, Any], Load]] = {
 KEYS = ("model", "material", "fix", "gravity", *LOADS, "solver", "tolerance", *OUTPUTS)
 
 
-@dataclass
-class Project:
-    """A model with what its run file says about solving, output and expected values.
-
-    Attributes
-    ----------
-    model : the model; ``model.notes`` tells what was not used.
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    tolerance : relative residual at which the iterative solver stops.
-    output : paths to write by the keys ``output``, ``json`` and ``picture``.
-    checks : comparisons with expected values.
-    """
-
-    model: Model
-    solver: str = "auto"
-    tolerance: float = 1e-10
-    output: dict[str, str] = field(default_factory=dict)
-    checks: list[Check] = field(default_factory=list)
-
-    def evaluate(self, result: Result) -> list[str]:
-        """Return one line for each check: passed, failed or not evaluated, with the numbers."""
-        return [check(result) for check in self.checks]
-
-
-def read_project(path: str | Path, *, allow_outside: bool = False) -> Project:
+def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     """Return the project of a run file: Kratos' ``ProjectParameters.json``, or our own.
 
     Our own has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
@@ -75,7 +50,7 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Project:
         from kratos_lite.io.project.kratos import read_kratos_project
 
         model, checks = read_kratos_project(settings, folder, allow_outside)
-        return Project(model, checks=checks)
+        return Scene(model, checks=checks)
     if "properties" in settings and "model" not in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     return _read_own(settings, folder, allow_outside)
@@ -95,7 +70,7 @@ class _Collector:
             return None
 
 
-def _read_own(settings: Settings, folder: Path, outside: bool) -> Project:
+def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
     collect = _Collector()
     for key in settings.unknown(KEYS):
         collect.problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
@@ -116,7 +91,7 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Project:
     if gravity is not None:
         model.add(Gravity(gravity))
     collect.problems.raise_if_any()
-    return Project(model, solver, tolerance, output)
+    return Scene(model, solver, tolerance, output)
 
 
 def _model_path(settings: Settings, folder: Path, outside: bool) -> Path:
