@@ -155,28 +155,41 @@ def _triad(axes: Any, X: Floats, directions: Floats) -> None:
         axes.text(*(low + 1.25 * length * axis), name, ha="center", va="center", style="italic", color="0.3")
 
 
-def _figure(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
+def _canvas() -> Any:
+    """Return the canvas class that draws without a screen."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
     except ImportError as error:
         raise KratosLiteError("pictures need matplotlib: pip install kratos-lite[view]") from error
+    return FigureCanvasAgg
+
+
+def _figure(size: tuple[float, float]) -> tuple[Any, Any]:
+    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
+    canvas = _canvas()
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=size, dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    canvas(figure)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.axis("off")
     return figure, axes
 
 
-def _save(path: str | Path, figure: Any) -> None:
+def check_picture_target(path: str | Path) -> str:
+    """Return the format of a picture; InputError for one that cannot be written."""
     kind = Path(path).suffix[1:].lower() or "png"
-    known = figure.canvas.get_supported_filetypes()
+    known = _canvas().get_supported_filetypes()
     if kind not in known:
         raise InputError(
             f"{path}: pictures cannot be written as .{kind}; known are {' '.join(sorted(known))}"
         )
+    return kind
+
+
+def _save(path: str | Path, figure: Any) -> None:
+    kind = check_picture_target(path)
     write_whole(path, lambda file: figure.savefig(file, format=kind, bbox_inches="tight", pad_inches=0.1))
 
 

@@ -45,10 +45,15 @@ def solve(options: Namespace) -> int:
     """Solve a file, write what was asked for, print the summary."""
     clock = perf_counter()
     from kratos_lite.io.files import load
+    from kratos_lite.io.results import check_picture, check_result_ending
 
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     _check_targets(options.input, options.output, options.json, options.picture)
+    if options.output:
+        check_result_ending(options.output)
+    if options.picture:
+        check_picture(options.picture)
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
     apply(scene.model, options)

@@ -59,7 +59,7 @@ def read_meshio(path: str | Path) -> Document:
         The ending is unknown, the file cannot be read, or it holds no mesh in three dimensions.
     """
     path = Path(path)
-    _known(path)
+    check_ending(path)
     with _guarded(path, "read") as (meshio, said):
         found = meshio.read(path)
     _check(path, found)
@@ -86,7 +86,7 @@ def write_meshio(
         The ending is unknown, or the format cannot hold this mesh, or the file cannot be written.
     """
     path = Path(path)
-    _known(path)
+    check_ending(path)
     types = {shape: name for name, shape in CELLS.items()}
     cells, slices, start = [], [], 0
     for block in mesh.blocks:
@@ -127,11 +127,11 @@ def _endings() -> list[str]:
     return sorted(set(meshio.extension_to_filetypes) - _OURS)
 
 
-def _known(path: Path) -> None:
+def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
     """Refuse an ending that meshio does not know, in words rather than by leaving the program."""
     endings = _endings()
     if not path.name.lower().endswith(tuple(endings)):
-        raise InputError(f"{path}: unknown ending {path.suffix!r}; known are .mdpa .elem {' '.join(endings)}")
+        raise InputError(f"{path}: unknown ending {path.suffix!r}; known are {own} {' '.join(endings)}")
 
 
 @contextmanager

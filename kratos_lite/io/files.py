@@ -42,11 +42,16 @@ def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Sc
     return Scene(model_from(read_document(path, strict=strict), materials=materials))
 
 
-def write(path: str | Path, thing: Any) -> None:
+def write(path: str | Path, thing: Any) -> list[str]:
     """Write a result, a model or a mesh by the ending of `path`.
 
     A result goes to .vtu, .json or a format of meshio; a model or a mesh to .mdpa, an .elem set,
     .vtu or a format of meshio.
+
+    Returns
+    -------
+    list of str
+        What the format cannot hold and was left out.
     """
     from kratos_lite.io.document import Document
     from kratos_lite.mesh import Mesh
@@ -55,16 +60,15 @@ def write(path: str | Path, thing: Any) -> None:
 
     if isinstance(thing, Result):
         thing.save(path)
-    elif isinstance(thing, Model):
+        return []
+    if isinstance(thing, Model):
         from kratos_lite.io.kratos import document_from
 
-        write_document(path, document_from(thing))
-    elif isinstance(thing, Mesh):
-        write_document(path, Document(thing))
-    elif isinstance(thing, Document):
-        write_document(path, thing)
-    else:
-        raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
+        document = document_from(thing)
+        return [str(note) for note in document.notes] + write_document(path, document)
+    if isinstance(thing, (Mesh, Document)):
+        return write_document(path, Document(thing) if isinstance(thing, Mesh) else thing)
+    raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
 
 
 def write_document(path: str | Path, document: Document) -> list[str]:
@@ -74,7 +78,7 @@ def write_document(path: str | Path, document: Document) -> list[str]:
         from kratos_lite.io.mdpa import write_mdpa
 
         write_mdpa(path, document)
-        return []
+        return _mixed(document)
     if kind in ELEM_SET:
         from kratos_lite.io.elem import write_elem
 
@@ -92,18 +96,22 @@ def write_document(path: str | Path, document: Document) -> list[str]:
         from kratos_lite.io.bridge import write_meshio
 
         write_meshio(path, document.mesh, points, cells)
-    lost = [
-        "properties",
-        "nodal_data",
-        "element_data",
-        "condition_data",
-        "constraints",
-        "tables",
-        "model_data",
-    ]
-    kept = [name for name in lost if getattr(document, name)]
-    notes = [f"{kind} files hold meshes only; left out: {', '.join(kept)}"] if kept else []
-    unknown = [
-        f"{len(block)} {block.name}" for block in document.mesh.blocks if block.shape is None and len(block)
-    ]
+    return _left_out(kind, document)
+
+
+def _mixed(document: Document) -> list[str]:
+    """Note constraints between different directions, which Kratos 10 shifts by one when it reads them."""
+    mixed = [c.id for c in document.constraints if {name for _, name in c.masters} - {c.slave[1]}]
+    shown = ", ".join(map(str, mixed[:5])) + (" …" if len(mixed) > 5 else "")
+    text = f"constraints {shown} mix directions; kratos_lite reads them as meant, Kratos does not"
+    return [text] if mixed else []
+
+
+def _left_out(kind: str, document: Document) -> list[str]:
+    """Note what a format of meshes does not hold."""
+    data = ("properties", "nodal_data", "element_data", "condition_data", "constraints", "tables")
+    lost = [name.replace("_", " ") for name in data if getattr(document, name)]
+    lost += ["parts and conditions"] if document.mesh.parts or document.mesh.conditions else []
+    notes = [f"{kind} files hold meshes only; left out: {', '.join(lost)}"] if lost else []
+    unknown = [f"{len(b)} {b.name}" for b in document.mesh.blocks if b.shape is None and len(b)]
     return [*notes, f"left out, for their shape is unknown: {', '.join(unknown)}"] if unknown else notes

@@ -42,6 +42,7 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
 
 def write_result(path: str | Path, result: Result) -> None:
     """Write a result by the ending of `path`: .vtu, .json, or a format of meshio."""
+    check_result_ending(path)
     ending = Path(path).suffix.lower()
     if ending == ".json":
         write_json(path, result)
@@ -51,12 +52,28 @@ def write_result(path: str | Path, result: Result) -> None:
         from kratos_lite.io.vtu import write_vtu
 
         write_vtu(path, result.mesh, points, cells)
-    elif ending:
+    else:
         from kratos_lite.io.bridge import write_meshio
 
         write_meshio(path, result.mesh, points, cells)
-    else:
+
+
+def check_result_ending(path: str | Path) -> None:
+    """Raise InputError, before any work is done, for an ending that no writer of results has."""
+    ending = Path(path).suffix.lower()
+    if not ending:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
+    if ending not in (".vtu", ".json"):
+        from kratos_lite.io.bridge import check_ending
+
+        check_ending(Path(path), own=".vtu .json")
+
+
+def check_picture(path: str | Path) -> None:
+    """Raise KratosLiteError, before any work is done, if a picture of this name cannot be made."""
+    from kratos_lite.view import check_picture_target
+
+    check_picture_target(Path(path))
 
 
 def summary(result: Result) -> dict[str, Any]:

@@ -75,7 +75,8 @@ class Variables:
         if loads is not None:
             model.add(loads)
         for name in sorted({*self.nodal, *self.conditional} - USED):
-            model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
+            if any(name in fields and fields[name].any() for fields in (self.nodal, self.conditional)):
+                model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
     def _apply_supports(self, model: Model) -> None:
         for axis in "XYZ":
