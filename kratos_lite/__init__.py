@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     )
     from kratos_lite.generate import annulus, box
     from kratos_lite.io.files import read, write
-    from kratos_lite.loads import BodyForce, Gravity, NodalForces, PointLoad, Pressure, Traction
+    from kratos_lite.loads import BodyForce, Gravity, LineLoad, NodalForces, PointLoad, Pressure, Traction
     from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
     from kratos_lite.mesh import Block, Mesh, Part
     from kratos_lite.model import Model
@@ -53,7 +53,7 @@ _HOME = {
     "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
     "kratos_lite.generate": "annulus box",
     "kratos_lite.io.files": "read write",
-    "kratos_lite.loads": "BodyForce Gravity NodalForces PointLoad Pressure Traction",
+    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Traction",
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",
     "kratos_lite.model": "Model",
@@ -81,6 +81,7 @@ __all__ = [
     "KinematicLinear3D20N",
     "KinematicLinear3D27N",
     "KratosLiteError",
+    "LineLoad",
     "LinearMaterial",
     "MaterialError",
     "Mesh",

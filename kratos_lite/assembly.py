@@ -8,12 +8,12 @@ list of the whole model ever exists.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.batches import Batch
+from kratos_lite.batches import Batch, add_nodal
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array
@@ -41,9 +41,10 @@ class Pattern:
         for nodes in connectivity:
             m, k = nodes.shape
             pointer = np.arange(0, m * k + 1, k)
-            ones = np.ones(m * k, dtype=np.int8)
+            # booleans, as the product only asks whether two nodes share an element, however many
+            ones = np.ones(m * k, dtype=bool)
             groups.append(csr_array((ones, nodes.ravel(), pointer), shape=(m, n_nodes)).T)
-        incidence = hstack(groups, format="csr", dtype=np.int8)
+        incidence = hstack(groups, format="csr", dtype=bool)
         graph = (incidence @ incidence.T).tocsr()
         graph.sort_indices()
         self.n_nodes = n_nodes
@@ -59,8 +60,27 @@ class Pattern:
         step = max(1, 1_000_000 // (k * k))
         for start in range(0, m, step):
             n = nodes[start : start + step].astype(np.int64)
-            found[start : start + step] = np.searchsorted(keys, n[:, :, None] * self.n_nodes + n[:, None, :])
+            wanted = n[:, :, None] * self.n_nodes + n[:, None, :]
+            place = np.searchsorted(keys, wanted)
+            if (keys[np.minimum(place, len(keys) - 1)] != wanted).any():
+                raise AssertionError("the sparsity pattern misses a pair of nodes that share an element")
+            found[start : start + step] = place
         return found
+
+
+class PatternCache:
+    """The last pattern made, for as long as the connectivity stays the same."""
+
+    def __init__(self) -> None:
+        self._key: tuple[int, ...] = ()
+        self._pattern: Pattern | None = None
+
+    def get(self, n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> Pattern:
+        """Return the pattern of this connectivity, made anew only if it differs from the last."""
+        key = (n_nodes, *(hash(nodes.tobytes()) for nodes in connectivity))
+        if self._pattern is None or key != self._key:
+            self._key, self._pattern = key, Pattern(n_nodes, connectivity)
+        return self._pattern
 
 
 def _add_blocks(data: Array, positions: NDArray[np.int32], matrices: Array) -> None:
@@ -114,16 +134,12 @@ def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:
     return K.reshape(n, n)
 
 
-def internal_load(points: Array, batches: Sequence[Batch], u: Array, prestressed: bool = True) -> Array:
+def internal_load(points: Array, batches: Sequence[Batch], u: Array) -> Array:
     """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
-    from kratos_lite.batches import add_nodal
-
     total = np.zeros_like(points)
     for batch in batches:
         for chunk in batch.chunks():
             element, nodes = batch.at(points, chunk), batch.nodes[chunk]
-            stress: Any = element.stress(batch.material.C, u[nodes])
-            if prestressed:
-                stress = stress + batch.initial_stress(chunk)
+            stress = batch.material.stress(element.strain(u[nodes])) + batch.initial_stress(chunk)
             add_nodal(total, nodes, element.internal_load(stress))
     return total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,12 +97,17 @@ class Gravity(BodyForce):
         return batch.material.density * self.force
 
 
-def _faces(mesh: Mesh, where: Where, what: str) -> list[Block]:
+SURFACES = ("triangle", "quadrilateral")
+
+
+def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
     faces = mesh.faces(where)
     for block in faces:
-        if block.shape is None:
+        if block.shape is None or block.shape.cell not in cells:
+            kind = "of the unknown kind" if block.shape is None else "of another kind,"
             raise ModelError(
-                f"{what} meets conditions of the unknown kind {block.name} (the first is {block.ids[0]})"
+                f"{what} acts on {' and '.join(cells)}s; it meets conditions {kind} {block.name} "
+                f"(the first is {block.ids[0]})"
             )
     if not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
@@ -113,13 +119,15 @@ def _faces(mesh: Mesh, where: Where, what: str) -> list[Block]:
 
 
 class Traction(Load):
-    """Force per area on the faces of a part (per length on lines, per node on points).
+    """Force per area on the faces of a part.
 
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
     traction : (3,) float, Pa.
     """
+
+    cells: ClassVar[tuple[str, ...]] = SURFACES
 
     def __init__(self, where: Where, traction: ArrayLike) -> None:
         self.where = where
@@ -128,10 +136,22 @@ class Traction(Load):
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N t dA as nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
-        for block in _faces(mesh, self.where, "a traction"):
+        for block in _faces(mesh, self.where, f"a {type(self).__name__.lower()}", self.cells):
             assert block.shape is not None
             add_nodal(total, block.nodes, surface_load(block.shape, mesh.points[block.nodes], self.traction))
         return total
+
+
+class LineLoad(Traction):
+    """Force per length on the line conditions of a part.
+
+    Parameters
+    ----------
+    where : part with line conditions.
+    traction : (3,) float, N/m.
+    """
+
+    cells: ClassVar[tuple[str, ...]] = ("line",)
 
 
 class Pressure(Load):
@@ -156,8 +176,7 @@ class Pressure(Load):
         """Return -∫ N p n dA as nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
         for block in _faces(mesh, self.where, "a pressure"):
-            if block.shape is None or block.shape.cell not in ("triangle", "quadrilateral"):
-                raise ModelError(f"a pressure acts on faces; {block.name} is not one")
+            assert block.shape is not None
             sign = outward_signs(mesh, block) if self.normal == "outward" else np.ones(len(block))
             p = self.pressure * sign
             add_nodal(total, block.nodes, surface_pressure(block.shape, mesh.points[block.nodes], p))
@@ -241,7 +260,7 @@ class ConditionLoads(Load):
             if force.any():
                 add_nodal(total, block.nodes, surface_load(block.shape, X, force))
             pressure = self.pressure[rows, None] + self.nodal_pressure[block.nodes]
-            if pressure.any() and block.shape.cell in ("triangle", "quadrilateral"):
+            if pressure.any() and block.shape.cell in SURFACES:
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
 
@@ -250,7 +269,7 @@ def _check_loadable(block: Block, force: bool, pressure: bool) -> None:
     """Raise ModelError for a load stated on conditions that cannot carry it."""
     if block.shape is None and (force or pressure):
         raise ModelError(f"a load is given on conditions of the unknown kind {block.name}")
-    if block.shape is not None and pressure and block.shape.cell not in ("triangle", "quadrilateral"):
+    if block.shape is not None and pressure and block.shape.cell not in SURFACES:
         raise ModelError(f"a pressure acts on faces; {block.name} is not one")
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite import checks, mobility
 from kratos_lite.arguments import finite
-from kratos_lite.assembly import Progress
+from kratos_lite.assembly import PatternCache, Progress
 from kratos_lite.batches import Batch
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, ModelError
@@ -53,6 +53,7 @@ class Model:
         self.mesh = mesh
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
+        self.patterns = PatternCache()
         self.notes: list[str] = []
         self.initial_displacement: Array | None = None
         self.prestress: Array | None = None

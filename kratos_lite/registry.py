@@ -42,7 +42,7 @@ class Registry(Generic[T]):
             self._aliases[alias] = name
 
     def __getitem__(self, name: str) -> T:
-        key = self._aliases.get(name, name)
+        key = name if name in self._items else self._aliases.get(name, name)
         if key not in self._items:
             known = [*self._items, *self._aliases]
             raise InputError(f"unknown {self.kind} {name!r}.{nearest(name, known)}")

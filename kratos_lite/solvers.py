@@ -7,7 +7,6 @@ which x would be exact.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -31,11 +30,7 @@ DIRECT_LIMIT = 10_000
 """Up to this many unknowns factorising is the fastest sparse way."""
 FALLBACK_LIMIT = 150_000
 """Up to this many unknowns a factorisation is tried when the iteration fails."""
-ROUND_OFF = 1e-13
-"""A backward error below this is as good as the numbers allow."""
 METHODS = ("auto", "dense", "direct", "amg")
-
-log = logging.getLogger("kratos_lite")
 
 
 @dataclass(frozen=True)
@@ -49,8 +44,8 @@ class Solution:
     backward_error: float
 
 
-def choose(method: str, unknowns: int, symmetric: bool = True) -> tuple[str, str]:
-    """Return the method to use and the reason, in words.
+def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) -> tuple[str, str]:
+    """Return the method to use for `unknowns` free ones of `dofs`, and the reason in words.
 
     >>> choose("auto", 24)
     ('dense', '24 unknowns ≤ 600: a full matrix is fastest')
@@ -59,7 +54,7 @@ def choose(method: str, unknowns: int, symmetric: bool = True) -> tuple[str, str
         raise InputError(f"solver must be one of {', '.join(METHODS)}; got {method!r}")
     if method != "auto":
         return method, "asked for"
-    if unknowns <= DENSE_LIMIT:
+    if unknowns <= DENSE_LIMIT and dofs <= 4 * DENSE_LIMIT:
         return "dense", f"{unknowns} unknowns ≤ {DENSE_LIMIT}: a full matrix is fastest"
     if unknowns <= DIRECT_LIMIT:
         return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorisation is fastest"
@@ -163,7 +158,7 @@ def conjugate_gradients(
         r -= alpha * Ap
         norm = float(np.linalg.norm(r))
         if progress:
-            progress("solve", min(1.0, np.log(norm / start) / np.log(tolerance)))
+            progress("solve", min(1.0, np.log(max(norm, 1e-300) / start) / np.log(tolerance)))
         limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
         if norm <= limit:
             return x, iteration, True

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import checks, solvers
-from kratos_lite.assembly import Pattern, Progress, assemble_dense, assemble_stiffness, internal_load
+from kratos_lite.assembly import Progress, assemble_dense, assemble_stiffness, internal_load
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.loads import check_loads
@@ -61,7 +61,7 @@ def solve_static(
     points = model.mesh.points[active]
     reduced = reduction(model.supports, active)
     f = forces[active].ravel()
-    method, reason = solvers.choose(solver, len(reduced.free))
+    method, reason = solvers.choose(solver, len(reduced.free), len(f))
     if method == "dense" and len(f) > solvers.DENSE_MAX:
         raise InputError(f"solver='dense' is for up to {solvers.DENSE_MAX} degrees of freedom; got {len(f)}")
     with phase("assemble"):
@@ -69,7 +69,8 @@ def solve_static(
         if method == "dense":
             K = assemble_dense(points, local)
         else:
-            K = assemble_stiffness(points, local, Pattern(len(points), [b.nodes for b in local]), progress)
+            pattern = model.patterns.get(len(points), [batch.nodes for batch in local])
+            K = assemble_stiffness(points, local, pattern, progress)
     with phase("solve"):
         solution = solve_reduced(K, f, reduced, method, tolerance, points, progress)
         if solution.method == method:
@@ -87,6 +88,11 @@ def solve_static(
                 f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
                 "ask for a smaller tolerance, or look for very thin elements, very unlike stiffnesses or "
                 "nearly free parts"
+            )
+        if max(force, moment) > 1e-4:
+            raise SolveError(
+                f"loads and reactions miss equilibrium by {force:.1e} (forces) and {moment:.1e} (moments) of "
+                "their size; look for very unlike stiffnesses, and please report a model that has none"
             )
         warnings += checks.check_rounding(noise, loads, loads - forces, reactions, model.supports)
     report = Report(
@@ -127,9 +133,7 @@ def initial_loads(model: Model, batches: Sequence[Batch]) -> Array:
 def renumber(model: Model, batches: list[Batch], forces: Array) -> tuple[NDArray[np.int64], list[Batch]]:
     """Return the rows of the nodes that elements use, and the batches numbered by them."""
     mesh = model.mesh
-    used = np.zeros(mesh.n_nodes, dtype=bool)
-    for batch in batches:
-        used[batch.nodes] = True
+    used = mesh.used_nodes()
     lost = np.flatnonzero(~used & (forces != 0).any(axis=1))
     if len(lost):
         raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")

@@ -171,7 +171,7 @@ def test_points_of_each_rule_by_degree(cell, counts):
         ("tetrahedron", [1, 4, 8, 15, 15]),
         ("hexahedron", [1, 8, 27, 64, 125]),
         ("pyramid", [1, 8, 27, 64, 125]),
-        ("wedge", [1, 12, 21, 64, 125]),
+        ("wedge", [3, 6, 9, 12, 15]),
         ("quadrilateral", [1, 4, 9, 16, 25]),
         ("line", [1, 2, 3, 4, 5]),
     ],

@@ -102,7 +102,10 @@ def _add_solve(commands: object) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code: 0, 1 for a defect of ours, 2 for bad input, 130 for Ctrl-C."""
+    """Run one command; return its exit code.
+
+    0, 1 for a defect of ours, 2 for bad input, 3 for a check of the run file that failed, 130 for Ctrl-C.
+    """
     options = build_parser().parse_args(_join_negative(sys.argv[1:] if arguments is None else arguments))
     from kratos_lite.cli import commands
     from kratos_lite.errors import KratosLiteError

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from kratos_lite.cli.options import apply, material
 from kratos_lite.errors import InputError, ModelError
 
+EXIT_CHECK_FAILED = 3
+
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
     from kratos_lite.model import Model
@@ -72,9 +74,10 @@ def solve(options: Namespace) -> int:
         print(result)
         for path in outputs:
             print(f"{'written':<22}{path}")
-    for line in scene.evaluate(result):
+    lines = scene.evaluate(result)
+    for line in lines:
         print(line)
-    return 0
+    return EXIT_CHECK_FAILED if any(" failed " in line for line in lines) else 0
 
 
 def _check_targets(source: str, *targets: str | None) -> None:

@@ -108,7 +108,7 @@ class KinematicLinear:
             cls.mass_rule = cls.rule
         suffix = cls.__name__.removeprefix("KinematicLinear")
         same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]
-        ELEMENTS.add(cls.__name__, cls, [*cls.aliases, *same])
+        ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same])
 
     def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
         self.X: Array = np.asarray(X, dtype=float)
@@ -279,15 +279,15 @@ class KinematicLinear:
     def lumped_mass(self, density: ArrayLike) -> Array:
         """Return the mass of each node as (..., n) in kg; always positive, sums to the mass.
 
-        Row sums where these are positive on the reference cell, otherwise the scaled diagonal
-        of Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
+        Row sums where these are all positive, on the reference cell and on the element; otherwise
+        the scaled diagonal of Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
         """
         m = self.scalar_mass(density)
-        if has_positive_row_sums(self.shape, self.mass_rule):
-            return np.asarray(m.sum(axis=-1))
-        diagonal = np.diagonal(m, axis1=-2, axis2=-1)
-        scale = m.sum(axis=(-2, -1)) / diagonal.sum(axis=-1)
-        return np.asarray(diagonal * scale[..., None])
+        sums, diagonal = m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1)
+        scaled = diagonal * (sums.sum(axis=-1) / diagonal.sum(axis=-1))[..., None]
+        if not has_positive_row_sums(self.shape, self.mass_rule):
+            return np.asarray(scaled)
+        return np.asarray(np.where((sums > 0).all(axis=-1)[..., None], sums, scaled))
 
 
 def _isotropic(C: Array) -> tuple[float, float] | None:

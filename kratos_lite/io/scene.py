@@ -29,5 +29,5 @@ class Scene:
     checks: list[Callable[[Result], str]] = field(default_factory=list)
 
     def evaluate(self, result: Result) -> list[str]:
-        """Return one line for each check: passed, failed or not evaluated, with the numbers."""
+        """Return one line for each check, "check passed/failed/not evaluated: …", with the numbers."""
         return [check(result) for check in self.checks]

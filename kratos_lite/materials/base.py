@@ -39,7 +39,7 @@ class LinearMaterial:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        MATERIALS.add(cls.__name__, cls, cls.aliases)
+        MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
 
     def __post_init__(self) -> None:
         if is_dataclass(self):

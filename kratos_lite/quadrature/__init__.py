@@ -131,7 +131,11 @@ def tetrahedron(degree: int) -> Rule:
 @lru_cache
 def wedge(degree: int) -> Rule:
     """Return the product of a triangle rule and a Gauss-Legendre rule on t in [-1, 1]."""
-    base, height = triangle(degree), line(degree)
+    return _prism(triangle(degree), line(degree))
+
+
+def _prism(base: Rule, height: Rule) -> Rule:
+    """Return the product of a rule on the triangle and one on the line."""
     points = [(*rs, t) for t in height.points[:, 0] for rs in base.points]
     weights = np.outer(height.weights, base.weights).ravel()
     return Rule(np.array(points), weights, min(base.degree, height.degree), f"{base.name} x {height.name}")
@@ -176,8 +180,11 @@ def rule_for(cell: str, degree: int) -> Rule:
 def by_order(cell: str, order: int) -> Rule:
     """Return the rule that INTEGRATION_ORDER 1 … 5 asks for.
 
-    Tetrahedra: degree = order.  Other cells: `order` points in each direction, degree 2·order - 1.
+    Tetrahedra: degree = order.  Wedges: three points in each of `order` layers.  Hexahedra and
+    pyramids: `order` points in each direction, degree 2·order - 1.
     """
     if order not in (1, 2, 3, 4, 5):
         raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")
+    if cell == "wedge":
+        return _prism(triangle(2), line(2 * order - 1))
     return rule_for(cell, order if cell == "tetrahedron" else 2 * order - 1)

@@ -111,7 +111,7 @@ def test_pressure_on_a_face_inside_the_body_is_refused():
         nodal(mesh, kl.Pressure("cut", 1.0))
 
 
-def test_traction_on_a_line_is_a_force_per_length():
+def test_line_load_is_a_force_per_length():
     from kratos_lite.shapes import Line3
 
     mesh = kl.box((1, 1, 2), element=kind(20))
@@ -119,7 +119,7 @@ def test_traction_on_a_line_is_a_force_per_length():
     line = kl.Block("Line", np.array([ends], dtype=np.int32), np.array([1]), np.array([0]), Line3)
     edge = kl.Part(nodes=np.array(ends), conditions=np.array([0]))
     mesh = kl.Mesh(mesh.points, mesh.blocks, conditions=[line], parts={"edge": edge})
-    forces = nodal(mesh, kl.Traction("edge", (0, 6, 0)))
+    forces = nodal(mesh, kl.LineLoad("edge", (0, 6, 0)))
     np.testing.assert_allclose(forces[ends, 1], (2, 2, 8), rtol=1e-14)
     with pytest.raises(kl.ModelError, match="a pressure acts on faces; Line is not one"):
         nodal(mesh, kl.Pressure("edge", 1.0))
