@@ -13,7 +13,7 @@ from kratos_lite.arguments import finite
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where, WhereElements
+from kratos_lite.mesh import Block, Mesh, Where, WhereElements, outward_signs
 from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
@@ -102,17 +102,17 @@ SURFACES = ("triangle", "quadrilateral")
 
 def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
     faces = mesh.faces(where)
+    wanted = "faces" if cells == SURFACES else "lines"
     for block in faces:
         if block.shape is None or block.shape.cell not in cells:
-            kind = "of the unknown kind" if block.shape is None else "of another kind,"
+            kind = "conditions of the unknown kind" if block.shape is None else "other conditions,"
             raise ModelError(
-                f"{what} acts on {' and '.join(cells)}s; it meets conditions {kind} {block.name} "
-                f"(the first is {block.ids[0]})"
+                f"{what} acts on {wanted}; it meets {kind} {block.name} (the first is {block.ids[0]})"
             )
     if not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
         raise ModelError(
-            f"{what} finds no face on {name}: it has no surface conditions and no element face "
+            f"{what} finds no {wanted[:-1]} on {name}: it has no conditions and no element face "
             "on the boundary has all its nodes in it"
         )
     return faces
@@ -177,8 +177,7 @@ class Pressure(Load):
         total = np.zeros_like(mesh.points)
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
-            sign = outward_signs(mesh, block) if self.normal == "outward" else np.ones(len(block))
-            p = self.pressure * sign
+            p = self.pressure * (outward(mesh, block) if self.normal == "outward" else np.ones(len(block)))
             add_nodal(total, block.nodes, surface_pressure(block.shape, mesh.points[block.nodes], p))
         return total
 
@@ -277,35 +276,22 @@ def check_loads(
     loads: Sequence[Load], batches: Sequence[Batch], forces: Array, supports: Supports
 ) -> list[str]:
     """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
-    warnings = []
+    moved = supports.values.any() or any(link.constant for link in supports.links)
     if any(isinstance(load, Gravity) for load in loads) and all(b.material.density == 0 for b in batches):
-        warnings.append("gravity acts on no mass: every material has density 0; give density in kg/m³")
-    elif forces.any() and not forces[~supports.fixed].any() and not supports.values.any():
-        warnings.append("all loads act on fixed components, so nothing moves")
-    return warnings
+        return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
+    if not forces.any() and not moved:
+        return ["no load acts and no displacement is prescribed, so nothing moves"]
+    if not forces[~supports.fixed].any() and not moved:
+        return ["all loads act on fixed components, so nothing moves"]
+    return []
 
 
-def outward_signs(mesh: Mesh, block: Block) -> Array:
-    """Return +1 for faces whose node order runs counter-clockwise from outside, else -1.
-
-    A face that is not on the boundary of the body has no outward side: that is an error.
-    """
-    assert block.shape is not None
-    c = block.shape.corners
-    corners = block.nodes[:, :c]
-    boundary = [b.nodes[:, :c] for b in mesh.boundary if b.shape is not None and b.shape.corners == c]
-    outside = np.vstack([np.zeros((0, c), dtype=np.int32), *boundary])
-    both, k = np.vstack([outside, corners]), len(outside)
-    _, key = np.unique(np.sort(both, axis=1), axis=0, return_inverse=True)
-    key = key.ravel()
-    owner = np.full(key.max(initial=-1) + 1, -1)
-    owner[key[:k]] = np.arange(k)
-    match = owner[key[k:]]
-    if (match < 0).any():
-        lost = block.ids[int(np.argmax(match < 0))]
+def outward(mesh: Mesh, block: Block) -> Array:
+    """Return +1 for faces whose nodes run counter-clockwise from outside the body, else -1."""
+    signs = outward_signs(mesh.boundary, block)
+    if (signs == 0).any():
+        lost = block.ids[int(np.argmax(signs == 0))]
         raise ModelError(
             f"face {lost} ({block.name}) is not on the boundary of the body, so it has no outward normal"
         )
-    start = np.argmax(outside[match] == corners[:, :1], axis=1)
-    following = np.take_along_axis(outside[match], ((start + 1) % c)[:, None], axis=1)[:, 0]
-    return np.where(following == corners[:, 1], 1.0, -1.0)
+    return signs

@@ -123,11 +123,36 @@ def _halved_squares(mesh: Mesh, key: NDArray[np.uint64]) -> Ints:
     return np.concatenate(elements)[np.isin(three, np.concatenate(triangles)).any(axis=1)]
 
 
-def bodies(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
-    """Return the body of each node, and the nodes that belong to a second body, with that body.
+@dataclass(frozen=True)
+class Bodies:
+    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it.
 
-    A body is a set of elements joined by faces; nodes without elements have body -1.
+    Attributes
+    ----------
+    part : (n,) int, the first body of each node, -1 for nodes without elements.
+    node, body : all pairs, sorted by node.
     """
+
+    part: Ints
+    node: Ints
+    body: Ints
+
+    @property
+    def joints(self) -> tuple[Ints, Ints]:
+        """Nodes that belong to a further body, and that body."""
+        further = self.body != self.part[self.node]
+        return self.node[further], self.body[further]
+
+    def frames(self, points: Array) -> tuple[Array, Array]:
+        """Return the centre (b, 3) and the size (b,) of each body."""
+        order = np.argsort(self.body, kind="stable")
+        X, start = points[self.node[order]], np.flatnonzero(np.diff(self.body[order], prepend=-1))
+        low, high = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
+        return (low + high) / 2, np.maximum((high - low).max(axis=1), np.finfo(float).tiny)
+
+
+def bodies(mesh: Mesh) -> Bodies:
+    """Return the bodies of a mesh: sets of elements that are joined by faces."""
     faces = all_faces(mesh)
     one, other = faces.pairs()
     joined = np.stack([faces.element[one], faces.element[other]], axis=1)
@@ -136,26 +161,31 @@ def bodies(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     nodes = np.concatenate([b.nodes.ravel() for b in mesh.blocks])
     size = np.concatenate([np.full(len(b), b.nodes.shape[1]) for b in mesh.blocks])
     owners = np.repeat(body, size)
-    pairs = np.unique(nodes.astype(np.int64) * len(names) + owners)
-    node, owner = np.divmod(pairs, len(names))
-    part = np.full(mesh.n_nodes, -1)
-    part[node[::-1]] = owner[::-1]
-    second = owner != part[node]
-    return part, node[second], owner[second]
+    found = _of_pairs(mesh.n_nodes, nodes.astype(np.int64), owners)
+    if len(np.unique(found.joints[1])) > MAX_HINGED:
+        label = components(len(names), [np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)])
+        label = np.unique(label, return_inverse=True)[1]
+        found = _of_pairs(mesh.n_nodes, found.node, label[found.body])
+    return found
+
+
+def _of_pairs(n_nodes: int, node: Ints, body: Ints) -> Bodies:
+    count = int(body.max()) + 1
+    node, body = np.divmod(np.unique(node * count + body), count)
+    part = np.full(n_nodes, -1)
+    part[node[::-1]] = body[::-1]
+    return Bodies(part, node, body)
 
 
 def check_supports(mesh: Mesh, supports: Supports) -> None:
     """Raise ModelError that names the rigid modes which the supports leave free, part by part."""
-    part, node, second = bodies(mesh)
-    if len(np.unique(second)) > MAX_HINGED:
-        label = components(int(part.max()) + 1, [np.stack([part[node], second], axis=1)])
-        part = np.where(part < 0, -1, np.unique(label, return_inverse=True)[1][part])
-        node = second = node[:0]
-    equations = _equations(part, node, second, supports)
+    found = bodies(mesh)
+    equations = _equations(found, supports)
+    frames = found.frames(mesh.points)
     problems = []
-    for group in _groups(int(part.max()) + 1, equations):
-        modes = _free_modes(mesh, part, group, equations)
-        problems += _name_modes(mesh, part, group, modes, len(node) > 0)
+    for group in _groups(len(frames[0]), equations):
+        modes = _free_modes(mesh, frames, group, equations)
+        problems += _name_modes(mesh, found, group, modes)
     if problems:
         shown = "; ".join(problems[:MAX_PROBLEMS])
         raise ModelError(f"the supports leave rigid motions free: {shown}. Fix more nodes or components")
@@ -171,8 +201,9 @@ class Equations:
     weight: Array
 
 
-def _equations(part: Ints, node: Ints, second: Ints, supports: Supports) -> Equations:
+def _equations(found: Bodies, supports: Supports) -> Equations:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
+    part, (node, second) = found.part, found.joints
     row, dof, weight = supports.rows_of_constraints()
     body = part[dof // 3]
     first = int(row.max(initial=-1)) + 1
@@ -198,7 +229,9 @@ def _groups(n_bodies: int, equations: Equations) -> list[list[int]]:
     return [group.tolist() for group in np.split(members, cuts)]
 
 
-def _free_modes(mesh: Mesh, part: Ints, group: list[int], equations: Equations) -> list[Array]:
+def _free_modes(
+    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: Equations
+) -> list[Array]:
     """Return the free modes (6, k) of each body of a group.
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
@@ -208,8 +241,7 @@ def _free_modes(mesh: Mesh, part: Ints, group: list[int], equations: Equations) 
     dof, body, weight = equations.dof[mine], equations.body[mine], equations.weight[mine]
     C = np.zeros((len(rows), 6 * len(group)))
     for i, p in enumerate(group):
-        X = mesh.points[part == p]
-        centre, size = X.mean(axis=0), max(float(np.ptp(X, axis=0).max()), np.finfo(float).tiny)
+        centre, size = frames[0][p], float(frames[1][p])
         here = body == p
         R = rigid_modes(mesh.points[dof[here] // 3], centre).reshape(-1, 3, 6)
         R = R[np.arange(len(R)), dof[here] % 3] / np.array([1, 1, 1, size, size, size])
@@ -221,18 +253,19 @@ def _free_modes(mesh: Mesh, part: Ints, group: list[int], equations: Equations) 
     return [free[6 * i : 6 * i + 6] for i in range(len(group))]
 
 
-def _name_modes(mesh: Mesh, part: Ints, group: list[int], modes: list[Array], hinged: bool) -> list[str]:
+def _name_modes(mesh: Mesh, found: Bodies, group: list[int], modes: list[Array]) -> list[str]:
     """Return one sentence for each part that can still move."""
     named = []
     for p, free in zip(group, modes, strict=True):
         words = _motions(free)
         if words:
-            nodes = np.flatnonzero(part == p)
-            if len(modes) == 1 and len(np.unique(part[part >= 0])) == 1:
+            nodes = found.node[found.body == p]
+            if found.body.max() == 0:
                 who = f"the body ({len(nodes)} nodes)"
             else:
                 who = f"the part of node {mesh.node_ids[nodes[0]]} ({len(nodes)} nodes)"
-            hint = " (it hangs on a node or an edge only)" if hinged and len(group) > 1 else ""
+            hangs = len(group) > 1 and np.isin(nodes, found.joints[0]).any()
+            hint = " (it hangs on a node or an edge only)" if hangs else ""
             named.append(f"{who} can still move: {words}{hint}")
     return named
 

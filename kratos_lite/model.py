@@ -20,7 +20,7 @@ from kratos_lite.mesh import Block, Mesh, Where, WhereElements
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.result import Result
 from kratos_lite.statics import solve_static
-from kratos_lite.supports import AXES, Link, Supports
+from kratos_lite.supports import AXES, Link, Supports, rigid_modes
 
 Array = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ class Model:
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         self.loads.append(load)
 
-    def activate(self, displacement: ArrayLike) -> None:
+    def stress_free_at(self, displacement: ArrayLike) -> None:
         """Make the body stress-free at a displacement u0 (n, 3) in m: strain comes from u - u0."""
         u0 = finite(displacement, "the initial displacement")
         if u0.shape != self.mesh.points.shape:
@@ -154,6 +154,10 @@ class Model:
         if self.prestress is None:
             self.prestress = np.zeros((self.mesh.n_elements, 6))
         self.prestress[rows] += s
+
+    def rigid_modes(self) -> Array:
+        """Return the six rigid modes (3n, 6) of all nodes: translations x y z, rotations about x y z."""
+        return rigid_modes(self.mesh.points)
 
     # ---- batches -------------------------------------------------------------------------------
 

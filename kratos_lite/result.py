@@ -106,6 +106,8 @@ class Result:
         self.u = u
         self.reactions = reactions
         self.loads = loads
+        for array in (u, reactions, loads):
+            array.setflags(write=False)  # strains and stresses are made of them later
         self.report = report
         self._strained = u if u0 is None else u - u0
 
@@ -139,19 +141,34 @@ class Result:
             raise InputError(f"at must be one of {', '.join(PLACES)}; got {at!r}")
         parts = list(self._at_gauss(stress))
         if at == "gauss":
+            return self._by_element(parts)
+        return self._means(parts) if at == "element" else self._average(parts)
+
+    def _by_element(self, parts: list[tuple[Batch, Array, Array]]) -> Any:
+        """Return (m, g, 6), or a list of (g, 6) where elements have different numbers of points."""
+        if len({len(batch.rule) for batch, _, _ in parts}) > 1:
             rows: list[Any] = [None] * self.mesh.n_elements
             for batch, values, _ in parts:
                 for row, value in zip(batch.rows.tolist(), values, strict=True):
                     rows[row] = value
-            same = len({len(batch.rule) for batch, _, _ in parts}) == 1
-            return np.array(rows) if same else rows
-        if at == "element":
-            out = np.zeros((self.mesh.n_elements, 6))
-            for batch, values, volumes in parts:
-                share = volumes / volumes.sum(axis=1, keepdims=True)
-                out[batch.rows] = (values * share[..., None]).sum(axis=1)
-            return out
-        return self._average(parts)
+            return rows
+        out = np.zeros((self.mesh.n_elements, *parts[0][1].shape[1:]))
+        for batch, values, _ in parts:
+            out[batch.rows] = values
+        return out
+
+    def _means(self, parts: list[tuple[Batch, Array, Array]]) -> Array:
+        """Return the mean over the volume of each element, (m, 6)."""
+        out = np.zeros((self.mesh.n_elements, 6))
+        for batch, values, volumes in parts:
+            share = volumes / volumes.sum(axis=1, keepdims=True)
+            out[batch.rows] = (values * share[..., None]).sum(axis=1)
+        return out
+
+    def stress_at_nodes_and_elements(self) -> tuple[Array, Array]:
+        """Return nodal stresses (n, 6) and element means (m, 6) in Pa from one pass over the elements."""
+        parts = list(self._at_gauss(stress=True))
+        return self._average(parts), self._means(parts)
 
     def _average(self, parts: list[tuple[Batch, Array, Array]]) -> Array:
         """Return nodal values (n, 6): the mean over the elements around each node."""

@@ -2,5 +2,17 @@
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, select
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
+from kratos_lite.mesh.topology import outward_signs
 
-__all__ = ["NO_ROWS", "Block", "Floats", "Ints", "Mesh", "Part", "Where", "WhereElements", "select"]
+__all__ = [
+    "NO_ROWS",
+    "Block",
+    "Floats",
+    "Ints",
+    "Mesh",
+    "Part",
+    "Where",
+    "WhereElements",
+    "outward_signs",
+    "select",
+]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Ints
+from kratos_lite.mesh.blocks import Block, Ints
 from kratos_lite.shapes import FACE_SHAPES, Shape
 
 
@@ -58,6 +58,28 @@ def _occurs_once(keys: list[NDArray[np.int64]]) -> list[NDArray[np.bool_]]:
     return np.split(once, np.cumsum([k.shape[1] for k in keys])[:-1])
 
 
+def outward_signs(boundary: Sequence[Block], block: Block) -> NDArray[np.float64]:
+    """Return +1 for faces whose nodes run counter-clockwise from outside, -1 for others, 0 inside."""
+    assert block.shape is not None
+    c = block.shape.corners
+    outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
+    known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
+    corners = block.nodes[:, :c]
+    both = np.sort(np.vstack([known, corners]), axis=1)
+    _, key = np.unique(both, axis=0, return_inverse=True)
+    key = key.ravel()
+    owner = np.full(key.max(initial=-1) + 1, -1)
+    owner[key[: len(known)]] = np.arange(len(known))
+    match = owner[key[len(known) :]]
+    signs = np.zeros(len(block))
+    on = np.flatnonzero(match >= 0)
+    mate = known[match[on]]
+    start = np.argmax(mate == corners[on, :1], axis=1)
+    following = np.take_along_axis(mate, ((start + 1) % c)[:, None], axis=1)[:, 0]
+    signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
+    return signs
+
+
 def mirror(shape: type[Shape]) -> Ints:
     """Return the node order that turns a cell inside out: its reflection in r = s, or r = 0.
 
@@ -77,6 +99,3 @@ def inside_out(block: Block, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     centre = block.shape.nodes[: block.shape.corners].mean(axis=0)
     J = np.swapaxes(points[block.nodes], 1, 2) @ block.shape.dN(centre)
     return np.asarray(np.linalg.det(J) < 0)
-
-
-__all__ = ["NO_ROWS", "boundary", "inside_out", "mirror"]

@@ -13,9 +13,9 @@ from kratos_lite.shapes import Shape
 from kratos_lite.supports import rigid_modes
 from kratos_lite.testing import patches
 from kratos_lite.testing.cells import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
-from kratos_lite.testing.report import Finding, Measured, difference, run, worst
-from kratos_lite.testing.rules import VOLUME, check_rule
-from kratos_lite.testing.shapes import check_shape
+from kratos_lite.testing.report import Finding, Measured, difference, failures, run, run_after, worst
+from kratos_lite.testing.rules import check_rule
+from kratos_lite.testing.shapes import check_functions, problems
 
 Element = type[KinematicLinear]
 
@@ -46,28 +46,38 @@ def check_element(element: Element) -> list[Finding]:
     found = run((definition,), element)
     if not found[0].passed:
         return found
-    found += check_shape(element.shape)
-    for name, rule in (("rule", element.rule), ("mass rule", element.mass_rule)):
-        found += [replace(f, check=f"{name} {f.check}") for f in check_rule(element.shape.cell, rule)]
-    return found + run(SINGLE, element) + run(patches.CHECKS, element)
+    shape = check_functions(element.shape)
+    rule, mass = (
+        [replace(f, check=f"{name} {f.check}") for f in check_rule(element.shape.cell, r)]
+        for name, r in (("rule", element.rule), ("mass rule", element.mass_rule))
+    )
+    causes = [f for f in shape if f.check in ("derivatives", "broadcasting", "kronecker")] + rule
+    found += shape + rule + mass
+    if failures(causes):
+        return found + run_after(causes, SINGLE + MASS + patches.CHECKS, element)
+    if failures(mass):
+        return found + run(SINGLE + patches.CHECKS, element) + run_after(mass, MASS, element)
+    return found + run(SINGLE + MASS + patches.CHECKS, element)
 
 
 def definition(element: Element) -> Measured:
     """Check that the class states a solid shape, a rule and a mass rule."""
-    shape, problems = getattr(element, "shape", None), []
+    shape, wrong = getattr(element, "shape", None), []
     if not (isinstance(shape, type) and issubclass(shape, Shape)):
-        problems.append(
+        wrong.append(
             "states no shape: write a Shape with cell, nodes, corners, degree, N and dN, and shape = it"
         )
-    elif getattr(shape, "nodes", np.zeros((0, 0))).shape[1:] != (3,) or shape.cell not in VOLUME:
-        problems.append(
+    elif getattr(shape, "nodes", np.zeros((0, 3))).shape[1:] != (3,):
+        wrong.append(
             f"has the shape {shape.__name__}, which is not a solid: it needs nodes (n, 3) and a known cell"
         )
+    else:
+        wrong += [f"has the shape {shape.__name__}, which {why}" for why in problems(shape)]
     for name in ("rule", "mass_rule"):
         if not isinstance(getattr(element, name, None), Rule):
-            problems.append(f"states no {name}: write for example {name} = hexahedron(degree=3)")
-    why = "; ".join(problems) or "states a shape, a rule and a mass rule"
-    return Measured(len(problems), 0, f"{element.__name__} {why}")
+            wrong.append(f"states no {name}: write for example {name} = hexahedron(degree=3)")
+    why = "; ".join(wrong) or "states a shape, a rule and a mass rule"
+    return Measured(len(wrong), 0, f"{element.__name__} {why}")
 
 
 # ---- checks ------------------------------------------------------------------------------------
@@ -261,6 +271,6 @@ def lumped_mass(element: Element) -> Measured:
 
 SINGLE = (
     functions, volume, strain_operator, stiffness, symmetry, rank, rigid_motions, frame_invariance,
-    numbering_invariance, length_scaling, offset, internal_load, body_force, mass_total, consistent_mass,
-    lumped_mass,
+    numbering_invariance, length_scaling, offset, internal_load, body_force,
 )  # fmt: skip
+MASS = (mass_total, consistent_mass, lumped_mass)

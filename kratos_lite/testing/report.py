@@ -41,6 +41,7 @@ class Finding:
     measured, limit : numbers; relative errors or counts, as `detail` says.
     detail : where the largest error is, or why the check was not run.
     skipped : True if the check was not run: then nothing is known, good or bad.
+    claim : what holds if the check passes.
     """
 
     check: str
@@ -49,12 +50,16 @@ class Finding:
     limit: float
     detail: str
     skipped: bool = False
+    claim: str = ""
 
     def __str__(self) -> str:
         if self.skipped:
             return f"{self.check}: not run: {self.detail}"
-        sign = "≤" if self.passed else "exceeds"
-        return f"{self.check}: {self.measured:.3g} {sign} {self.limit:.3g}: {self.detail}"
+        if self.passed:
+            return f"{self.check}: {self.measured:.3g} ≤ {self.limit:.3g}: {self.claim or self.detail}"
+        if not math.isfinite(self.measured) and self.limit == 0:
+            return f"{self.check}: {self.detail}"
+        return f"{self.check}: {self.measured:.3g} exceeds {self.limit:.3g}: {self.detail}"
 
 
 def failures(findings: Iterable[Finding]) -> list[Finding]:
@@ -88,22 +93,60 @@ def run(checks: Iterable[Callable[[S], Measured | str]], subject: S) -> list[Fin
     """Run checks on a subject; each returns what it measured, or a text that says why it cannot run.
 
     Whatever the subject raises becomes a failed finding, for a kit that stops at the first bug
-    would not show the second.
+    would not show the second.  The same error, met again, is counted once.
     """
-    return [_run_one(check, subject) for check in checks]
+    findings: list[Finding] = []
+    first: dict[str, str] = {}
+    for check in checks:
+        finding = _run_one(check, subject)
+        if math.isinf(finding.measured) and finding.detail.startswith("raises "):
+            seen = first.setdefault(finding.detail, finding.check)
+            if seen != finding.check:
+                finding = _not_run(finding.check, f"stops at the same error as {seen!r}")
+        findings.append(finding)
+    return findings
+
+
+def run_after(
+    causes: Iterable[Finding], checks: Iterable[Callable[[S], Measured | str]], subject: S
+) -> list[Finding]:
+    """Run checks that only mean something if others passed; after a failure they are not run, and say so.
+
+    >>> run_after([Finding("kronecker", False, 1.0, 0.0, "")], [worst], {})[0].detail
+    'mend kronecker first'
+    """
+    names = [finding.check for finding in failures(causes)]
+    if not names:
+        return run(checks, subject)
+    return [_not_run(title(check), f"mend {', '.join(names)} first") for check in checks]
+
+
+def title(check: Callable[..., object]) -> str:
+    """Return the name of a check as findings show it."""
+    return check.__name__.replace("_", " ")
+
+
+def _not_run(check: str, why: str) -> Finding:
+    return Finding(check, False, math.nan, math.nan, why, skipped=True)
+
+
+def _claim(check: Callable[..., object]) -> str:
+    """Return the first line of the docstring of a check, as a statement."""
+    line = (check.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    return line.removeprefix("Check that ").removeprefix("Check for ").removeprefix("Check ")
 
 
 def _run_one(check: Callable[[S], Measured | str], subject: S) -> Finding:
-    name = check.__name__.replace("_", " ")
+    name = title(check)
     try:
         with np.errstate(all="ignore"):  # a result that is not finite fails its check anyway
             result = check(subject)
     except Exception as error:
         return Finding(name, False, math.inf, 0.0, f"raises {describe(error)}")
     if isinstance(result, str):
-        return Finding(name, False, math.nan, math.nan, result, skipped=True)
+        return _not_run(name, result)
     value, limit = float(result.value), float(result.limit)
-    return Finding(name, value <= limit, value, limit, result.detail)
+    return Finding(name, value <= limit, value, limit, result.detail, claim=_claim(check))
 
 
 def describe(error: Exception) -> str:

@@ -5,11 +5,39 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.shapes import FACE_SHAPES, Shape
-from kratos_lite.testing.report import ConformanceError, Finding, Measured, at, run, worst
+from kratos_lite.shapes import (
+    FACE_SHAPES,
+    Hexahedron8,
+    Line2,
+    Point1,
+    Pyramid5,
+    Quadrilateral4,
+    Shape,
+    Tetrahedron4,
+    Triangle3,
+    Wedge6,
+)
+from kratos_lite.testing.report import ConformanceError, Finding, Measured, at, run, run_after, worst
 from kratos_lite.testing.rules import exponents, monomial
 
 Array = NDArray[np.float64]
+
+REFERENCE: dict[str, type[Shape]] = {
+    shape.cell: shape
+    for shape in (Point1, Line2, Triangle3, Quadrilateral4, Tetrahedron4, Pyramid5, Wedge6, Hexahedron8)
+}
+"""Reference cell of each family, by its corners."""
+
+VTK = {
+    "tetrahedron": {4: 10, 10: 24},
+    "pyramid": {5: 14, 13: 27, 19: 37},
+    "wedge": {6: 13, 12: 31, 15: 26, 18: 32},
+    "hexahedron": {8: 12, 20: 25, 24: 33, 27: 29},
+}
+"""VTK cell type number by cell and number of nodes.  Source: vtkCellType.h."""
+
+MAX_NODES, MAX_DEGREE = 200, 9
+"""Largest shape that the kit checks."""
 
 
 def check_shape(shape: type[Shape]) -> list[Finding]:
@@ -30,7 +58,52 @@ def check_shape(shape: type[Shape]) -> list[Finding]:
     >>> all(finding.passed for finding in check_shape(Wedge15))
     True
     """
-    return run(CHECKS, shape)
+    first = run((definition,), shape)
+    return first + check_functions(shape) if first[0].passed else first
+
+
+def check_functions(shape: type[Shape]) -> list[Finding]:
+    """Check a shape whose definition is sound; what follows from wrong functions is not run."""
+    first = run(BASIC, shape)
+    return first + run_after(first, DEPENDENT, shape) + run(DATA, shape)
+
+
+def definition(shape: type[Shape]) -> Measured:
+    """Check that the class states its cell, nodes, corners, degree and VTK number as they must be."""
+    found = problems(shape)
+    return Measured(len(found), 0, f"{shape.__name__} {'; '.join(found) or 'is stated well'}")
+
+
+def problems(shape: type[Shape]) -> list[str]:
+    """Return what is wrong with the data of a shape that stands in its class; stop at what hides the rest."""
+    missing = [name for name in ("cell", "nodes", "corners", "degree") if not hasattr(shape, name)]
+    if missing:
+        return [f"states no {', '.join(missing)}: see docs/add-an-element.md"]
+    if shape.cell not in REFERENCE:
+        return [f"has the cell {shape.cell!r}; cells are {', '.join(REFERENCE)}"]
+    ideal, n = REFERENCE[shape.cell].nodes, len(shape.nodes)
+    d, c = ideal.shape[1], len(ideal)
+    if shape.nodes.ndim != 2 or shape.nodes.shape[1] != d or not c <= n <= MAX_NODES:
+        return [f"has nodes {shape.nodes.shape}; a {shape.cell} has ({c} to {MAX_NODES}, {d})"]
+    found = []
+    if shape.corners != c:
+        found.append(f"says corners = {shape.corners}; a {shape.cell} has {c}")
+    elif not (np.sort(distances(shape.nodes[:c], ideal), axis=1)[:, :1] == 0).all():
+        found.append(f"has first nodes that are not the corners {ideal.tolist()} of the {shape.cell}")
+    if shape.degree not in range(MAX_DEGREE + 1):
+        found.append(f"says degree = {shape.degree}; an integer from 0 to {MAX_DEGREE} is needed")
+    lists = [*shape.edges, *shape.faces]
+    if any(a not in range(n) for nodes in lists for a in nodes):
+        found.append(f"lists nodes in edges or faces that are not 0 to {n - 1}")
+    known = VTK.get(shape.cell, {}).get(n)
+    if known is not None and shape.vtk != known:
+        found.append(f"says vtk = {shape.vtk}; write vtk = {known}, or results cannot be saved")
+    return found
+
+
+def distances(X: Array, Y: Array) -> Array:
+    """Return the largest coordinate difference of each point of X (n, d) to each of Y (m, d), as (n, m)."""
+    return np.asarray(np.abs(X[:, None] - Y).max(axis=2, initial=0.0))
 
 
 def inside(shape: type[Shape], count: int) -> Array:
@@ -123,11 +196,22 @@ def partition_of_unity(shape: type[Shape]) -> Measured:
 
 
 def reproduction(shape: type[Shape]) -> Measured:
-    """Check that polynomials up to the degree of the shape come back from nodal values, with their slopes."""
+    """Check that polynomials up to the degree of the shape, and no higher ones, come back from nodal values."""
+    error, text = worst(_misses(shape, exponents(shape.nodes.shape[1], shape.degree)))
+    limit, more = 4e-15, shape.degree + 1
+    higher = [e for e in exponents(shape.nodes.shape[1], more) if sum(e) == more]
+    if error <= limit and higher and worst(_misses(shape, higher))[0] <= 1e-9:
+        text = f"the functions span degree {more} completely; write degree = {more}"
+        return Measured(1, 0, f"{text} (degree claimed: {shape.degree})")
+    return Measured(error, limit, f"{text} (degree claimed: {shape.degree})")
+
+
+def _misses(shape: type[Shape], powers: list[tuple[int, ...]]) -> dict[str, float]:
+    """Return how far each monomial, interpolated from nodal values, and its slopes are off, and where."""
     points, d = inside(shape, 40), shape.nodes.shape[1]
     N, dN = values(shape, points), gradients(shape, points)
     errors: dict[str, float] = {}
-    for e in exponents(d, shape.degree):
+    for e in powers:
         power = np.array(e, dtype=int)
         nodal = np.prod(shape.nodes**power, axis=1)
         miss = np.abs(N @ nodal - np.prod(points**power, axis=1))
@@ -137,8 +221,7 @@ def reproduction(shape: type[Shape]) -> Measured:
             miss = np.maximum(miss, np.abs(dN[..., j] @ nodal - slope))
         p = int(np.argmax(miss))
         errors[f"{monomial(e)} is off most at xi = {at(points[p])}"] = float(miss[p])
-    error, text = worst(errors)
-    return Measured(error, 4e-15, f"{text} (degree claimed: {shape.degree})")
+    return errors
 
 
 def bounded(shape: type[Shape]) -> Measured | str:
@@ -173,18 +256,18 @@ def faces(shape: type[Shape]) -> Measured | str:
     """Check that faces are outward, closed (each edge once in each direction) and list all their nodes."""
     if shape.nodes.shape[1] < 3:
         return "only solids have faces"
-    problems = [] if shape.faces else ["the shape lists no faces"]
+    wrong = [] if shape.faces else ["the shape lists no faces"]
     directed: dict[tuple[int, int], int] = {}
     centre = shape.nodes[: shape.corners].mean(axis=0)
     for f, face in enumerate(shape.faces):
-        problems += [f"face {f} {face} {why}" for why in _face_problems(shape, face, centre)]
+        wrong += [f"face {f} {face} {why}" for why in _face_problems(shape, face, centre)]
         ring = [a for a in face if a < shape.corners]
         for edge in zip(ring, ring[1:] + ring[:1], strict=True):
             directed[edge] = directed.get(edge, 0) + 1
     open_ = [e for e, count in directed.items() if count != 1 or directed.get((e[1], e[0]), 0) != 1]
     if open_:
-        problems.append(f"edge {open_[0]} is not used once in each direction by two faces")
-    return Measured(len(problems), 0, problems[0] if problems else "problems found in the faces")
+        wrong.append(f"edge {open_[0]} is not used once in each direction by two faces")
+    return Measured(len(wrong), 0, wrong[0] if wrong else "no fault in the faces")
 
 
 def _face_problems(shape: type[Shape], face: tuple[int, ...], centre: Array) -> list[str]:
@@ -218,7 +301,6 @@ def node_orders(shape: type[Shape]) -> Measured:
     )
 
 
-CHECKS = (
-    derivatives, broadcasting, kronecker, partition_of_unity, reproduction, bounded, mid_edges, faces,
-    node_orders,
-)  # fmt: skip
+BASIC = (derivatives, broadcasting, kronecker)
+DEPENDENT = (partition_of_unity, reproduction, bounded)
+DATA = (mid_edges, faces, node_orders)

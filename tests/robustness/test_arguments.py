@@ -92,9 +92,12 @@ WRONG = {
         r"nodal forces need shape \(27, 3\)",
     ),
     "nodal vector": (lambda: kl.NodalForces(np.ones(3)), r"nodal forces must be \(n, 3\)"),
-    "activate word": (lambda: model().activate("a"), "the initial displacement must be made of real numbers"),
+    "activate word": (
+        lambda: model().stress_free_at("a"),
+        "the initial displacement must be made of real numbers",
+    ),
     "activate shape": (
-        lambda: model().activate(np.zeros(3)),
+        lambda: model().stress_free_at(np.zeros(3)),
         r"the initial displacement needs shape \(27, 3\)",
     ),
     "prestress word": (lambda: model().add_prestress("a"), "a prestress must be made of real numbers"),

@@ -1,0 +1,179 @@
+"""Edges of the design: many elements at a node, few free unknowns, classes that inherit, bodies at corners."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import statics
+from kratos_lite.assembly import Pattern, PatternCache
+from kratos_lite.materials import MATERIALS
+from kratos_lite.supports import rigid_modes
+
+STEEL = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
+
+
+def fan(n, levels=2):
+    """Return n wedges around the z axis per level."""
+    angle = 2 * np.pi * np.arange(n) / n
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    level = np.vstack([[[0, 0, 0]], ring])
+    points = np.vstack([level + [0, 0, z] for z in range(levels + 1)])
+    i = np.arange(n)
+    base = np.column_stack([0 * i, 1 + i, 1 + (i + 1) % n])
+    nodes = np.vstack([np.hstack([base + k * (n + 1), base + (k + 1) * (n + 1)]) for k in range(levels)])
+    block = kl.Block(
+        "KinematicLinear3D6N",
+        nodes.astype(np.int32),
+        np.arange(1, len(nodes) + 1),
+        np.ones(len(nodes), dtype=int),
+        kl.KinematicLinear3D6N.shape,
+    )
+    return kl.Mesh(points, [block])
+
+
+@pytest.mark.parametrize("n", [127, 128, 255, 256])
+def test_any_number_of_elements_may_share_a_node_pair(n):
+    model = kl.Model(fan(n), STEEL)
+    model.fix("z-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    sparse, full = model.solve("direct").u, model.solve("dense").u
+    assert np.abs(sparse - full).max() < 1e-12 * np.abs(full).max()
+
+
+def test_pattern_without_a_pair_is_refused():
+    pattern = Pattern(4, [np.array([[0, 1], [1, 2]], dtype=np.int32)])
+    keys = np.repeat(np.arange(4), np.diff(pattern.indptr)) * 4 + pattern.indices
+    with pytest.raises(AssertionError, match="misses a pair"):
+        pattern._find(keys, np.array([[0, 3]], dtype=np.int32))
+
+
+def test_pattern_is_kept_until_the_connectivity_changes():
+    nodes = kl.box(cells=(3, 3, 3)).blocks[0].nodes
+    cache = PatternCache()
+    first = cache.get(64, [nodes])
+    assert cache.get(64, [nodes.copy()]) is first
+    other = nodes.copy()
+    other[0, [0, 1]] = other[0, [1, 0]]
+    assert cache.get(64, [other]) is not first
+
+
+def test_few_free_unknowns_of_a_large_model_take_no_full_matrix():
+    model = kl.Model(kl.box(cells=(12, 12, 12)), STEEL)
+    model.fix(lambda X: X[:, 2] < 0.95)
+    model.add(kl.Gravity((0, 0, -9.81)))
+    report = model.solve().report
+    assert report.unknowns == 3 * 13 * 13
+    assert report.solver == "direct"
+
+
+def test_lost_equilibrium_is_an_error(monkeypatch):
+    right = statics.assemble_dense
+    monkeypatch.setattr(statics, "assemble_dense", lambda *a: right(*a) * (1 + 0.1 * np.eye(24)))
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("z-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    with pytest.raises(kl.SolveError, match="miss equilibrium by"):
+        model.solve("dense")
+
+
+def test_subclasses_do_not_take_the_names_of_their_parents():
+    with MATERIALS.temporary(), kl.ELEMENTS.temporary():
+
+        class Softer(kl.Isotropic3D):
+            pass
+
+        class TotalLagrangian3D8N(kl.KinematicLinear3D8N):
+            pass
+
+        assert MATERIALS["LinearElastic3DLaw"] is kl.Isotropic3D
+        assert MATERIALS["Softer"] is Softer
+        assert kl.ELEMENTS["TotalLagrangian3D8N"] is TotalLagrangian3D8N
+        assert kl.ELEMENTS["SmallDisplacementElement3D8N"] is kl.KinematicLinear3D8N
+
+
+def test_lumped_mass_is_positive_on_distorted_elements():
+    kind = kl.KinematicLinear3D27N
+    rng = np.random.default_rng(3)
+    element = kind(kind.nodes + rng.uniform(-0.3, 0.3, (200, 27, 3)))
+    valid = (element.dV > 0).all(axis=1)
+    rows = element.scalar_mass(1.0).sum(axis=-1)
+    assert (rows[valid] < 0).any()
+    lumped = element.lumped_mass(1.0)[valid]
+    assert (lumped > 0).all()
+    np.testing.assert_allclose(
+        lumped.sum(axis=1), element.scalar_mass(1.0)[valid].sum(axis=(1, 2)), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("name", ["Point1", "Line2"])
+def test_traction_refuses_conditions_that_are_no_faces(name):
+    from kratos_lite.shapes import SHAPES
+
+    mesh = kl.box()
+    shape = SHAPES[name]
+    nodes = mesh.nodes("z+")[: len(shape.nodes)][None, :].astype(np.int32)
+    mesh.conditions = [kl.Block(name, nodes, np.array([7]), np.array([1]), shape)]
+    mesh.parts["top"] = kl.Part(nodes=mesh.nodes("z+"), conditions=np.array([0]))
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-")
+    model.add(kl.Traction("top", (0, 0, 1.0)))
+    with pytest.raises(
+        kl.ModelError, match=rf"acts on faces; it meets other conditions, {name} \(the first is 7\)"
+    ):
+        model.solve()
+
+
+def test_checkerboard_of_cells_that_meet_at_edges_is_solved_if_it_is_held():
+    mesh = kl.box((2, 2, 1), (2, 2, 1))
+    block = mesh.blocks[0]
+    mesh.blocks = [block.take(np.array([0, 3]))]
+    model = kl.Model(mesh, STEEL)
+    model.fix(mesh.blocks[0].nodes[0], "xyz")
+    with pytest.raises(
+        kl.ModelError, match=r"can still move: rotation about z \(it hangs on a node or an edge"
+    ):
+        model.check()
+    held = kl.Model(mesh, STEEL)
+    held.fix(lambda X: X[:, 2] == 0, "xyz")
+    held.add(kl.Gravity((0, 0, -9.81)))
+    assert np.isfinite(held.solve().u).all()
+
+
+def test_body_whose_nodes_all_belong_to_others_is_still_a_body():
+    """Three rows of cells: the middle one touches the outer ones along edges only."""
+    mesh = kl.box((3, 3, 3), (3, 3, 3))
+    block = mesh.blocks[0]
+    middle = np.round(mesh.points[block.nodes].mean(axis=1) * 2).astype(int)
+    odd = (middle.sum(axis=1) // 2) % 2 == 0
+    mesh.blocks = [block.take(odd)]
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-")
+    model.add(kl.Gravity((1.0, 2.0, -9.81)))
+    from kratos_lite.assembly import assemble_dense
+
+    used = mesh.used_nodes()
+    free = ~(model.supports.fixed | ~used[:, None]).ravel()
+    K = assemble_dense(mesh.points, model.batches())[np.ix_(free, free)]
+    smallest = np.linalg.eigvalsh(K)[[0, -1]]
+    if smallest[0] > 1e-9 * smallest[1]:
+        assert np.isfinite(model.solve().u).all()
+    else:
+        with pytest.raises(kl.ModelError, match="can still move"):
+            model.check()
+
+
+def test_rigid_modes_of_the_model_carry_no_stress():
+    from kratos_lite.assembly import assemble_dense
+
+    model = kl.Model(kl.box(cells=(2, 1, 1), element="KinematicLinear3D20N"), STEEL)
+    K = assemble_dense(model.mesh.points, model.batches())
+    R = model.rigid_modes()
+    assert R.shape == (3 * model.mesh.n_nodes, 6)
+    assert np.abs(K @ R).max() < 1e-12 * np.abs(K).max()
+    np.testing.assert_array_equal(R, rigid_modes(model.mesh.points))
+
+
+def test_model_without_load_says_so():
+    model = kl.Model(kl.box(), STEEL)
+    model.fix("z-")
+    assert any("no load" in text for text in model.solve().report.warnings)
