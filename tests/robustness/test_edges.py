@@ -1,4 +1,4 @@
-"""Edges of the design: many elements at a node, few free unknowns, classes that inherit, bodies at corners."""
+"""Edges of the design: many elements at a node, few unknowns, inheritance, bodies that meet at corners."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def fan(n, levels=2):
     angle = 2 * np.pi * np.arange(n) / n
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     level = np.vstack([[[0, 0, 0]], ring])
-    points = np.vstack([level + [0, 0, z] for z in range(levels + 1)])
+    points = np.vstack([level + np.array([0, 0, z]) for z in range(levels + 1)])
     i = np.arange(n)
     base = np.column_stack([0 * i, 1 + i, 1 + (i + 1) % n])
     nodes = np.vstack([np.hstack([base + k * (n + 1), base + (k + 1) * (n + 1)]) for k in range(levels)])

@@ -121,7 +121,7 @@ def test_line_load_is_a_force_per_length():
     mesh = kl.Mesh(mesh.points, mesh.blocks, conditions=[line], parts={"edge": edge})
     forces = nodal(mesh, kl.LineLoad("edge", (0, 6, 0)))
     np.testing.assert_allclose(forces[ends, 1], (2, 2, 8), rtol=1e-14)
-    with pytest.raises(kl.ModelError, match="a pressure acts on faces; .*Line"):
+    with pytest.raises(kl.ModelError, match=r"a pressure acts on faces; .*Line"):
         nodal(mesh, kl.Pressure("edge", 1.0))
 
 
@@ -228,5 +228,5 @@ def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
     line = kl.Block("Line", np.array([[1, 3]], dtype=np.int32), np.array([1]), np.array([0]), Line2)
     mesh = kl.Mesh(box.points, box.blocks, conditions=[line])
     load = ConditionLoads(np.zeros((1, 3)), {"line": np.zeros((8, 3))}, np.ones(1), np.zeros(8))
-    with pytest.raises(kl.ModelError, match="a pressure acts on faces; .*Line"):
+    with pytest.raises(kl.ModelError, match=r"a pressure acts on faces; .*Line"):
         nodal(mesh, load)
