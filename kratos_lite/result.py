@@ -242,22 +242,24 @@ class Result:
         energy, mises, row = self._totals
         kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block))
 
-        def vector(v: Array) -> str:
-            small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), 1e-300), 0.0, v)
+        def vector(v: Array, size: float = 0.0) -> str:
+            # What is left of forces that cancel is rounding, and is shown as the 0 that it stands for.
+            small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
             return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"
 
+        forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
         rows = [
             ("nodes", f"{mesh.n_nodes}"),
             ("elements", kinds),
             ("unknowns", f"{report.unknowns}"),
-            ("total load", f"{vector(report.total_load)} N"),
-            ("total reaction", f"{vector(report.total_reaction)} N"),
+            ("total load", f"{vector(report.total_load, forces)} N"),
+            ("total reaction", f"{vector(report.total_reaction, forces)} N"),
             (
                 "largest displacement",
                 f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m",
             ),
             ("strain energy", f"{energy:.6e} J"),
-            ("largest von Mises", f"{mises:.6e} Pa in element {mesh.element_ids[row]}"),
+            ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
             ("solver", f"{report.solver}: {report.reason}"),
         ]
         if report.iterations:

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import io
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 from kratos_lite import __version__
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
+EXIT_CODES = """exit codes:
+  0    done
+  1    a defect of kratos-lite
+  2    bad input, or an output that cannot be written
+  3    solved, but a check of the run file failed
+  130  interrupted with Ctrl-C"""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -16,6 +25,8 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="kratos-lite",
         description="Finite elements for solids: from an input file to displacements and stresses.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -70,7 +81,7 @@ def _add_solve(commands: object) -> None:
     solve = _add(commands, "solve", "solve a static linear model and print a summary", SOLVE_EXAMPLES)
     solve.add_argument("input", help=INPUT)
     out = solve.add_argument_group("output")
-    out.add_argument("-o", "--output", metavar="OUT.vtu", help="results for ParaView (or a format of meshio)")
+    out.add_argument("-o", "--output", metavar="OUT.vtu", help="results for ParaView (or .vtk, .json)")
     out.add_argument("--json", metavar="OUT.json", help="summary, displacements and reactions by node id")
     out.add_argument("--picture", metavar="OUT.png", help="picture of the deformed body")
     given = solve.add_argument_group(
@@ -102,34 +113,30 @@ def _add_solve(commands: object) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code.
-
-    0, 1 for a defect of ours, 2 for bad input, 3 for a check of the run file that failed, 130 for Ctrl-C.
-    """
-    options = build_parser().parse_args(_join_negative(sys.argv[1:] if arguments is None else arguments))
-    from kratos_lite.cli import commands
-    from kratos_lite.errors import KratosLiteError
-
+    """Run one command; return its exit code, one of `EXIT_CODES`."""
+    _escape_unknown_characters()
+    words = _join_negative(sys.argv[1:] if arguments is None else arguments)
     try:
-        return int(getattr(commands, options.command)(options))
-    except KratosLiteError as error:
-        if options.debug:
-            raise
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return _run(words)
     except KeyboardInterrupt:
         print("interrupted; nothing half-written is left", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        sys.stderr.close()
+        _discard_output()
         return 0
+    except OSError as error:
+        if "--debug" in words:
+            raise
+        _discard_output()
+        print(f"error: {error.filename or 'the output'}: {error.strerror or error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
     except MemoryError:
-        if options.debug:
+        if "--debug" in words:
             raise
         print("error: not enough memory; use a coarser mesh or --solver amg", file=sys.stderr)
         return EXIT_BAD_INPUT
     except Exception as error:
-        if options.debug:
+        if "--debug" in words:
             raise
         print(
             f"internal error: {type(error).__name__}: {error}\n"
@@ -137,6 +144,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return EXIT_INTERNAL
+
+
+def _run(words: Sequence[str]) -> int:
+    """Run one command; errors of the user's end in one line."""
+    from kratos_lite.errors import KratosLiteError
+
+    options = build_parser().parse_args(words)
+    try:
+        from kratos_lite.cli import commands
+
+        code = int(getattr(commands, options.command)(options))
+    except KratosLiteError as error:
+        if options.debug:
+            raise
+        # The texts are written for Python; here the same choice is an option.
+        print(f"error: {str(error).replace('strict=False', '--lenient')}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    sys.stdout.flush()  # a full disk shows here rather than after the end of the program
+    return code
+
+
+def _escape_unknown_characters() -> None:
+    """Let a terminal without ≤ and × show their codes instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _discard_output() -> None:
+    """Send what is still to be printed nowhere, so that Python does not fail on it at its end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _join_negative(arguments: Sequence[str]) -> list[str]:

@@ -10,12 +10,14 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import apply, material
+from kratos_lite.cli.targets import check_targets, files_read
 from kratos_lite.errors import InputError, ModelError
 
 EXIT_CHECK_FAILED = 3
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
+    from kratos_lite.mesh import Mesh
     from kratos_lite.model import Model
     from kratos_lite.result import Result
 
@@ -44,20 +46,17 @@ class TerminalProgress:
 
 
 def solve(options: Namespace) -> int:
-    """Solve a file, write what was asked for, print the summary."""
+    """Solve a file, print the summary, write what was asked for."""
     clock = perf_counter()
     from kratos_lite.io.files import load
-    from kratos_lite.io.results import check_picture, check_result_ending
 
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
-    _check_targets(options.input, options.output, options.json, options.picture)
-    if options.output:
-        check_result_ending(options.output)
-    if options.picture:
-        check_picture(options.picture)
+    read = files_read(options.input)
+    _targets(options, {}, read)
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
+    targets = _targets(options, scene.output, read)
     apply(scene.model, options)
     seconds["read"] = perf_counter() - clock
     solver, tolerance = options.solver or scene.solver, scene.tolerance
@@ -69,53 +68,57 @@ def solve(options: Namespace) -> int:
     finally:
         progress.close()
     result.report.seconds = {**seconds, **result.report.seconds}
-    outputs = _write(result, options, scene.output)
-    if not options.quiet:
-        print(result)
-        for path in outputs:
-            print(f"{'written':<22}{path}")
-    lines = scene.evaluate(result)
-    for line in lines:
-        print(line)
+    lines: list[str] = []
+    try:  # a file that fails loses no summary, and a terminal that fails loses no file
+        lines = scene.evaluate(result)
+        if not options.quiet:
+            print(result, flush=True)
+    finally:
+        _write(result, targets, options.quiet)
+        for line in lines:
+            print(line)
     return EXIT_CHECK_FAILED if any(" failed " in line for line in lines) else 0
 
 
-def _check_targets(source: str, *targets: str | None) -> None:
-    """Refuse, before any work is done, a target without a folder, given twice, or that is the input."""
-    taken = {Path(source).resolve()}
-    for target in filter(None, targets):
-        path = Path(target)
-        if not path.parent.is_dir():
-            raise InputError(f"{target}: the folder {path.parent} does not exist")
-        if path.resolve() in taken:
-            raise InputError(f"{target}: is the input or another output already; choose another name")
-        taken.add(path.resolve())
+def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dict[str, str]:
+    """Return the files to write by key, those of the command line before those of the run file.
+
+    All are checked, before any work is done.
+    """
+    from kratos_lite.io.documents import ending
+    from kratos_lite.io.results import check_picture, check_result_ending
+
+    asked = {key: getattr(options, key) for key in ("output", "json", "picture")}
+    targets = {key: given.get(key) if path is None else path for key, path in asked.items()}
+    found = {key: path for key, path in targets.items() if path is not None}
+    check_targets(read, found.values())
+    if "output" in found:
+        check_result_ending(found["output"])
+    if "json" in found and ending(found["json"]) != ".json":
+        raise InputError(f"{found['json']}: the ending must be .json; other results go to --output")
+    if "picture" in found:
+        check_picture(found["picture"])
+    return found
 
 
-def _write(result: Result, options: Namespace, given: dict[str, str]) -> list[str]:
-    """Write the files asked for on the command line or in the run file; return their names."""
-    start = perf_counter()
-    written = []
-    for key, writer in (("output", result.save), ("json", result.save), ("picture", result.plot)):
-        path = getattr(options, key) or given.get(key)
-        if path:
-            if key == "json" and not str(path).endswith(".json"):
-                from kratos_lite.io.results import write_json
-
-                write_json(path, result)
-            else:
-                writer(path)
-            written.append(str(path))
-    if written:
-        result.report.seconds["write"] = perf_counter() - start
-    return written
+def _write(result: Result, targets: dict[str, str], quiet: bool) -> None:
+    """Write the files and say so."""
+    for key, path in targets.items():
+        (result.plot if key == "picture" else result.save)(path)
+        if not quiet:
+            print(f"{'written':<22}{path}")
 
 
 def info(options: Namespace) -> int:
-    """Describe a file."""
+    """Describe a file; of a run file, the model that it means."""
     from kratos_lite.io.describe import describe
+    from kratos_lite.io.documents import ending
+    from kratos_lite.io.files import read
 
-    print(describe(_document(options)))
+    if ending(options.input) == ".json":
+        print(f"{'file':<12}{Path(options.input).name}\n{read(options.input)}")
+    else:
+        print(describe(_document(options)))
     return 0
 
 
@@ -192,11 +195,21 @@ def convert(options: Namespace) -> int:
     """Convert a file."""
     from kratos_lite.io.files import write_document
 
-    _check_targets(options.input, options.output)
+    check_targets(files_read(options.input), [options.output])
     document = _document(options)
     lost = write_document(options.output, document)
-    mesh = document.mesh
-    print(f"{options.output}: {mesh.n_nodes} nodes, {mesh.n_elements} elements, {len(mesh.parts)} parts")
+    print(f"{options.output}: {_counts(options.output, document.mesh)}")
     for text in (*lost, *document.notes):
         print(f"note     {text}")
     return 0
+
+
+def _counts(path: str, mesh: Mesh) -> str:
+    """Return the numbers of what a format holds of a mesh."""
+    from kratos_lite.io.documents import ELEM_SET, ending
+
+    kind = ending(path)
+    whole = kind == ".mdpa" or kind in ELEM_SET  # others hold no elements of unknown shape
+    elements = sum(len(block) for block in mesh.blocks if whole or block.shape is not None)
+    parts = f", {len(mesh.parts)} parts" if kind == ".mdpa" else ""
+    return f"{mesh.n_nodes} nodes, {elements} elements{parts}"

@@ -82,20 +82,33 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
     return part, kind(**values)
 
 
+def _where(model: Model, part: str | None) -> str | int | None:
+    """Return what a word before the constants of a material means: a part, a property id, or all."""
+    from kratos_lite.errors import nearest
+    from kratos_lite.materials import MATERIALS
+
+    if part is None or part in model.mesh.parts or (part[1:] in ("+", "-") and part[0] in "xyz"):
+        return part
+    if part.isdecimal():
+        return int(part)
+    laws, parts = ", ".join(MATERIALS), ", ".join(model.mesh.parts) or "none"
+    hint = nearest(part, [*MATERIALS, *model.mesh.parts])
+    raise InputError(f"--material: unknown law or part {part!r}; laws are {laws}, parts are {parts}.{hint}")
+
+
 def apply(model: Model, options: Namespace) -> None:
     """Add the materials, supports and loads of the command line to a model."""
     from kratos_lite.loads import Gravity, PointLoad, Pressure, Traction
 
-    for text in options.material:
-        part, law = material(text)
-        where: str | int | None = part
-        if part is not None and part.isdecimal() and part not in model.mesh.parts:
-            where = int(part)
-        model.assign(law, where)
+    given = [material(text) for text in options.material]
+    for part, law in sorted(given, key=lambda pair: pair[0] is not None):  # the special wins over the general
+        model.assign(law, _where(model, part))
     for text in options.fix:
         part, rest = split_part(text, "--fix", "PART:axes or PART:axes=value")
         axes, equals, value = rest.partition("=")
         model.fix(part, axes, number(value, "--fix") if equals else 0.0)
+    if options.gravity and any(isinstance(load, Gravity) for load in model.loads):
+        model.notes.append("--gravity is added to the gravity of the file")
     for text in options.gravity:
         model.add(Gravity(vector(text, "--gravity")))
     for text in options.traction:

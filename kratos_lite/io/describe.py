@@ -59,7 +59,7 @@ def _short(value: Any) -> str:
         return "[" + ", ".join(_short(v) for v in value.tolist()) + "]"
     if isinstance(value, list):
         return _short(np.array(value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value + 0.0:g}" if isinstance(value, float) else str(value)  # + 0.0 makes -0 a 0
 
 
 def _blocks(title: str, blocks: Sequence[Block], known: bool = False) -> Iterable[str]:

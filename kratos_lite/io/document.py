@@ -17,12 +17,15 @@ from kratos_lite.mesh import Block, Mesh
 
 @dataclass
 class Properties:
-    """One ``Properties`` block: variables by name, with the line of each."""
+    """One ``Properties`` block: variables by name, with the line of each in the file `source`, if that is
+    not the file of the mesh.
+    """
 
     id: int
     values: dict[str, Any] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
     line: int = 0
+    source: str = ""
 
 
 @dataclass(eq=False)
@@ -36,6 +39,7 @@ class Data:
     fixed : (m,) bool, True where the degree of freedom is fixed (nodal data only).
     values : (m,) or (m, k) float; empty for flags.
     line : line of the ``Begin``.
+    source : name of the file, if it is not the file of the mesh.
     """
 
     variable: str
@@ -43,6 +47,7 @@ class Data:
     fixed: NDArray[np.bool_]
     values: NDArray[np.float64]
     line: int = 0
+    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,13 +68,19 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Note:
-    """Something the reader kept without use, skipped, or found odd."""
+    """Something the reader kept without use, skipped, or found odd.
+
+    >>> print(Note(3, "odd"), Note(3, "odd", "beam.cond"), sep="; ")
+    line 3: odd; beam.cond:3: odd
+    """
 
     line: int
     text: str
+    source: str = ""
 
     def __str__(self) -> str:
-        return f"line {self.line}: {self.text}" if self.line else self.text
+        place = ":".join([self.source, *([str(self.line)] if self.line else [])]) if self.source else ""
+        return f"{place or f'line {self.line}'}: {self.text}" if place or self.line else self.text
 
 
 @dataclass

@@ -29,6 +29,8 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
     """
     path = Path(path)
     kind = ending(path)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
     if kind == ".mdpa":
         from kratos_lite.io.mdpa import read_mdpa
 

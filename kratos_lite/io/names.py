@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
+from kratos_lite.errors import nearest
 from kratos_lite.shapes import (
     FACE_SHAPES,
     Hexahedron8,
@@ -44,6 +46,17 @@ def count(name: str) -> int | None:
     """Return the number of nodes that a name such as ``…3D8N`` ends with."""
     match = re.search(r"3D(\d+)N?$", name)
     return int(match.group(1)) if match and len(match.group(1)) < 4 else None
+
+
+def nearest_variable(name: str, known: Iterable[str]) -> str:
+    """Return a hint like `errors.nearest`, but only for a likely slip of the pen.
+
+    >>> nearest_variable("YOUNGS_MODULUS", ["YOUNG_MODULUS"]), nearest_variable("EMISSIVITY", ["VISCOSITY"])
+    (' Did you mean YOUNG_MODULUS?', '')
+    """
+    from difflib import get_close_matches
+
+    return nearest(name, get_close_matches(name, list(known), cutoff=0.8))
 
 
 def element_shape(name: str) -> type[Shape] | None:

@@ -96,5 +96,6 @@ def _text(path: Path, error: OSError, needed: int) -> str:
     with suppress(OSError):
         free = shutil.disk_usage(folder).free
         if error.errno == errno.ENOSPC:
-            cure = f"at least {needed} bytes are needed, {free} bytes are free; free some space"
+            cure = f"{free} bytes are free; free some space"
+            cure = f"at least {needed} bytes are needed, {cure}" if needed else cure
     return f"{path}: cannot be written: {error.strerror or error}; {cure}"

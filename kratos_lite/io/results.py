@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.json`, pictures, and whatever meshio writes."""
+"""Results to files: `.vtu` for ParaView, `.vtk`, `.json` and pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import voigt
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.output import write_whole
 
 if TYPE_CHECKING:
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from kratos_lite.result import Result
 
 Array = NDArray[Any]
+RESULT_ENDINGS = (".vtu", ".vtk", ".json")
+"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
+NAMES = {"VON_MISES_STRESS": "von Mises stress"}
+"""Titles of pictures where the words of the variable do not do."""
 
 
 def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -41,7 +45,7 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
 
 
 def write_result(path: str | Path, result: Result) -> None:
-    """Write a result by the ending of `path`: .vtu, .json, or a format of meshio."""
+    """Write a result by the ending of `path`: .vtu, .vtk or .json."""
     check_result_ending(path)
     ending = Path(path).suffix.lower()
     if ending == ".json":
@@ -59,14 +63,14 @@ def write_result(path: str | Path, result: Result) -> None:
 
 
 def check_result_ending(path: str | Path) -> None:
-    """Raise InputError, before any work is done, for an ending that no writer of results has."""
+    """Raise InputError, before any work is done, for an ending of a format that cannot hold a result."""
     ending = Path(path).suffix.lower()
     if not ending:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
-    if ending not in (".vtu", ".json"):
-        from kratos_lite.io.bridge import check_ending
-
-        check_ending(Path(path), own=".vtu .json")
+    if ending not in RESULT_ENDINGS:
+        raise InputError(
+            f"{path}: unknown ending {ending!r} for results; {' '.join(RESULT_ENDINGS)} hold all fields"
+        )
 
 
 def check_picture(path: str | Path) -> None:
@@ -119,7 +123,14 @@ def write_json(path: str | Path, result: Result) -> None:
         "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
         "reaction": {ids[row]: result.reactions[row].tolist() for row in held},
     }
-    write_whole(path, json.dumps(content, ensure_ascii=False, allow_nan=False).encode())
+    try:
+        text = json.dumps(content, ensure_ascii=False, allow_nan=False)
+    except ValueError:
+        raise SolveError(
+            f"{path}: not written: some results exceed the numbers that a computer holds (1.8e308); "
+            "look for loads, supports or constants in wrong units"
+        ) from None
+    write_whole(path, text.encode())
 
 
 def plot_result(path: str | Path, result: Result, values: str = "VON_MISES_STRESS") -> None:
@@ -134,4 +145,5 @@ def plot_result(path: str | Path, result: Result, values: str = "VON_MISES_STRES
         field, values = voigt.von_mises(field), "VON_MISES_STRESS"
     elif field.ndim == 2:
         field = np.linalg.norm(field, axis=1)
-    picture(path, result.mesh, result.u, field, title=values)
+    title = NAMES.get(values, values.replace("_", " ").lower())
+    picture(path, result.mesh, result.u, field, title=title)

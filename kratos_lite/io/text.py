@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 from pathlib import Path
 
 from kratos_lite.errors import InputError
@@ -11,7 +12,8 @@ MAX_LINE = 1_000_000
 """Longest line that is read, in bytes."""
 MAX_ID = 2**63 - 1
 _REAL = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
-_COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
+# An unclosed comment runs to the end, so that the search stays linear in time.
+_COMMENT = re.compile(rb"//[^\n]*|/\*.*?(?:\*/|(\Z))", re.DOTALL)
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -20,11 +22,15 @@ def read_bytes(path: str | Path) -> bytes:
     Raises
     ------
     InputError
-        The file is missing, a folder, unreadable, a broken gzip, or holds a NUL byte or a line
-        of more than `MAX_LINE` bytes.
+        The file is missing, a folder, a pipe or device, unreadable, a broken gzip, or holds a NUL byte
+        or a line of more than `MAX_LINE` bytes.
     """
     path = Path(path)
     try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            # Reading a pipe or a device may never end.
+            raise InputError(f"{path}: is no ordinary file but a pipe or device; name a file")
         data = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
@@ -84,18 +90,14 @@ def blank_comments(data: bytes, source: str = "") -> bytes:
     """
     if b"/" not in data:
         return data
-    blanked = _COMMENT.sub(_blank, data)
-    if (open_ := blanked.find(b"/*")) >= 0:
-        line, column = line_column(blanked, open_)
-        raise InputError(f"{source}:{line}:{column}: comment '/*' is never closed; add '*/'")
-    return blanked
 
+    def blank(match: re.Match[bytes]) -> bytes:
+        if match.group(1) is not None:
+            line, column = line_column(data, match.start())
+            raise InputError(f"{source}:{line}:{column}: comment '/*' is never closed; add '*/'")
+        return b"\n".join(b" " * len(piece) for piece in match.group().split(b"\n"))
 
-def _blank(match: re.Match[bytes]) -> bytes:
-    text = match.group()
-    if b"\n" not in text:
-        return b" " * len(text)
-    return b"\n".join(b" " * len(piece) for piece in text.split(b"\n"))
+    return _COMMENT.sub(blank, data)
 
 
 def shown(token: bytes) -> str:

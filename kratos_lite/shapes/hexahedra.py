@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kratos_lite.shapes import tensor
-from kratos_lite.shapes.base import Array, Shape, mid_edges, quadratic_faces
+from kratos_lite.shapes.base import mid_edges, quadratic_faces
+from kratos_lite.shapes.tensor import Lagrange, Multilinear, Serendipity
 
 _CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
@@ -21,25 +20,15 @@ _FACES = ((0, 3, 2, 1), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (0, 4, 7, 3), 
 _CENTRES = (20, 21, 22, 23, 24, 25)
 
 
-class Hexahedron8(Shape):
+class Hexahedron8(Multilinear):
     """Eight-node trilinear hexahedron."""
 
     cell, corners, degree = "hexahedron", 8, 1
     nodes, edges, faces = _CORNERS, _EDGES, _FACES
     vtk, gmsh = 12, 5
 
-    @staticmethod
-    def N(xi: ArrayLike) -> Array:
-        """Return (1 ± r)(1 ± s)(1 ± t) / 8."""
-        return tensor.linear_N(xi, Hexahedron8.nodes)
 
-    @staticmethod
-    def dN(xi: ArrayLike) -> Array:
-        """Return their derivatives."""
-        return tensor.linear_dN(xi, Hexahedron8.nodes)
-
-
-class Hexahedron20(Shape):
+class Hexahedron20(Serendipity):
     """Twenty-node serendipity hexahedron."""
 
     cell, corners, degree = "hexahedron", 8, 2
@@ -49,18 +38,8 @@ class Hexahedron20(Shape):
     to_vtk = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
     to_gmsh = (*range(8), 8, 11, 12, 9, 13, 10, 14, 15, 16, 19, 17, 18)
 
-    @staticmethod
-    def N(xi: ArrayLike) -> Array:
-        """Return the serendipity functions."""
-        return tensor.serendipity_N(xi, Hexahedron20.nodes)
 
-    @staticmethod
-    def dN(xi: ArrayLike) -> Array:
-        """Return their derivatives."""
-        return tensor.serendipity_dN(xi, Hexahedron20.nodes)
-
-
-class Hexahedron27(Shape):
+class Hexahedron27(Lagrange):
     """Twenty-seven-node triquadratic Lagrange hexahedron; exact for quadratics on distorted cells."""
 
     cell, corners, degree = "hexahedron", 8, 2
@@ -75,13 +54,3 @@ class Hexahedron27(Shape):
     vtk, gmsh = 29, 12
     to_vtk = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 24, 22, 21, 23, 20, 25, 26)
     to_gmsh = (*range(8), 8, 11, 12, 9, 13, 10, 14, 15, 16, 19, 17, 18, 20, 21, 24, 22, 23, 25, 26)
-
-    @staticmethod
-    def N(xi: ArrayLike) -> Array:
-        """Return the 27 products of one-dimensional quadratics."""
-        return tensor.lagrange_N(xi, Hexahedron27.nodes)
-
-    @staticmethod
-    def dN(xi: ArrayLike) -> Array:
-        """Return their derivatives."""
-        return tensor.lagrange_dN(xi, Hexahedron27.nodes)

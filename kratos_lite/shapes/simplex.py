@@ -8,9 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array
-
-Edges = tuple[tuple[int, int], ...]
+from kratos_lite.shapes.base import Array, Shape
 
 
 def barycentric(xi: ArrayLike) -> tuple[Array, Array]:
@@ -21,23 +19,36 @@ def barycentric(xi: ArrayLike) -> tuple[Array, Array]:
     return L, np.vstack([-np.ones((1, d)), np.eye(d)])
 
 
-def linear_dN(xi: ArrayLike) -> Array:
-    """Return the derivatives of L at each point, (..., d+1, d)."""
-    L, dL = barycentric(xi)
-    return np.broadcast_to(dL, (*L.shape[:-1], *dL.shape)).copy()
+class Linear(Shape):
+    """Simplices with N = L."""
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the barycentric coordinates (..., d+1)."""
+        return barycentric(xi)[0]
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return their constant derivatives (..., d+1, d)."""
+        L, dL = barycentric(xi)
+        return np.broadcast_to(dL, (*L.shape[:-1], *dL.shape)).copy()
 
 
-def quadratic_N(xi: ArrayLike, edges: Edges) -> Array:
-    """Return L_i (2 L_i - 1) at the corners and 4 L_i L_j on the edges."""
-    L, _ = barycentric(xi)
-    i, j = np.array(edges).T
-    return np.concatenate([L * (2 * L - 1), 4 * L[..., i] * L[..., j]], axis=-1)
+class Quadratic(Shape):
+    """Simplices with L_i (2 L_i - 1) at the corners and 4 L_i L_j on the edges."""
 
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the functions of the corners, then of the edges (..., n)."""
+        L, _ = barycentric(xi)
+        i, j = np.array(cls.edges).T
+        return np.concatenate([L * (2 * L - 1), 4 * L[..., i] * L[..., j]], axis=-1)
 
-def quadratic_dN(xi: ArrayLike, edges: Edges) -> Array:
-    """Return the derivatives of `quadratic_N`."""
-    L, dL = barycentric(xi)
-    i, j = np.array(edges).T
-    corner = (4 * L - 1)[..., None] * dL
-    middle = 4 * (L[..., i, None] * dL[j] + L[..., j, None] * dL[i])
-    return np.concatenate([corner, middle], axis=-2)
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return their derivatives (..., n, d)."""
+        L, dL = barycentric(xi)
+        i, j = np.array(cls.edges).T
+        corner = (4 * L - 1)[..., None] * dL
+        middle = 4 * (L[..., i, None] * dL[j] + L[..., j, None] * dL[i])
+        return np.concatenate([corner, middle], axis=-2)

@@ -1,7 +1,8 @@
 """Shape functions on [-1, 1]^d: multilinear, Lagrange and serendipity, for any dimension d.
 
-Each takes points xi (..., d) and node coordinates p (n, d) and returns N (..., n) and
-dN (..., n, d).  Source: Zienkiewicz & Taylor, The Finite Element Method, vol. 1, ch. 4.
+The functions take points xi (..., d) and node coordinates p (n, d); the classes are families of
+shapes that differ in their nodes alone.
+Source: Zienkiewicz & Taylor, The Finite Element Method, vol. 1, ch. 4.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array
+from kratos_lite.shapes.base import Array, Shape
 
 
 def _product(f: Array) -> Array:
@@ -39,27 +40,7 @@ def _edge_factors(xi: ArrayLike, p: Array) -> tuple[Array, Array]:
     return np.where(p == 0, 1 - x * x, 1 + x * p), np.where(p == 0, -2 * x, p + 0 * x)
 
 
-def linear_N(xi: ArrayLike, p: Array) -> Array:
-    """Return N_a = prod_i (1 + xi_i p_ai) / 2^d."""
-    return np.asarray(_product(_linear_factors(xi, p)[0]) / 2 ** p.shape[1])
-
-
-def linear_dN(xi: ArrayLike, p: Array) -> Array:
-    """Return the derivatives of `linear_N`."""
-    return np.asarray(_gradient(*_linear_factors(xi, p)) / 2 ** p.shape[1])
-
-
-def lagrange_N(xi: ArrayLike, p: Array) -> Array:
-    """Return the products of the quadratic Lagrange polynomials through -1, 0, 1."""
-    return _product(_lagrange_factors(xi, p)[0])
-
-
-def lagrange_dN(xi: ArrayLike, p: Array) -> Array:
-    """Return the derivatives of `lagrange_N`."""
-    return _gradient(*_lagrange_factors(xi, p))
-
-
-def serendipity_N(xi: ArrayLike, p: Array) -> Array:
+def _serendipity_N(xi: ArrayLike, p: Array) -> Array:
     """Return the quadratic serendipity functions: corner nodes first, then mid-edge nodes."""
     d = p.shape[1]
     c = 2**d
@@ -69,8 +50,8 @@ def serendipity_N(xi: ArrayLike, p: Array) -> Array:
     return np.concatenate([corner, middle], axis=-1)
 
 
-def serendipity_dN(xi: ArrayLike, p: Array) -> Array:
-    """Return the derivatives of `serendipity_N`."""
+def _serendipity_dN(xi: ArrayLike, p: Array) -> Array:
+    """Return the derivatives of `_serendipity_N`."""
     d = p.shape[1]
     c = 2**d
     f, df = _linear_factors(xi, p[:c])
@@ -78,3 +59,45 @@ def serendipity_dN(xi: ArrayLike, p: Array) -> Array:
     corner = (_gradient(f, df) * bubble + _product(f)[..., None] * df) / c
     middle = _gradient(*_edge_factors(xi, p[c:])) * 2 / c
     return np.concatenate([corner, middle], axis=-2)
+
+
+class Multilinear(Shape):
+    """Shapes with N_a = prod_i (1 + xi_i p_ai) / 2^d."""
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the multilinear functions (..., n)."""
+        return np.asarray(_product(_linear_factors(xi, cls.nodes)[0]) / 2 ** cls.nodes.shape[1])
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return their derivatives (..., n, d)."""
+        return np.asarray(_gradient(*_linear_factors(xi, cls.nodes)) / 2 ** cls.nodes.shape[1])
+
+
+class Lagrange(Shape):
+    """Shapes with the products of the quadratic Lagrange polynomials through -1, 0, 1."""
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the products (..., n)."""
+        return _product(_lagrange_factors(xi, cls.nodes)[0])
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return their derivatives (..., n, d)."""
+        return _gradient(*_lagrange_factors(xi, cls.nodes))
+
+
+class Serendipity(Shape):
+    """Shapes with the quadratic serendipity functions of corner and mid-edge nodes."""
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the functions of the corners, then of the edges (..., n)."""
+        return _serendipity_N(xi, cls.nodes)
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return their derivatives (..., n, d)."""
+        return _serendipity_dN(xi, cls.nodes)

@@ -15,6 +15,7 @@ from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.testing.elements import check_element
 from kratos_lite.testing.materials import check_material
+from kratos_lite.testing.mistakes import cure, mistakes, names, replaced
 from kratos_lite.testing.report import Finding
 from kratos_lite.testing.shapes import check_shape
 
@@ -42,15 +43,16 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
     with ExitStack() as stack:
         for registry in (ELEMENTS, SHAPES, MATERIALS):
             stack.enter_context(registry.temporary())
-        names = list(vars(_execute(Path(path))).items())
-        mine = [(n, v) for n, v in names if isinstance(v, type) and v.__module__ == MODULE]
+        library = names()
+        defined = list(vars(_execute(Path(path))).items())
+        mine = [(n, v) for n, v in defined if isinstance(v, type) and v.__module__ == MODULE]
         found = [
             (kind.__name__, check_element(kind)) for _, kind in mine if issubclass(kind, KinematicLinear)
         ]
         used = {getattr(kind, "shape", None) for _, kind in mine}
         shapes = [kind for _, kind in mine if issubclass(kind, Shape) and kind not in used]
         found += [(kind.__name__, check_shape(kind)) for kind in shapes]
-        materials = [(n, v) for n, v in names if isinstance(v, LinearMaterial)]
+        materials = [(n, v) for n, v in defined if isinstance(v, LinearMaterial)]
         found += [(f"{n} ({type(v).__name__})", check_material(v)) for n, v in materials]
         made = {type(v) for _, v in materials}
         found += [
@@ -58,6 +60,15 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
             for _, kind in mine
             if issubclass(kind, LinearMaterial) and kind not in made
         ]
+        for _, kind in mine:
+            extra = mistakes(kind) + replaced(kind, library, Path(path))
+            same = next(
+                (f for name, f in found if kind.__name__ in (name, name.partition(" (")[2][:-1])), None
+            )
+            if same is not None:
+                same += extra
+            elif extra:
+                found.append((kind.__name__, extra))
     if not found:
         raise InputError(
             f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or LinearMaterial"
@@ -66,8 +77,12 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
 
 
 def _no_instance(kind: type[LinearMaterial]) -> Finding:
-    cure = f"make one at the top level of the file, for example soil = {kind.__name__}(…) with its constants"
-    return Finding("instance", False, nan, nan, f"a material is checked as an instance: {cure}", skipped=True)
+    advice = (
+        f"make one at the top level of the file, for example soil = {kind.__name__}(…) with its constants"
+    )
+    return Finding(
+        "instance", False, nan, nan, f"a material is checked as an instance: {advice}", skipped=True
+    )
 
 
 def _execute(path: Path) -> ModuleType:
@@ -91,7 +106,8 @@ def _execute(path: Path) -> ModuleType:
     except (Exception, SystemExit) as error:
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        raise InputError(f"{place}: the file stops with {type(error).__name__}: {error}") from None
+        text = f"the file stops with {type(error).__name__}: {error}{cure(error, vars(module))}"
+        raise InputError(f"{place}: {text}") from None
     finally:
         del sys.modules[MODULE]
     return module

@@ -196,7 +196,7 @@ def partition_of_unity(shape: type[Shape]) -> Measured:
 
 
 def reproduction(shape: type[Shape]) -> Measured:
-    """Check that polynomials up to the degree of the shape, and no higher ones, come back from nodal values."""
+    """Check that polynomials up to the degree of the shape, no higher ones, come back from nodal values."""
     error, text = worst(_misses(shape, exponents(shape.nodes.shape[1], shape.degree)))
     limit, more = 4e-15, shape.degree + 1
     higher = [e for e in exponents(shape.nodes.shape[1], more) if sum(e) == more]

@@ -25,7 +25,7 @@ def read_properties(files: ElemFiles) -> dict[int, Properties]:
         numbers = source.integers(run.columns[0], run.starts, least=0).tolist()
         lines = source.lines(run.starts).tolist()
         for number, line, start, name, text in zip(numbers, lines, run.starts, *run.columns[1:], strict=True):
-            properties = found.setdefault(number, Properties(number, line=line))
+            properties = found.setdefault(number, Properties(number, line=line, source=source.name))
             variable = name.decode("ascii")
             if variable in properties.values:
                 source.add(start, twice(f"{variable} of properties {number}", properties.lines[variable]))
@@ -51,6 +51,7 @@ def use_properties(files: ElemFiles, mesh: Mesh, properties: dict[int, Propertie
 def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
     """Return one Data per variable for its fixed degrees of freedom, then one for its free ones."""
     fixed, initial = _by_variable(files, ".cond", mesh), _by_variable(files, ".init", mesh)
+    cond, init = (files.sources[e].name if e in files.sources else "" for e in (".cond", ".init"))
     data = []
     for variable, nodes in fixed.items():
         values = initial.get(variable, {})

@@ -133,7 +133,7 @@ class Source:
 
     def note(self, start: int, text: str) -> None:
         """Note something odd at an offset."""
-        self.notes.append(Note(int(self.lines([start])[0]), f"{self.name}: {text}"))
+        self.notes.append(Note(int(self.lines([start])[0]), text, Path(self.name).name))
 
     def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.errors import nearest
 from kratos_lite.io.mdpa.rows import TRUTH, Layout, read_rows
 from kratos_lite.io.mdpa.scan import NAME, WORD, Frame, Source, Span
+from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.text import real, shown
 from kratos_lite.materials import MATERIALS
 
@@ -75,7 +75,7 @@ def kind_of(name: str) -> str | None:
 
 def note_unknown(source: Source, name: str, offset: int) -> None:
     """Note a variable that is kept though nobody here knows it."""
-    source.note(f"unknown variable {name} is kept, but not used.{nearest(name, KINDS)}", offset)
+    source.note(f"unknown variable {name} is kept, but not used.{nearest_variable(name, KINDS)}", offset)
 
 
 def read_values(source: Source, spans: list[Span]) -> tuple[dict[str, Any], dict[str, int]]:

@@ -67,7 +67,7 @@ def read_kratos_project(
     model = model_from(
         document,
         materials=materials is None,
-        processes=lambda values: notes.extend(run(actions, times, values)),
+        processes=lambda values: notes.extend(run(actions, case, values)),
     )
     for number, material in (materials or {}).items():
         model.assign(material, number)

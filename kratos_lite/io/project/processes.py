@@ -7,6 +7,7 @@ here once, at the last time at which Kratos would run it, in the order of those 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot
@@ -15,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.errors import nearest
 from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
+from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.project.case import Case, Interval, interval_of
 from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, is_number, shown
@@ -59,6 +60,10 @@ class Action:
         first = 1 if self.on_conditions or not self.factors else 0
         return [k for k in range(first, len(times)) if times[k] in self.interval]
 
+    def depends_on_place(self) -> bool:
+        """Whether an expression holds the place x, y or z of the moved mesh."""
+        return any(isinstance(f, str) and re.search(r"(?<!\w)[xyz](?!\w)", f) for f in self.factors)
+
     def value(self, points: Array, time: float) -> Array | float:
         """Return the value at points (m, 3) in m and a time in s."""
         x, y, z = points.T
@@ -94,7 +99,7 @@ def _variable(settings: Settings, known: Sequence[str], kind: str) -> str:
     if name not in known:
         raise settings.error(
             "variable_name",
-            f"{name!r} is not a {kind} variable of static solids.{nearest(name, known)} "
+            f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)} "
             f"Known are {', '.join(known[:5])} …",
         )
     return name
@@ -217,8 +222,9 @@ def actions_of(entry: Settings, module: str, case: Case) -> list[Action]:
     return make(settings, case, on_conditions)
 
 
-def run(actions: Sequence[Action], times: Sequence[float], values: Variables) -> list[str]:
+def run(actions: Sequence[Action], case: Case, values: Variables) -> list[str]:
     """Bring the values and supports to what they are at the last step; return notes."""
+    times = case.times
     steps = [action.active(times) for action in actions]
     notes = []
     for action, active in zip(actions, steps, strict=True):
@@ -226,6 +232,13 @@ def run(actions: Sequence[Action], times: Sequence[float], values: Variables) ->
             why = "its interval holds no step" if not active else "its part has none to act on"
             where = action.settings.path.removesuffix(".Parameters")
             notes.append(f"{where}: {action.component} is never set: {why}")
+        elif case.moved and active[-1] > 1 and action.depends_on_place():
+            # Before the first step nothing has moved yet.
+            notes.append(
+                f"{where}: Kratos evaluates x, y, z at time {times[active[-1]]:g} s on the mesh as the steps "
+                "before moved it, kratos_lite on the undeformed one; write X, Y, Z to mean the same"
+            )
+    notes = list(dict.fromkeys(notes))
     _set(actions, steps, times, values)
     _hold(actions, steps, len(times) - 1, values)
     return notes

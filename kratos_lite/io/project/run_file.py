@@ -13,7 +13,7 @@ from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
-from kratos_lite.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model import Model
 
@@ -89,9 +89,19 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
         for part in sections[key].values:
             collect(_load, model, sections[key], part, load)
     if gravity is not None:
-        model.add(Gravity(gravity))
+        _add_gravity(model, gravity)
     collect.problems.raise_if_any()
     return Scene(model, solver, tolerance, output)
+
+
+def _add_gravity(model: Model, gravity: list[float]) -> None:
+    """Add gravity, and note what the mesh file has of its kind already."""
+    for load in model.loads:
+        if isinstance(load, BodyForce):
+            name = "VOLUME_ACCELERATION" if isinstance(load, Gravity) else "BODY_FORCE"
+            place = "the nodes" if load.where is None else f"Properties {load.where}"
+            model.notes.append(f"gravity is added to the {name} of {place} in the mesh file")
+    model.add(Gravity(gravity))
 
 
 def _model_path(settings: Settings, folder: Path, outside: bool) -> Path:
