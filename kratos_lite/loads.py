@@ -251,7 +251,6 @@ class ConditionLoads(Load):
             rows = slice(start, start + len(block))
             start += len(block)
             _check_loadable(block, bool(self.force[rows].any()), bool(self.pressure[rows].any()))
-            _check_loadable(block, bool(self.force[rows].any()), bool(self.pressure[rows].any()))
             if block.shape is None or not len(block):
                 continue
             X = mesh.points[block.nodes]

@@ -279,7 +279,7 @@ class Result:
         return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
     def save(self, path: str | Path) -> None:
-        """Write the result to a file by its ending: .vtu, .json, or a format of meshio."""
+        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json."""
         from kratos_lite.io.results import write_result
 
         write_result(path, self)

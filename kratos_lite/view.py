@@ -54,7 +54,7 @@ def picture(
     values : (n,) numbers on the nodes that colour the surface.
     title : first line above the picture.
     unit : of `values`, at the colour bar; found from the title if it names a variable that we know.
-    scale : factor on the displacement; by default the largest is about a tenth of the body.
+    scale : factor on the displacement; by default at least 1, the largest being a tenth of the body.
     size : largest width and height in inches, at 150 dots per inch.
 
     Raises
@@ -87,10 +87,7 @@ def picture(
     if colours is not None:
         if unit is None:
             unit = next((unit for word, unit in UNITS.items() if word in title.upper()), "")
-        from matplotlib.ticker import EngFormatter
-
-        bar = figure.colorbar(colours, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=EngFormatter(unit))
-        bar.outline.set_visible(False)
+        _bar(figure, axes, colours, unit)
     axes.set_title(title, fontsize=11)
     _save(path, figure)
 
@@ -203,11 +200,13 @@ def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Floats:
 
 
 def _exaggeration(X: Floats, u: Floats) -> float:
-    """Return 1, 2 or 5 times a power of ten that makes the displacement a tenth of the body."""
+    """Return 1, 2 or 5 times a power of ten, at least 1, that makes the displacement a tenth of the body."""
     largest = np.linalg.norm(u, axis=1).max()
     if largest == 0:
         return 1.0
     wanted = 0.1 * np.linalg.norm(np.ptp(X, axis=0)) / largest
+    if wanted < 1:
+        return 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
@@ -255,10 +254,23 @@ def _colours(value: Floats) -> tuple[Any, Floats]:
     from matplotlib.colors import Normalize
 
     low, high = (float(value.min()), float(value.max())) if len(value) else (0.0, 1.0)
-    if high - low <= 1e-12 * max(abs(low), abs(high)):  # a constant is shown in the middle of the scale
-        low, high = low - 0.5 * (abs(low) or 1), high + 0.5 * (abs(high) or 1)
+    if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant is shown in the middle of the scale
+        half = 0.5 * max(abs(low), abs(high)) or 1.0
+        low, high = low - half, high + half
     shown = ScalarMappable(Normalize(low, high), colormaps["viridis"])
     return shown, np.asarray(shown.to_rgba(value))
+
+
+def _bar(figure: Any, axes: Any, colours: Any, unit: str) -> None:
+    """Draw the colour bar with one prefix for all its numbers."""
+    from matplotlib.ticker import EngFormatter, FuncFormatter
+
+    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colours.get_clim()))) / 3), -24, 24))
+    shown = FuncFormatter(lambda value, _: f"{value / 10.0**power:g}")
+    bar = figure.colorbar(colours, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
+    prefix = EngFormatter.ENG_PREFIXES[power]
+    bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
+    bar.outline.set_visible(False)
 
 
 def _paint(axes: Any, boundary: list[Block], X: Floats, field: Floats | None) -> Any:

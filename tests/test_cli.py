@@ -229,8 +229,10 @@ def test_run_file_says_the_same_as_options(run, box):
     assert same(displacement("by_file.json"), displacement("by_options.json"), 1e-14)
     told = run("info", "run.json")
     assert told.code == 0
-    assert "DISPLACEMENT_Z: 9 values, 9 fixed" in told.out
-    assert "YOUNG_MODULUS 2.1e+11" in told.out
+    assert told.out.startswith("file        run.json\nnodes       27\n")
+    assert "material    Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
+    assert "fixed       27 components" in told.out
+    assert "load        Gravity" in told.out
     assert run("check", "run.json").out.startswith("run.json: 27 nodes, 8 elements, no errors")
     assert run("convert", "run.json", "run.mdpa").code == 0
     assert run("solve", "run.mdpa", "--json", "again.json").code == 0
@@ -358,6 +360,22 @@ def test_help_of_each_command_shows_an_example(run, command):
     assert f"examples:\n  kratos-lite {command} " in done.out
 
 
+def test_help_tells_the_exit_codes(run):
+    told = run("--help").out
+    for line in ("0    done", "1    a defect", "2    bad input", "3    solved, but", "130  interrupted"):
+        assert f"\n  {line}" in told
+
+
+def test_a_terminal_that_knows_ascii_only_shows_codes(box):
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = process("solve", "box.vtu", *HELD, env=ascii_only)
+    assert (done.code, done.err) == (0, "")
+    assert "54 unknowns \\u2264 600" in done.out
+    done = process("solve", "--help", env=ascii_only)
+    assert (done.code, done.err) == (0, "")
+    assert "m/s\\xb2" in done.out
+
+
 def test_help_names_all_commands_and_version_is_told(run):
     told = run("--help")
     assert told.code == 0
@@ -386,7 +404,7 @@ WRONG_OPTIONS = {
     "tolerance zero": ([*HELD, "--tolerance", "0"], "tolerance must be a number between 0 and 1; got 0.0"),
     "no faces": ([*HELD, "--traction", "one:0,0,1"], "'one'"),
     "no folder": ([*HELD, "-o", "none/out.vtu"], "none/out.vtu: the folder none does not exist"),
-    "unknown ending": ([*HELD, "-o", "out.foo"], "out.foo: unknown ending '.foo'"),
+    "unknown ending": ([*HELD, "-o", "out.foo"], "out.foo: results cannot be written as '.foo'"),
     "no ending": ([*HELD, "-o", "out"], "out: give the file an ending"),
     "output is a folder": ([*HELD, "-o", "sub.vtu"], "sub.vtu: cannot be written: it is a folder"),
     "output twice": (
@@ -394,6 +412,25 @@ WRONG_OPTIONS = {
         "./out.json: is the input or another output",
     ),
     "output is the input": ([*HELD, "-o", "box.vtu"], "box.vtu: is the input or another output already"),
+    "no name": ([*HELD, "-o", ""], "an output has an empty name"),
+    "mesh format": (
+        [*HELD, "-o", "out.inp"],
+        "out.inp: results cannot be written as '.inp'; .vtu .vtk .json",
+    ),
+    "other mesh format": ([*HELD, "-o", "out.msh"], "results cannot be written as '.msh'"),
+    "json as vtu": ([*HELD, "--json", "out.vtu"], "out.vtu: the ending must be .json"),
+    "unknown law or part": (
+        ["--material", "Foo:E=1e9,nu=0.3"],
+        "unknown law or part 'Foo'; laws are Isotropic3D",
+    ),
+    "too large": (
+        [*HELD, "--fix", "z+:xyz=1e300", "--json", "out.json"],
+        "numbers exceed what a computer holds",
+    ),
+    "squares too large": (
+        [*HELD, "--fix", "z+:xyz=1e160", "--json", "out.json"],
+        "numbers exceed what a computer holds",
+    ),
     "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
 }
 
@@ -446,6 +483,66 @@ def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command)
     assert not Path("out.mdpa").exists()
 
 
+def fingerprints():
+    return {path.name: path.read_bytes() for path in Path().iterdir() if path.is_file()}
+
+
+SELF = {
+    "run file": {"model": "box.mdpa", "json": "run.json"},
+    "model": {"model": "box.vtu", "output": "box.vtu"},
+    "member of a set": {"model": "set.elem", "json": "set.json", "output": "./set.json"},
+    "format": {"model": "box.mdpa", "fix": {"z-": "xyz"}, "output": "out.inp"},
+}
+
+
+@pytest.mark.parametrize("name", SELF)
+def test_a_run_file_overwrites_nothing_that_is_read_and_names_no_useless_format(run, box, name):
+    kl.write("set.elem", held(box))
+    Path("run.json").write_text(json.dumps(SELF[name]))
+    before = fingerprints()
+    assert run("solve", "run.json").refuses(
+        "results cannot be written as '.inp'"
+        if name == "format"
+        else "is the input or another output already"
+    )
+    assert fingerprints() == before
+
+
+def test_no_file_that_is_read_is_overwritten(run, box):
+    kl.write("set.elem", held(box))
+    Path("run.json").write_text('{"model": "box.vtu"}')
+    Path("of_set.json").write_text('{"model": "set"}')
+    Path("kratos.json").write_text(
+        '{"solver_settings": {"model_import_settings": {"input_filename": "box"},'
+        ' "material_import_settings": {"materials_filename": "mat.json"}}}'
+    )
+    Path("mat.json").write_text("{}")
+    before = fingerprints()
+    for words in (
+        ("convert", "set.elem", "set.node"),
+        ("convert", "set", "set.init"),
+        ("convert", "set.cond", "./set.elem"),
+        ("convert", "of_set.json", "set.prop"),
+        ("convert", "kratos.json", "box.mdpa"),
+        ("solve", "run.json", "-o", "box.vtu"),
+        ("solve", "kratos.json", "--json", "mat.json"),
+    ):
+        assert run(*words).refuses("is the input or another output already")
+        assert fingerprints() == before
+
+
+def test_links_in_a_circle_and_pipes_are_refused(run, box):
+    for name in ("loop.mdpa", "loop.vtu"):
+        Path(name).symlink_to(name)
+        assert run("info", name).refuses(name)
+        assert run("convert", "box.mdpa", name).refuses(f"{name}: cannot be written: its symbolic links")
+        assert Path(name).is_symlink()
+    for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem", "pipe.json"):
+        os.mkfifo(name)
+    for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem"):
+        assert run("info", name).refuses(f"{name}: is a pipe or a device")
+
+
 @pytest.mark.parametrize("target", ["out", "out.json", "out.foo", "none/out.vtu", "box.mdpa"])
 def test_a_conversion_to_nowhere_or_onto_itself_is_refused(run, box, target):
     assert run("convert", "box.mdpa", target).refuses(target)
@@ -463,6 +560,77 @@ def test_debug_shows_where_an_error_came_from(box):
     done = process("solve", "none.mdpa", "--debug")
     assert done.code == 1
     assert "Traceback" in done.err
+
+
+@pytest.mark.parametrize("command", [("solve", *HELD), ("info",), ("check",)], ids=lambda words: words[0])
+def test_a_full_disk_behind_the_output_is_an_error_in_one_line(box, command):
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full on this system")
+    words = [sys.executable, "-m", "kratos_lite", command[0], "box.vtu", *command[1:]]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: the output: No space left on device\n")
+
+
+def test_a_file_that_fails_loses_no_summary(run, box, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    done = run("solve", "box.vtu", *HELD, "--json", "out.json")
+    assert done.code == 2
+    assert rows_of(done.out)["unknowns"] == "54"
+    assert "written" not in done.out
+    assert done.err.startswith("error: out.json: cannot be written: No space left on device; ")
+
+
+def test_a_terminal_that_fails_loses_no_file(box, monkeypatch):
+    def closed(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(kl.Result, "__str__", closed)
+    assert main(["solve", "box.vtu", *HELD, "--json", "out.json", "--gravity", "0,0,-9.81"]) == 0
+    assert len(displacement("out.json")) == 27
+
+
+def test_errors_speak_of_the_option(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    1 0 0 0\n", "    1 0 0\n    0\n")
+    Path("broken.mdpa").write_text(text)
+    done = run("info", "broken.mdpa")
+    assert done.refuses("--lenient")
+    assert "strict" not in done.err
+
+
+def test_gravity_on_top_of_that_of_the_file_is_noted(run, folder):
+    done = run("solve", GRAVITY_CUBE, "--gravity", "0,0,-9.81")
+    assert rows_of(done.out)["total load"] == "(0, 0, -149504) N"
+    assert "--gravity is added to the gravity of the file" in done.out
+    assert "--gravity is added" not in run("solve", GRAVITY_CUBE).out
+
+
+def test_the_material_of_a_part_wins_in_either_order(run, box):
+    pair = (["--material", "1:E=2e9,nu=0"], ["--material", "E=5e9,nu=0"])
+    for number, words in enumerate(([*pair[0], *pair[1]], [*pair[1], *pair[0]], pair[0])):
+        rest = ["--fix", "z-:xyz", "--traction", "z+:0,0,1e5", "--json", f"{number}.json"]
+        assert run("solve", "box.vtu", *words, *rest).code == 0
+    first, second, alone = (displacement(f"{number}.json") for number in range(3))
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, alone)
+
+
+def test_a_conversion_counts_what_is_in_the_file(run, box):
+    assert run("convert", "box.mdpa", "a.mdpa").out.startswith("a.mdpa: 27 nodes, 8 elements, 6 parts\n")
+    for name in ("a.elem", "a.vtu"):
+        done = run("convert", "box.mdpa", name)
+        assert done.out.startswith(f"{name}: 27 nodes, 8 elements\n")
+        assert "left out: " in done.out
+
+
+def test_forces_that_cancel_are_shown_as_zero(run, box):
+    done = run("solve", "box.vtu", *HELD, "--traction", "x-:1e9,1,3e8", "--traction", "x+:-1e9,1,-3e8")
+    assert rows_of(done.out)["total load"] == "(0, 2, 0) N"
+    assert rows_of(done.out)["total reaction"] == "(0, -2, 0) N"
+    assert "Pa (at a Gauss point) in element" in rows_of(done.out)["largest von Mises"]
 
 
 def test_a_defect_is_told_apart_from_bad_input(run, box, monkeypatch):
@@ -483,6 +651,19 @@ def test_want_of_memory_is_told(run, box, monkeypatch):
 
 def interrupt(*_):
     signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_while_modules_are_imported_ends_with_130(run, box, monkeypatch):
+    class Import:
+        def find_spec(self, name, *_):
+            if name == "kratos_lite.cli.commands":
+                interrupt()
+
+    monkeypatch.delitem(sys.modules, "kratos_lite.cli.commands")
+    monkeypatch.delattr("kratos_lite.cli.commands")
+    monkeypatch.setattr(sys, "meta_path", [Import(), *sys.meta_path])
+    done = run("info", "box.vtu")
+    assert (done.code, done.out, done.err) == (130, "", "interrupted; nothing half-written is left\n")
 
 
 def test_ctrl_c_while_solving_ends_with_130(run, box, monkeypatch):

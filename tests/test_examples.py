@@ -42,6 +42,28 @@ def test_python_of_the_readme_runs(number, tmp_path):
         assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
 
 
+@pytest.mark.parametrize("page", ["users.md", "add-an-element.md", "formats.md", "exercises.md"])
+def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
+    blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
+    assert blocks
+    script = tmp_path / "page.py"
+    script.write_text("\n".join(blocks))
+    out = run(sys.executable, "-W", "error", script, cwd=tmp_path)
+    if page == "exercises.md":
+        shares = [float(share) for share in re.findall(r"(\S+) of the beam", out)]
+        assert len(shares) == 4
+        assert shares[0] < shares[1] < 1  # linear elements are too stiff
+        assert all(abs(share - 1) < 0.01 for share in shares[2:])
+
+
+def test_elements_of_the_guide_conform(tmp_path):
+    script = tmp_path / "guide.py"
+    script.write_text("\n".join(python_blocks((EXAMPLES.parent / "docs" / "add-an-element.md").read_text())))
+    out = run(sys.executable, "-m", "kratos_lite", "check", script)
+    assert "MyWedge3D6N: 36 checks passed, 0 failed" in out
+    assert "slate (TransverseIsotropic3D): 6 checks passed, 0 failed" in out
+
+
 def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
     out = tmp_path / "r.json"
     folder = EXAMPLES / "cantilever"

@@ -1,3 +1,4 @@
+import re
 import sys
 
 import numpy as np
@@ -59,6 +60,33 @@ def test_deformation_and_its_factor_are_shown(cube, tmp_path):
 def test_the_colour_bar_names_the_unit(cube, tmp_path, title, unit, shown):
     picture(tmp_path / "a.svg", cube, values=1e7 * cube.points[:, 0], title=title, unit=unit)
     assert f" {shown} -->" in (tmp_path / "a.svg").read_text()
+
+
+def labels(path):
+    """Return the texts of a picture, which stand as comments before the paths of their letters."""
+    return re.findall("<!-- (.*?) -->", path.read_text())
+
+
+def test_all_numbers_of_the_colour_bar_have_one_unit(cube, tmp_path):
+    picture(tmp_path / "a.svg", cube, values=1e6 * (1 + cube.points[:, 0]), title="von Mises stress")
+    found = labels(tmp_path / "a.svg")
+    assert found[-1] == "MPa"
+    assert not [text for text in found[:-1] if "Pa" in text]
+    assert {"0.5", "1", "1.5", "2"} <= set(found)
+
+
+@pytest.mark.parametrize(
+    ("value", "noise", "shown"), [(5e6, 1e-9, "3 4 5 6 7 MPa"), (0.0, 0.0, "0.5 0.75 1 Pa")]
+)
+def test_a_uniform_field_gets_a_range_around_it(cube, tmp_path, value, noise, shown):
+    picture(tmp_path / "a.svg", cube, values=value * (1 + noise * cube.points[:, 0]), title="STRESS")
+    assert " ".join(labels(tmp_path / "a.svg")).endswith(f" {shown}")
+
+
+def test_a_deformation_is_never_shown_smaller_than_it_is(cube, tmp_path):
+    u = 30.0 * cube.points
+    picture(tmp_path / "a.svg", cube, u)
+    assert "deformation × 1 " in (tmp_path / "a.svg").read_text()
 
 
 def test_a_constant_field_and_no_displacement_are_drawn(cube, tmp_path):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import apply, material
 from kratos_lite.cli.targets import check_targets, files_read
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, ModelError, SolveError
 
 EXIT_CHECK_FAILED = 3
 
@@ -48,6 +48,19 @@ class TerminalProgress:
 def solve(options: Namespace) -> int:
     """Solve a file, print the summary, write what was asked for."""
     clock = perf_counter()
+    import numpy as np
+
+    try:
+        with np.errstate(over="raise"):
+            return _solve(options, clock)
+    except FloatingPointError:
+        raise SolveError(
+            "numbers exceed what a computer holds (1.8e308); "
+            "look for coordinates, constants, supports or loads in wrong units"
+        ) from None
+
+
+def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.io.files import load
 
     seconds = {"import": perf_counter() - clock}
@@ -85,7 +98,6 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
 
     All are checked, before any work is done.
     """
-    from kratos_lite.io.documents import ending
     from kratos_lite.io.results import check_picture, check_result_ending
 
     asked = {key: getattr(options, key) for key in ("output", "json", "picture")}
@@ -94,7 +106,7 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
     check_targets(read, found.values())
     if "output" in found:
         check_result_ending(found["output"])
-    if "json" in found and ending(found["json"]) != ".json":
+    if "json" in found and Path(found["json"]).suffix.lower() != ".json":
         raise InputError(f"{found['json']}: the ending must be .json; other results go to --output")
     if "picture" in found:
         check_picture(found["picture"])

@@ -15,7 +15,7 @@ KEYS_READ = ("model", "input_filename", "materials_filename", "input_file_name")
 
 def check_targets(read: Iterable[Path], targets: Iterable[str | None]) -> None:
     """Refuse, before any work is done, a target that is read, given twice, or cannot be written."""
-    taken = {os.path.realpath(path): str(path) for path in read}
+    taken = {os.path.realpath(path) for path in read}
     for target in targets:
         if target is None:
             continue
@@ -25,12 +25,14 @@ def check_targets(read: Iterable[Path], targets: Iterable[str | None]) -> None:
         if not folder.is_dir():
             raise InputError(f"{target}: the folder {folder} does not exist")
         for path in _set_of(Path(target)):
+            real, name = os.path.realpath(path), target if path == Path(target) else str(path)
             if path.exists() and not path.is_file():
-                raise InputError(f"{path}: cannot be written: it is a folder or a device, not a file")
-            if (real := os.path.realpath(path)) in taken:
-                which = "" if taken[real] in (target, str(path)) else f" ({taken[real]})"
-                raise InputError(f"{path}: is the input or another output already{which}; choose another name")
-        taken |= {os.path.realpath(path): target for path in _set_of(Path(target))}
+                raise InputError(f"{name}: cannot be written: it is a folder or a device, not a file")
+            if os.path.islink(real):
+                raise InputError(f"{name}: cannot be written: its symbolic links lead in a circle")
+            if real in taken:
+                raise InputError(f"{name}: is the input or another output already; choose another name")
+        taken |= {os.path.realpath(path) for path in _set_of(Path(target))}
 
 
 def files_read(source: str) -> list[Path]:

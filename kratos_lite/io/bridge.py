@@ -31,6 +31,7 @@ CELLS = {
 """Our shape of each cell type of meshio."""
 _NAMES = ("PointCondition3D{}N", "LineCondition3D{}N", "SurfaceCondition3D{}N", "KinematicLinear3D{}N")
 _PROPERTY_KEYS = ("gmsh:physical", "nastran:ref", "medit:ref", "PROPERTIES_ID")
+_INT32 = 2**31 - 1
 _OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 """Endings left to others: read by ourselves, pictures, or spread over several files."""
 _OPTIONS = {
@@ -47,7 +48,8 @@ def read_meshio(path: str | Path) -> Document:
     Solid cells become elements ``KinematicLinear3D…N``, triangles and quadrilaterals conditions
     ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  Named groups,
     cell sets and node sets become parts.  The number of the physical group (or material) of a solid cell
-    is its property id, or 1; the properties are empty.  Lengths are taken to be m.
+    is its property id, or 1; the properties are empty.  Lengths are taken to be m.  meshio tells no ids:
+    nodes and elements are counted from 1, unless the data NODE_ID and ELEMENT_ID of our own files name them.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ def read_meshio(path: str | Path) -> Document:
     """
     path = Path(path)
     check_ending(path)
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no ordinary file; name a file")  # a pipe might never end
     with _guarded(path, "read") as (meshio, said):
         found = meshio.read(path)
     _check(path, found)
@@ -102,14 +106,21 @@ def write_meshio(
         # Several writers of meshio leave out what their format cannot hold, and say nothing.
         kept, wanted = _count(meshio.read(temporary)), _count(whole)
         if kept != wanted:
-            raise InputError(f"{path}: this format keeps {kept} of {wanted}; .vtu and .vtk keep all cells")
+            raise InputError(
+                f"{path}: this format keeps {_told(kept)} of {_told(wanted)}; .vtu and .vtk keep all cells"
+            )
 
 
 def _gmsh_tags(path: Path, cell_data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return the property ids as the two tags of Gmsh, which takes no stresses on elements."""
     if results := set(cell_data) - {"PROPERTIES_ID", "ELEMENT_ID"}:
         raise InputError(f"{path}: .msh cannot hold {', '.join(sorted(results))} on elements; write .vtu")
-    tags = np.asarray(cell_data.get("PROPERTIES_ID", []), dtype=np.int32)
+    properties = np.asarray(cell_data.get("PROPERTIES_ID", []))
+    if len(properties) and properties.max() > _INT32:
+        raise InputError(
+            f"{path}: .msh holds property ids up to {_INT32}; got {properties.max()}; write .vtu"
+        )
+    tags = properties.astype(np.int32)
     return {"gmsh:physical": tags, "gmsh:geometrical": tags} if len(tags) else {}
 
 
@@ -119,6 +130,10 @@ def _count(mesh: Any) -> dict[str, int]:
     for cells in mesh.cells:
         counts[cells.type] = counts.get(cells.type, 0) + len(cells.data)
     return counts
+
+
+def _told(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "no cells"
 
 
 def _endings() -> list[str]:
@@ -181,12 +196,23 @@ def _check(path: Path, found: Any) -> None:
                 )
 
 
+def _ids(given: list[Any], count: int) -> Ints | None:
+    """Return ids if there are `count`, all whole, positive and different; else None."""
+    ids = np.concatenate([NO_ROWS, *map(np.ravel, given)])
+    if len(ids) != count or not count or not 1 <= ids.min() <= ids.max() < 2**62:
+        return None
+    if not np.array_equal(ids, np.round(ids)):
+        return None
+    return ids.astype(np.int64) if len(np.unique(ids)) == count else None
+
+
 class _Reading:
     """One mesh of meshio on its way to a Document."""
 
     def __init__(self, path: Path, found: Any, said: str) -> None:
         self.path, self.found = path, found
         self.notes = [Note(0, " ".join(said.split()))] if said.strip() else []
+        self.used = set(_PROPERTY_KEYS)
         self.sets = self._sets()
         self.kinds: list[type[Shape] | None] = [
             SHAPES[CELLS[cells.type]] if cells.type in CELLS else None for cells in found.cells
@@ -206,11 +232,38 @@ class _Reading:
             block.properties[:] = used[0]
         if not elements:
             self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
+        node_ids = self._name(elements)
         self._note_lost()
         mesh = Mesh(
-            self.found.points, elements, conditions=conditions, parts=self._parts(), source=self.path.name
+            self.found.points,
+            elements,
+            node_ids=node_ids,
+            conditions=conditions,
+            parts=self._parts(),
+            source=self.path.name,
         )
         return Document(mesh, {i: Properties(i) for i in used}, notes=self.notes)
+
+    def _name(self, elements: list[Block]) -> Ints:
+        """Give the elements the ids that our own files state, and return those of the nodes."""
+        n, m = len(self.found.points), sum(map(len, elements))
+        node_ids = _ids([self.found.point_data.get("NODE_ID", [])], n)
+        solids = [b for b, dim in enumerate(self.dims) if dim == 3]
+        stated = self.found.cell_data.get("ELEMENT_ID")
+        rows = np.concatenate([NO_ROWS, *(self.rows[b] for b in solids)])
+        ids = _ids([stated[b] for b in solids] if stated else [], m)
+        if ids is not None:
+            in_order = np.empty_like(ids)
+            in_order[rows] = ids
+            for block in elements:
+                block.ids[:] = in_order[block.ids - 1]
+            self.used.add("ELEMENT_ID")
+        if node_ids is None:
+            node_ids = np.arange(1, n + 1)
+            self.notes.append(Note(0, f"nodes are numbered 1 … {n} in the order of the file"))
+        else:
+            self.used.add("NODE_ID")
+        return node_ids
 
     def _sets(self) -> dict[str, list[Ints]]:
         """Return the named groups of cells: rows in each block of meshio."""
@@ -290,7 +343,7 @@ class _Reading:
                 why = "are in no named group" if name in CELLS else "are of no known type"
                 self.notes.append(Note(0, f"{count} cells {name!r} {why} and are not used"))
         data = [*self.found.point_data, *self.found.cell_data]
-        unused = [n for n in data if not n.startswith("gmsh:") and n not in _PROPERTY_KEYS]
+        unused = [n for n in data if not n.startswith("gmsh:") and n not in self.used]
         if unused:
             self.notes.append(Note(0, f"data not used: {', '.join(dict.fromkeys(unused))}"))
 

@@ -17,8 +17,9 @@ from kratos_lite.mesh import Block, Mesh
 
 @dataclass
 class Properties:
-    """One ``Properties`` block: variables by name, with the line of each in the file `source`, if that is
-    not the file of the mesh.
+    """One ``Properties`` block: variables by name, with the line of each.
+
+    `source` is the name of the file, if it is not the file of the mesh.
     """
 
     id: int

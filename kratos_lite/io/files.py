@@ -45,7 +45,7 @@ def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Sc
 def write(path: str | Path, thing: Any) -> list[str]:
     """Write a result, a model or a mesh by the ending of `path`.
 
-    A result goes to .vtu, .json or a format of meshio; a model or a mesh to .mdpa, an .elem set,
+    A result goes to .vtu, .vtk or .json; a model or a mesh to .mdpa, an .elem set,
     .vtu or a format of meshio.
 
     Returns
@@ -77,8 +77,7 @@ def write_document(path: str | Path, document: Document) -> list[str]:
     if kind == ".mdpa":
         from kratos_lite.io.mdpa import write_mdpa
 
-        write_mdpa(path, document)
-        return _mixed(document)
+        return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
     if kind in ELEM_SET:
         from kratos_lite.io.elem import write_elem
 

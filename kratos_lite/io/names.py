@@ -48,6 +48,23 @@ def count(name: str) -> int | None:
     return int(match.group(1)) if match and len(match.group(1)) < 4 else None
 
 
+def kratos_name(name: str) -> str:
+    """Return the name by which Kratos 10 knows an element or condition that kratos_lite gives a meaning.
+
+    Kratos has an ``Element3D8N`` too, but it is empty: it has no stiffness.
+
+    >>> kratos_name("TotalLagrangian3D27N"), kratos_name("Face3D4"), kratos_name("Bar3D2N")
+    ('SmallDisplacementElement3D27N', 'SmallDisplacementSurfaceLoadCondition3D4N', 'Bar3D2N')
+    """
+    nodes = count(name)
+    family = name[: name.rfind("3D")]
+    if family in ("KinematicLinear", "TotalLagrangian", "Element") and nodes in SOLIDS:
+        return f"SmallDisplacementElement3D{nodes}N"
+    if family in ("Face", "FacePressure") and nodes in FACE_SHAPES:
+        return f"SmallDisplacementSurfaceLoadCondition3D{nodes}N"
+    return name
+
+
 def nearest_variable(name: str, known: Iterable[str]) -> str:
     """Return a hint like `errors.nearest`, but only for a likely slip of the pen.
 

@@ -69,7 +69,7 @@ def check_result_ending(path: str | Path) -> None:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
     if ending not in RESULT_ENDINGS:
         raise InputError(
-            f"{path}: unknown ending {ending!r} for results; {' '.join(RESULT_ENDINGS)} hold all fields"
+            f"{path}: results cannot be written as {ending!r}; {' '.join(RESULT_ENDINGS)} hold all fields"
         )
 
 

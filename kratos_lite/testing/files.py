@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from math import nan
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.errors import InputError
@@ -21,8 +22,10 @@ from kratos_lite.testing.shapes import check_shape
 
 MODULE = "kratos_lite_checked_file"
 
+Named = tuple[str, list[Finding]]
 
-def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
+
+def run_file(path: str | Path) -> list[Named]:
     """Run a Python file and check what it defines; the file can do whatever a program can.
 
     Parameters
@@ -45,35 +48,41 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
             stack.enter_context(registry.temporary())
         library = names()
         defined = list(vars(_execute(Path(path))).items())
-        mine = [(n, v) for n, v in defined if isinstance(v, type) and v.__module__ == MODULE]
-        found = [
-            (kind.__name__, check_element(kind)) for _, kind in mine if issubclass(kind, KinematicLinear)
-        ]
-        used = {getattr(kind, "shape", None) for _, kind in mine}
-        shapes = [kind for _, kind in mine if issubclass(kind, Shape) and kind not in used]
-        found += [(kind.__name__, check_shape(kind)) for kind in shapes]
-        materials = [(n, v) for n, v in defined if isinstance(v, LinearMaterial)]
-        found += [(f"{n} ({type(v).__name__})", check_material(v)) for n, v in materials]
-        made = {type(v) for _, v in materials}
-        found += [
-            (kind.__name__, [_no_instance(kind)])
-            for _, kind in mine
-            if issubclass(kind, LinearMaterial) and kind not in made
-        ]
-        for _, kind in mine:
-            extra = mistakes(kind) + replaced(kind, library, Path(path))
-            same = next(
-                (f for name, f in found if kind.__name__ in (name, name.partition(" (")[2][:-1])), None
-            )
-            if same is not None:
-                same += extra
-            elif extra:
-                found.append((kind.__name__, extra))
+        mine = [v for _, v in defined if isinstance(v, type) and v.__module__ == MODULE]
+        found = _check_all(defined, mine)
+        _add_mistakes(found, mine, library, Path(path))
     if not found:
         raise InputError(
             f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or LinearMaterial"
         )
     return found
+
+
+def _check_all(defined: list[tuple[str, Any]], mine: list[type]) -> list[Named]:
+    """Check elements, the shapes that none of them uses, and materials by their instances."""
+    found = [(kind.__name__, check_element(kind)) for kind in mine if issubclass(kind, KinematicLinear)]
+    used = {getattr(kind, "shape", None) for kind in mine}
+    shapes = [kind for kind in mine if issubclass(kind, Shape) and kind not in used]
+    found += [(kind.__name__, check_shape(kind)) for kind in shapes]
+    materials = [(n, v) for n, v in defined if isinstance(v, LinearMaterial)]
+    found += [(f"{n} ({type(v).__name__})", check_material(v)) for n, v in materials]
+    made = {type(v) for _, v in materials}
+    laws = [kind for kind in mine if issubclass(kind, LinearMaterial) and kind not in made]
+    return found + [(kind.__name__, [_no_instance(kind)]) for kind in laws]
+
+
+def _add_mistakes(
+    found: list[Named], mine: list[type], library: dict[tuple[str, str], Any], path: Path
+) -> None:
+    """Add what a class lacks or replaces to its findings."""
+    for kind in mine:
+        extra = mistakes(kind) + replaced(kind, library, path)
+        name = kind.__name__
+        same = [findings for own, findings in found if own == name or own.endswith(f" ({name})")]
+        if same:
+            same[0].extend(extra)
+        elif extra:
+            found.append((name, extra))
 
 
 def _no_instance(kind: type[LinearMaterial]) -> Finding:

@@ -1,10 +1,11 @@
-"""Mistakes in classes of one's own that Python itself lets pass: a base or a decorator left out, a name taken."""
+"""Mistakes in one's own classes that Python lets pass: a base or a decorator left out, a name taken."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import is_dataclass
 from inspect import get_annotations
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def replaced(kind: type, before: dict[tuple[str, str], Any], path: Path) -> list
         return []
     taken = ", ".join(name for _, name in lost)
     text = f"the library has {taken} already; importing this file would replace it: choose another name"
-    return [Finding("name", False, len(lost), 0, text)]
+    return [Finding("name", False, inf, 0, text)]
 
 
 def mistakes(kind: type) -> list[Finding]:
@@ -53,9 +54,11 @@ def mistakes(kind: type) -> list[Finding]:
                 what = " and ".join(next(sign for sign in signs if sign[0] in vars(kind)))
                 text = f"{kind.__name__} has {what} but is no {base.__name__}, so nothing uses it: "
                 text += f"write class {kind.__name__}({base.__name__})"
-                return [Finding("base class", False, 1, 0, text)]
+                return [Finding("base class", False, inf, 0, text)]
     if lacks_decorator(kind):
-        return [Finding("dataclass", False, 1, 0, f"{kind.__name__} lists constants: add {FROZEN} above it")]
+        return [
+            Finding("dataclass", False, inf, 0, f"{kind.__name__} lists constants: add {FROZEN} above it")
+        ]
     return []
 
 

@@ -85,7 +85,7 @@ def errors(cells: KinematicLinear, u: Array, exact: Array, stress: Array) -> tup
 
 
 def linear_patch(element: Element) -> Measured | str:
-    """Run Irons' patch test with shear: 27 bricks, inner corners moved, u linear on the boundary.
+    """Check Irons' patch test with shear: 27 bricks, inner corners moved, u linear on the boundary.
 
     Source of the field: MacNeal & Harder, Finite Elements in Analysis and Design 1 (1985) 3-20.
     """

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements import ELEMENTS, kinematic_linear_3d6n
 from kratos_lite.errors import InputError
 from kratos_lite.materials import MATERIALS
 from kratos_lite.shapes import SHAPES
@@ -23,6 +23,7 @@ class MyWedge(Shape):
     nodes = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0, 1], [0, 1, 1]], float)
     edges = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))
     faces = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+    vtk = 13
 
     @staticmethod
     def N(xi):
@@ -98,7 +99,10 @@ def test_a_file_that_reuses_a_name_of_the_library_does_not_replace_it(checked):
     shipped = ELEMENTS["KinematicLinear3D6N"]
     ((name, findings),) = checked(WEDGE.replace("MyElement", "KinematicLinear3D6N"))
     assert name == "KinematicLinear3D6N"
-    assert not failures(findings)
+    (finding,) = failures(findings)
+    assert finding.check == "name"
+    assert "the library has KinematicLinear3D6N, SmallDisplacementElement3D6N" in finding.detail
+    assert finding.detail.endswith("importing this file would replace it: choose another name")
     assert ELEMENTS["KinematicLinear3D6N"] is shipped
     assert ELEMENTS["SmallDisplacementElement3D6N"] is shipped
 
@@ -142,6 +146,37 @@ def test_a_material_without_an_instance_says_how_to_make_one(checked):
     assert finding.skipped
     assert not finding.passed
     assert "soil = Transverse(" in finding.detail
+
+
+def test_a_file_of_the_library_itself_may_have_its_names():
+    ((name, findings),) = run_file(kinematic_linear_3d6n.__file__)
+    assert name == "KinematicLinear3D6N"
+    assert not failures(findings)
+
+
+def test_a_class_without_its_base_is_named(checked):
+    found = dict(checked(LAW.replace("(LinearMaterial)", "")))
+    (finding,) = failures(found["Transverse"])
+    assert str(finding) == (
+        "base class: Transverse has compliance but is no LinearMaterial, so nothing uses it: "
+        "write class Transverse(LinearMaterial)"
+    )
+
+
+def test_a_material_that_is_no_dataclass_is_named_with_and_without_an_instance(checked):
+    bare = LAW.replace("@dataclass(frozen=True)\n", "")
+    (finding,) = failures(dict(checked(bare))["Transverse"])
+    assert finding.detail == "Transverse lists constants: add @dataclass(frozen=True) above it"
+    with pytest.raises(InputError, match=r"takes no arguments; add @dataclass\(frozen=True\) above class Tr"):
+        checked(bare + "\nslate = Transverse(9e9, 5e9, 0.2, 0.15, 2e9)\n")
+
+
+def test_a_shape_without_its_vtk_number_is_told_the_number_and_checked_all_the_same(checked):
+    ((_, findings),) = checked(WEDGE.replace("    vtk = 13\n", ""))
+    (finding,) = failures(findings)
+    assert finding.check == "definition"
+    assert "write vtk = 13 in the shape" in finding.detail
+    assert len(findings) == 38
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,7 @@ def test_what_is_not_used_is_noted(tmp_path):
     )
     document = read_meshio(tmp_path / "a.vtk")
     assert [str(note) for note in document.notes] == [
+        "nodes are numbered 1 … 18 in the order of the file",
         "2 cells 'line' are in no named group and are not used",
         "1 cells 'wedge18' are of no known type and are not used",
         "data not used: T",
@@ -209,8 +210,8 @@ def test_a_missing_file_is_an_input_error(tmp_path):
     [
         ("old.xyz", "unknown ending"),
         ("old.mdpa", "unknown ending"),
-        ("old.stl", "keeps {} of {'hexahedron20': 1}"),
-        ("old.mesh", "keeps {} of {'hexahedron20': 1}"),
+        ("old.stl", "keeps no cells of 1 hexahedron20; .vtu"),
+        ("old.mesh", "keeps no cells of 1 hexahedron20; .vtu"),
         ("old.avs", "cannot be written by meshio"),
         ("old.msh", "cannot hold STRESS on elements"),
     ],
@@ -268,7 +269,10 @@ def test_warnings_of_meshio_become_notes(tmp_path, monkeypatch):
         return found
 
     monkeypatch.setattr(meshio, "read", read)
-    assert [str(note) for note in read_meshio(tmp_path / "a.vtk").notes] == ["Warning: odd"]
+    assert [str(note) for note in read_meshio(tmp_path / "a.vtk").notes] == [
+        "Warning: odd",
+        "nodes are numbered 1 … 4 in the order of the file",
+    ]
 
 
 def test_elements_listed_twice_in_a_gmsh_file_are_refused(tmp_path):
@@ -285,3 +289,42 @@ def test_no_gzipped_vtu_is_written(tmp_path, ending):
     with pytest.raises(InputError, match=r"write it as \.vtu"):
         write_vtu(tmp_path / f"a.vtu.{ending}", one("Tetrahedron4"))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", ["vtu", "vtk", "own.vtu"])
+def test_our_own_files_keep_the_ids_of_nodes_and_elements(tmp_path, ending):
+    a, b = one("Hexahedron8"), one("Tetrahedron4")
+    b.blocks[0].nodes += 8
+    b.blocks[0].ids[:] = 70
+    a.blocks[0].ids[:] = 90
+    points, ids = np.vstack([a.points, b.points + 5]), np.arange(12)[::-1] * 10 + 101
+    mesh = Mesh(points, [*a.blocks, *b.blocks], node_ids=ids)
+    data = {"ELEMENT_ID": np.array([90, 70]), "PROPERTIES_ID": np.array([4, 4])}
+    path = tmp_path / f"a.{ending}"
+    (write_vtu if ending == "own.vtu" else write_meshio)(path, mesh, {"NODE_ID": ids}, data)
+    document = read_meshio(path)
+    assert document.mesh.node_ids.tolist() == ids.tolist()
+    assert [block.ids.tolist() for block in document.mesh.blocks] == [[90], [70]]
+    assert document.notes == []
+
+
+@pytest.mark.parametrize("ids", [[1, 2, 3, 3], [0, 1, 2, 3], [1, 2, 3, 4.5], [1, 2, 3, np.nan]])
+def test_ids_that_are_none_are_not_taken(tmp_path, ids):
+    write_meshio(tmp_path / "a.vtu", one("Tetrahedron4"), {"NODE_ID": np.array(ids)})
+    document = read_meshio(tmp_path / "a.vtu")
+    assert document.mesh.node_ids.tolist() == [1, 2, 3, 4]
+    assert [str(note) for note in document.notes] == [
+        "nodes are numbered 1 … 4 in the order of the file",
+        "data not used: NODE_ID",
+    ]
+
+
+def test_property_ids_too_large_for_gmsh_are_refused(tmp_path):
+    for number, fits in ((2**31 - 1, True), (2**31, False)):
+        data = {"PROPERTIES_ID": np.array([number])}
+        if fits:
+            write_meshio(tmp_path / "a.msh", one("Tetrahedron4"), {}, data)
+            assert list(read_meshio(tmp_path / "a.msh").properties) == [number]
+        else:
+            with pytest.raises(InputError, match=r"property ids up to 2147483647; got 2147483648"):
+                write_meshio(tmp_path / "b.msh", one("Tetrahedron4"), {}, data)

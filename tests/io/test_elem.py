@@ -487,10 +487,10 @@ def test_repetitions_that_agree_are_noted(make):
             init="NODES[1](P, 0) = 1\nNODES[1](P, 0) = 1.0",
         )
     )
-    assert [(note.line, note.text.rsplit("/", 1)[-1]) for note in document.notes] == [
-        (2, "a.node: node 3 is repeated from line 1"),
-        (2, "a.cond: 1 statements repeat earlier ones, from here on"),
-        (2, "a.init: 1 statements repeat earlier ones, from here on"),
+    assert [str(note) for note in document.notes] == [
+        "a.node:2: node 3 is repeated from line 1",
+        "a.cond:2: 1 statements repeat earlier ones, from here on",
+        "a.init:2: 1 statements repeat earlier ones, from here on",
     ]
     assert document.mesh.n_nodes == 5
     assert document.nodal_data[0].ids.tolist() == [1]

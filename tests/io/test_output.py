@@ -40,6 +40,12 @@ def test_a_failing_disk_leaves_the_old_file_and_says_how_much_was_needed(old, mo
     assert list(old.parent.iterdir()) == [old]
 
 
+def test_a_full_disk_without_a_known_size_tells_what_is_free(old, monkeypatch):
+    monkeypatch.setattr(os, "fsync", _full)
+    with pytest.raises(InputError, match=r"No space left on device; \d+ bytes are free; free some space$"):
+        write_whole(old, b"")
+
+
 def test_a_disk_that_fills_midway_leaves_the_old_file(old):
     def write(file):
         file.write(b"half")

@@ -449,7 +449,7 @@ def test_material_variables_that_are_not_used_are_noted(folder):
     materials["properties"][0]["Material"]["Variables"]["YIELD_STRESS"] = 1e6
     write(folder, materials, "materials.json")
     project = read_project(write(folder, run_file([CLAMP], [GRAVITY])))
-    assert "material of Structure.Body: YIELD_STRESS not used by LinearElastic3DLaw" in project.model.notes
+    assert "Properties 1: YIELD_STRESS not used by a static solution of solids" in project.model.notes
 
 
 def test_unknown_settings_are_noted_and_outputs_are_not_run(folder):
@@ -990,3 +990,20 @@ def test_pressures_that_kratos_lets_follow_the_faces_are_noted(folder, prefix, c
     assert (
         sum(note.startswith(f"{name}: the pressure acts on the undeformed body") for note in notes) == count
     )
+
+
+@pytest.mark.parametrize(
+    ("expression", "step", "moves", "noted"),
+    [
+        ("1e6*x", 0.4, True, True),
+        ("1e6*x", 0.4, False, False),
+        ("1e6*x", 1.1, True, False),
+        ("1e6*X*exp(t)", 0.4, True, False),
+    ],
+)
+def test_expressions_that_kratos_evaluates_on_the_moved_mesh_are_noted(
+    folder, expression, step, moves, noted
+):
+    content = run_file([CLAMP], [push(expression)], step=step, move_mesh_flag=moves)
+    notes = read_project(write(folder, content)).model.notes
+    assert sum("as the steps before moved it" in note for note in notes) == noted

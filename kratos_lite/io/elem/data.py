@@ -55,8 +55,9 @@ def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
     data = []
     for variable, nodes in fixed.items():
         values = initial.get(variable, {})
-        data.append(_data(variable, {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}, True))
-    return data + [_data(variable, nodes, False) for variable, nodes in initial.items() if nodes]
+        held = {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}
+        data.append(_data(variable, held, True, cond))
+    return data + [_data(variable, nodes, False, init) for variable, nodes in initial.items() if nodes]
 
 
 def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]:
@@ -112,7 +113,8 @@ def _value(source: Source, form: Form, text: bytes, start: int) -> Any:
     return np.array(matrix)
 
 
-def _data(variable: str, nodes: Values, fixed: bool) -> Data:
+def _data(variable: str, nodes: Values, fixed: bool, source: str) -> Data:
     values = np.array([value for value, _ in nodes.values()])
     ids = np.array(list(nodes), dtype=np.int64)
-    return Data(variable, ids, np.full(len(ids), fixed), values, min(line for _, line in nodes.values()))
+    line = min(line for _, line in nodes.values())
+    return Data(variable, ids, np.full(len(ids), fixed), values, line, source)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
 
@@ -121,7 +122,9 @@ def _note_unused(files: ElemFiles, mesh: Mesh) -> None:
         if block.shape is None:
             counts[block.name] = counts.get(block.name, 0) + len(block)
     for name, count in counts.items():
-        files.notes.append(Note(0, f"{files.stem}.cond: {count} conditions {name} are kept without use"))
+        files.notes.append(
+            Note(0, f"{count} conditions {name} are kept without use", Path(files.stem).name + ".cond")
+        )
 
 
 def _joined(runs: Sequence[Run], count: int) -> tuple[list[list[bytes]], list[int]]:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import Problems
+from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.elem.data import read_nodal_data, read_properties, use_properties
 from kratos_lite.io.elem.files import ElemFiles, stem
 from kratos_lite.io.elem.mesh import read_mesh
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.output import replacing
 from kratos_lite.mesh import Block, Mesh
 
 
@@ -58,11 +59,11 @@ def read_elem(path: str | Path) -> Document:
 
 
 def write_elem(path: str | Path, document: Document) -> list[Note]:
-    """Write a document as a five-file set; reals keep all their digits.
+    """Write a document as a five-file set, the whole of it or nothing; reals keep all their digits.
 
     Parameters
     ----------
-    path : name of the set; an ending of the set is cut off.
+    path : name of the set; an ending of the set is cut off.  Sets are not written gzipped.
     document : coordinates in m.
 
     Returns
@@ -85,18 +86,26 @@ def write_elem(path: str | Path, document: Document) -> list[Note]:
     [1, 0.0, 0.0, 0.1]
     ])
     """
+    if str(path).lower().endswith(".gz"):
+        # A plain file of the same name beside it would be read in its place.
+        raise InputError(f"{path}: five-file sets are not written gzipped; leave out the ending .gz")
     problems, notes = Problems(), _left_out(document)
     _check(document, problems)
+    dofs = _dofs(document)
+    fixed = [f"NODES[{n}].Fix({name});" for (n, name), (_, is_fixed) in dofs.items() if is_fixed]
     lines = {
         ".node": _node_lines(document.mesh),
         ".elem": _cell_lines(document.mesh, document.mesh.blocks, "ELEMENTS"),
-        ".cond": [*_fix_lines(document), *_cell_lines(document.mesh, document.mesh.conditions, "CONDITIONS")],
+        ".cond": [*fixed, *_cell_lines(document.mesh, document.mesh.conditions, "CONDITIONS")],
         ".prop": list(_property_lines(document, problems, notes)),
-        ".init": _init_lines(document),
+        ".init": [f"NODES[{n}]({name}, 0) = {value!r};" for (n, name), (value, _) in dofs.items()],
     }
     problems.raise_if_any()
-    for ending, text in lines.items():
-        write_whole(stem(path) + ending, "".join(f"{line}\n" for line in text).encode("ascii"))
+    with ExitStack() as stack:
+        # All are on the disk before the first takes its place.
+        for ending, text in lines.items():
+            data = "".join(f"{line}\n" for line in text).encode("ascii")
+            stack.enter_context(replacing(stem(path) + ending, len(data))).write_bytes(data)
     return notes
 
 
@@ -164,7 +173,7 @@ def _property_lines(document: Document, problems: Problems, notes: list[Note]) -
                 yield f"PROPERTIES[{number}][{name}] = {text};"
             else:
                 notes.append(
-                    Note(0, f"left out: {name} of properties {number}; {value!r} is no finite number")
+                    Note(0, f"left out: {name} {value!r} of properties {number}; .prop files hold numbers only")
                 )
     used = {0, *(int(number) for block in document.mesh.blocks for number in np.unique(block.properties))}
     for number in sorted(used - written - {0}) if written else ():
@@ -182,21 +191,14 @@ def _number_text(value: Any) -> str:
     return repr(array.astype(float).tolist())
 
 
-def _scalars(document: Document) -> list[Data]:
-    return [data for data in document.nodal_data if _is_scalar(data)]
-
-
-def _fix_lines(document: Document) -> list[str]:
-    return [
-        f"NODES[{node}].Fix({data.variable});"
-        for data in _scalars(document)
-        for node in data.ids[data.fixed].tolist()
-    ]
-
-
-def _init_lines(document: Document) -> list[str]:
-    return [
-        f"NODES[{node}]({data.variable}, 0) = {value!r};"
-        for data in _scalars(document)
-        for node, value in zip(data.ids.tolist(), data.values.astype(float).tolist(), strict=True)
-    ]
+def _dofs(document: Document) -> dict[tuple[int, str], tuple[float, bool]]:
+    """Return value and fixity by node and variable; where the document states one twice, the last value."""
+    dofs: dict[tuple[int, str], tuple[float, bool]] = {}
+    for data in filter(_is_scalar, document.nodal_data):
+        # Values on nodes that do not exist mean nothing; the reader of the document noted them.
+        known = document.mesh.node_rows(data.ids) >= 0
+        columns = data.ids[known], data.values[known], data.fixed[known]
+        for node, value, fixed in zip(*columns, strict=True):
+            dof = int(node), data.variable
+            dofs[dof] = float(value), bool(fixed) or dofs.get(dof, (0.0, False))[1]
+    return dofs

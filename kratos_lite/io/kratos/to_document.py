@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
-from kratos_lite.io.kratos.to_model import USER_LAW
+from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.loads import Gravity
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
-from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.kratos.variables import Variables
-from kratos_lite.loads import BodyForce, Gravity
-from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.errors import Problems, nearest
+from kratos_lite.io.document import Data, Document, Note
+from kratos_lite.io.kratos.properties import apply_properties
+from kratos_lite.io.kratos.variables import LOADING, VECTORS, Variables, components
 from kratos_lite.mesh import Block
 from kratos_lite.model import Model
-
-ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}
-"""Variables that say what material a Properties block means."""
-USER_LAW = "UserProvidedLinearElastic3DLaw"
-"""The law of Kratos that takes any ELASTICITY_TENSOR (6, 6) in Pa; it has no orthotropic one for solids."""
 
 
 def model_from(
@@ -46,9 +40,10 @@ def model_from(
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh.blocks)
     used = {int(p) for block in document.mesh.blocks for p in np.unique(block.properties)}
-    problems = Problems(document.mesh.source)
+    sources = [properties.source for properties in document.properties.values() if properties.source]
+    problems = Problems(sources[0] if sources else document.mesh.source)
     for number in sorted(used & document.properties.keys()):
-        _apply_properties(model, document.properties[number], materials, problems)
+        apply_properties(model, document.properties[number], materials, problems)
     problems.raise_if_any()
     values = Variables(document.mesh)
     _fill(values, document, model)
@@ -66,8 +61,9 @@ def check_elements(document: Document) -> None:
         if len(block) and block.name not in ELEMENTS:
             line = None if block.lines is None else int(block.lines[0])
             known = [*ELEMENTS, *(alias for name in ELEMENTS for alias in ELEMENTS.aliases(name))]
+            hint = nearest(block.name, known) if "3D" in block.name else ""
             problems.add(
-                f"unknown element {block.name!r} ({len(block)} of them);{nearest(block.name, known)} "
+                f"unknown element {block.name!r} ({len(block)} of them);{hint} "
                 f"Known are {', '.join(sorted(ELEMENTS, key=_by_number))} and their Kratos names",
                 line,
             )
@@ -89,117 +85,22 @@ def _renamed(blocks: list[Block]) -> list[str]:
     return list(notes.values())
 
 
-def _apply_properties(model: Model, properties: Properties, materials: bool, problems: Problems) -> None:
-    values = properties.values
-    where = properties.id
-    if materials:
-        try:
-            material = material_from(values)
-        except KratosLiteError as error:
-            line = _line_of(properties, str(error))
-            unknown = [v for v in values if v not in ELASTIC | {"DENSITY"} and nearest(v, ELASTIC)]
-            hint = "".join(
-                f"; found {v!r} at line {properties.lines.get(v, 0)}:{nearest(v, ELASTIC)}" for v in unknown
-            )
-            problems.add(f"Properties {where}: {error}{hint}", line)
-            return
-        if material is not None:
-            model.assign(material, where)
-    if "INTEGRATION_ORDER" in values:
-        try:
-            order = values["INTEGRATION_ORDER"]
-            model.use_rule(int(order), where)
-            if order not in (1, 2, 3, 4, 5):
-                raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")
-        except InputError as error:
-            problems.add(f"Properties {where}: {error}", properties.lines.get("INTEGRATION_ORDER"))
-    _apply_volume_loads(model, properties, problems)
-    for name in ("INSITU_STRESS", "PRESTRESS"):
-        if name in values:
-            stress = np.asarray(values[name], dtype=float).ravel()
-            if stress.shape != (6,):
-                problems.add(f"{name} must have six components xx yy zz xy yz xz", properties.lines.get(name))
-            else:
-                model.add_prestress(stress * float(values.get("PRESTRESS_FACTOR", 1.0)), where)
-
-
-def _line_of(properties: Properties, text: str) -> int:
-    """Return the line of the variable that an error names, else of the block."""
-    named = [line for name, line in properties.lines.items() if name in text]
-    return named[0] if named else properties.line
-
-
-def material_from(values: dict[str, Any]) -> LinearMaterial | None:
-    """Return the material of a Properties block, or None if it names none.
-
-    >>> material_from({"YOUNG_MODULUS": 210e9, "POISSON_RATIO": 0.3})
-    Isotropic3D(E=210000000000.0, nu=0.3, density=0.0)
-    """
-    law = values.get("CONSTITUTIVE_LAW")
-    if law is None and not ELASTIC & values.keys():
-        return None
-    name = "Isotropic3D" if law is None else str(law)
-    if law in (None, USER_LAW) and "YOUNG_MODULUS_X" in values:
-        name = "Orthotropic3D"
-    if name not in MATERIALS:
-        known = [*MATERIALS, *(alias for m in MATERIALS for alias in MATERIALS.aliases(m))]
-        raise MaterialError(
-            f"CONSTITUTIVE_LAW {name!r} is not a linear elastic law that kratos_lite has "
-            f"({', '.join(MATERIALS)} and their Kratos names);{nearest(name, known)} "
-            "choose one of them, or give a material with --material"
-        )
-    material = MATERIALS[name].from_variables(values)
-    if law == USER_LAW:
-        C = np.asarray(values.get("ELASTICITY_TENSOR"))
-        if C.shape != (6, 6) or not np.abs(C - material.C).max() <= 1e-9 * np.abs(material.C).max():
-            raise MaterialError(
-                f"ELASTICITY_TENSOR is not the one of the constants beside it for {name}; mend one"
-            )
-    return material
-
-
-def _apply_volume_loads(model: Model, properties: Properties, problems: Problems) -> None:
-    """Add weight: density × VOLUME_ACCELERATION (or GRAVITY), else BODY_FORCE."""
-    vectors: dict[str, Any] = {}
-    for name in ("VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE"):
-        value = np.asarray(properties.values.get(name, np.zeros(3)), dtype=float)
-        if value.shape != (3,):
-            problems.add(f"{name} must have three components", properties.lines.get(name))
-            return
-        vectors[name] = value
-    a, g, b = vectors.values()
-    where = properties.id
-    if a.any() and g.any() and (a != g).any():
-        problems.add(
-            f"Properties {where} has VOLUME_ACCELERATION {a.tolist()} and GRAVITY {g.tolist()}; keep one",
-            properties.lines.get("GRAVITY"),
-        )
-        return
-    acceleration = a if a.any() else g
-    if acceleration.any():
-        model.add(Gravity(acceleration, where))
-        if b.any():
-            model.notes.append(
-                f"Properties {where}: BODY_FORCE is ignored: density × gravity is the body force already"
-            )
-    elif b.any():
-        model.add(BodyForce(b, where))
-
-
 def _fill(values: Variables, document: Document, model: Model) -> None:
     """Put the data blocks of a document into variables."""
-    mesh = document.mesh
+    mesh, problems = document.mesh, Problems()
     for data in document.nodal_data:
+        if not _fits(data, model, problems, mesh.source):
+            continue
         rows = mesh.node_rows(data.ids)
         known = rows >= 0
         if data.values.size:
+            _note_overridden(values, data, rows, model)
             values.set_nodes(data.variable, rows[known], data.values[known])
         if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
         elif data.variable.startswith("DISPLACEMENT") and data.values.any():
-            model.notes.append(
-                f"line {data.line}: initial values of {data.variable} do not matter in linear statics"
-            )
+            text = f"initial values of {data.variable} do not matter in linear statics"
+            model.notes.append(str(Note(data.line, text, data.source)))
     if document.condition_data:
         ids = np.concatenate([np.zeros(0, dtype=np.int64), *(block.ids for block in mesh.conditions)])
         order = np.argsort(ids, kind="stable")
@@ -207,10 +108,38 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
             place = np.searchsorted(ids, data.ids, sorter=order).clip(max=max(len(ids) - 1, 0))
             rows = order[place] if len(ids) else np.zeros(0, dtype=np.int64)
             known = ids[rows] == data.ids if len(ids) else np.zeros(len(data.ids), dtype=bool)
-            if data.values.size:
+            if data.values.size and _fits(data, model, problems, mesh.source):
                 values.set_conditions(data.variable, rows[known], data.values[known])
     for data in document.element_data:
         model.notes.append(f"line {data.line}: ElementalData {data.variable} is not used")
+    problems.raise_if_any()
+
+
+def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
+    """Whether the values have the size of their variable; note what is unused, refuse what is wrong."""
+    wanted = (3,) if data.variable in VECTORS else ()
+    if not data.values.size or data.values.shape[1:] == wanted:
+        return True
+    size = list(data.values.shape[1:]) or "of one number"
+    if data.variable in VECTORS or data.variable in LOADING:
+        text = f"{data.variable} has values {size}; expected {'[3] (x, y, z)' if wanted else 'one number'}"
+        problems.add(f"{data.source or source}:{data.line}: {text}")
+    else:
+        text = f"{data.variable} is not used by a static solution of solids"
+        model.notes.append(str(Note(data.line, text, data.source)))
+    return False
+
+
+def _note_overridden(values: Variables, data: Data, rows: NDArray[np.int64], model: Model) -> None:
+    """Note fixed values that an earlier block gave otherwise."""
+    for name, new in components(data.variable, data.values).items():
+        if name in values.fixed:
+            changed = (rows >= 0) & values.fixed[name][rows] & (values.nodal[name][rows] != new)
+            if changed.any():
+                more = f" (and {changed.sum() - 1} more)" if changed.sum() > 1 else ""
+                node = data.ids[changed][0]
+                text = f"{name} of node {node}{more} is fixed to another value before; the last one counts"
+                model.notes.append(str(Note(data.line, text, data.source)))
 
 
 def _link(model: Model, document: Document) -> None:

@@ -6,10 +6,12 @@ turns them into supports and loads.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.loads import ConditionLoads, Gravity
+from kratos_lite.loads import SURFACES, ConditionLoads, Gravity
 from kratos_lite.mesh import Mesh
 from kratos_lite.model import Model
 
@@ -23,7 +25,7 @@ LOADS = {
 """Variable that loads a condition, by its cell."""
 PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
 VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
-USED = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
+LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
 
 
@@ -74,7 +76,7 @@ class Variables:
         loads = self._condition_loads(model)
         if loads is not None:
             model.add(loads)
-        for name in sorted({*self.nodal, *self.conditional} - USED):
+        for name in sorted({*self.nodal, *self.conditional} - LOADING):
             if any(name in fields and fields[name].any() for fields in (self.nodal, self.conditional)):
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
@@ -107,7 +109,7 @@ class Variables:
                 variable = LOADS[block.shape.cell]
                 carried.add(variable)
                 force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
-        self._note_idle(model, carried)
+        self._note_idle(model)
         zero, nodal_zero = np.zeros(mesh.n_conditions), np.zeros(mesh.n_nodes)
         positive, negative = PRESSURES
         pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
@@ -131,12 +133,38 @@ class Variables:
                 f"Kratos; {name} adds a pressure stiffness there"
             )
 
-    def _note_idle(self, model: Model, carried: set[str]) -> None:
-        """Note load values that no condition carries."""
-        faces = "SURFACE_LOAD" in carried
-        for name in sorted({*self.nodal, *self.conditional}):
-            values = [f[name] for f in (self.nodal, self.conditional) if name in f]
-            load = name.rsplit("_", 1)[0] if name not in PRESSURES else "SURFACE_LOAD"
-            idle = load in LOADS.values() and load not in carried if name not in PRESSURES else not faces
-            if idle and any(v.any() for v in values):
-                model.notes.append(f"{name} has no effect: no condition of the file carries it")
+    def _note_idle(self, model: Model) -> None:
+        """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
+        ids = np.concatenate([np.zeros(0, dtype=np.int64), *(b.ids for b in self.mesh.conditions)])
+        for variable in (*dict.fromkeys(LOADS.values()), *PRESSURES):
+            cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
+            on_conditions, on_nodes = self._carriers(cells)
+            kinds = "faces" if cells[0] in SURFACES else f"{cells[0]} conditions"
+            idle = _loaded(self.conditional, variable, on_conditions)
+            if idle.any():
+                where = f"{idle.sum()} conditions (first {ids[idle][0]})"
+                model.notes.append(f"{variable} on {where} has no effect: only {kinds} carry it")
+            idle = _loaded(self.nodal, variable, on_nodes)
+            if idle.any():
+                where = f"{idle.sum()} nodes (first {self.mesh.node_ids[idle][0]})"
+                text = f"only {kinds} carry it, and none has these nodes"
+                model.notes.append(f"{variable} on {where} has no effect: {text}")
+
+    def _carriers(self, cells: Iterable[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which conditions are of these cells, and which nodes they have."""
+        nodes, masks = np.zeros(self.mesh.n_nodes, dtype=bool), [np.zeros(0, dtype=bool)]
+        for block in self.mesh.conditions:
+            carries = block.shape is not None and block.shape.cell in cells
+            masks.append(np.full(len(block), carries))
+            if carries:
+                nodes[block.nodes] = True
+        return np.concatenate(masks), nodes
+
+
+def _loaded(fields: dict[str, Array], variable: str, carried: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where a variable or a component of it is not 0 although nothing carries it."""
+    loaded = np.zeros(len(carried), dtype=bool)
+    for name in (variable, *(f"{variable}_{axis}" for axis in "XYZ")):
+        if name in fields:
+            loaded |= fields[name] != 0
+    return loaded & ~carried

@@ -136,6 +136,11 @@ def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constrai
             at = source.data.find(b"\n", here, end)
             if at < 0:
                 break
+    if len({len(c.masters) for c in found}) > 1:
+        text = "Kratos misreads a block of Constraints with different numbers of masters; "
+        source.note(
+            text + "kratos_lite reads it as written; give each number a block of its own", frame.offset
+        )
     return found
 
 

@@ -11,24 +11,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Constraint, Data, Document
+from kratos_lite.io.document import Constraint, Data, Document, Note
 from kratos_lite.io.mdpa.parts import PART_NAME
 from kratos_lite.io.mdpa.scan import NAME
 from kratos_lite.io.mdpa.values import Table, kind_of
+from kratos_lite.io.names import kratos_name
 from kratos_lite.io.output import write_whole
 from kratos_lite.mesh import NO_ROWS, Block, Ints, Mesh, Part
 
 Lines = Iterator[str]
 
 
-def write_mdpa(path: str | Path, document: Document) -> None:
+def write_mdpa(path: str | Path, document: Document) -> list[Note]:
     """Write a document, as a whole or not at all; gzipped if the name ends with ``.gz``.
 
-    Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``
-    and its kin are written as ``SmallDisplacementElement3D8N``, the name by which Kratos knows them.
+    Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
+    ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
+    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``.
     A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
     variable of each master from the word before in the header, so it reads such a constraint differently.
+
+    Returns
+    -------
+    list of Note
+        Elements and conditions that are written though Kratos does not know them.
 
     Raises
     ------
@@ -38,7 +46,7 @@ def write_mdpa(path: str | Path, document: Document) -> None:
     Examples
     --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
-    >>> write_mdpa(path, Document(Mesh([[0.1, 0, 0]], node_ids=[7])))
+    >>> _ = write_mdpa(path, Document(Mesh([[0.1, 0, 0]], node_ids=[7])))
     >>> print(path.read_text().strip())
     Begin Nodes
     7 0.1 0.0 0.0
@@ -53,6 +61,20 @@ def write_mdpa(path: str | Path, document: Document) -> None:
 
         data = gzip.compress(data, mtime=0)
     write_whole(path, data)
+    return _unknown_to_kratos(document.mesh)
+
+
+def _unknown_to_kratos(mesh: Mesh) -> list[Note]:
+    """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
+    counts: dict[str, int] = {}
+    for block in (*mesh.blocks, *mesh.conditions):
+        name = kratos_name(block.name)
+        own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith("KinematicLinear3D")
+        if len(block) and (own or "ContactFace" in name or re.search(r"3D\d+$", name)):
+            counts[name] = counts.get(name, 0) + len(block)
+    return [
+        Note(0, f"{n} {name} are written, but Kratos 10 does not know them") for name, n in counts.items()
+    ]
 
 
 def _lines(document: Document) -> Lines:
@@ -162,7 +184,7 @@ def _table(header: str, table: Any) -> Lines:
 
 
 def _cells(kind: str, block: Block, mesh: Mesh) -> Lines:
-    name = re.sub(r"^KinematicLinear(?=3D\d+N$)", "SmallDisplacementElement", _name(block.name))
+    name = _name(block.name if kind == "Geometries" else kratos_name(block.name))
     columns = [block.ids[:, None], mesh.node_ids[block.nodes]]
     if kind != "Geometries":
         columns.insert(1, np.asarray(block.properties)[:, None])
@@ -171,20 +193,28 @@ def _cells(kind: str, block: Block, mesh: Mesh) -> Lines:
 
 def _constraints(constraints: list[Constraint]) -> Lines:
     """Give the constraints, those of the same variables in one block."""
-    for (name, *variables), group in groupby(constraints, key=_header):
+    # Kratos misreads a block whose constraints have different numbers of masters.
+    for (_, *words), group in groupby(constraints, key=_header):
         rows = []
         for c in group:
             weights = ",".join(_array(f"constraint {c.id}", np.asarray(w)) for w in c.weights)
             constant = _array(f"constraint {c.id}", np.asarray(c.constant))
             nodes = " ".join(str(node) for node, _ in (c.slave, *c.masters))
             rows.append(f"{c.id} {constant} [{weights}] {nodes}")
-        yield from _block(" ".join(["Constraints", *map(_name, (name, *variables))]), rows)
+        yield from _block(" ".join(["Constraints", *map(_name, map(str, words))]), rows)
 
 
-def _header(constraint: Constraint) -> tuple[str, ...]:
-    """Return name and variables; Kratos misreads a header with more than the slave's where one is enough."""
+def _header(constraint: Constraint) -> tuple[int | str, ...]:
+    """Return the number of masters, the name and the variables of the header.
+
+    Kratos misreads a header with more than the slave's variable where one is enough.
+    """
     variables = [constraint.slave[1], *(variable for _, variable in constraint.masters)]
-    return (constraint.name, *(variables[:1] if len(set(variables)) == 1 else variables))
+    return (
+        len(constraint.masters),
+        constraint.name,
+        *(variables[:1] if len(set(variables)) == 1 else variables),
+    )
 
 
 def _data(data: Data, is_nodal: bool) -> Lines:

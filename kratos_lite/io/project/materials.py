@@ -8,16 +8,10 @@ import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.kratos.to_model import ELASTIC, material_from
+from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
 from kratos_lite.io.project.case import Case
 from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
-
-USED = ELASTIC | {
-    "DENSITY", "INTEGRATION_ORDER", "VOLUME_ACCELERATION", "GRAVITY", "BODY_FORCE", "INSITU_STRESS",
-    "PRESTRESS", "PRESTRESS_FACTOR",
-}  # fmt: skip
-"""Variables of a material that change a static linear solution."""
 
 
 def materials_of(
@@ -77,9 +71,6 @@ def _material(entry: Settings, properties: Properties, notes: list[str]) -> Line
         )
     variables = body.section("Variables")
     values: dict[str, Any] = {key.rsplit(".", 1)[-1]: _number(variables, key) for key in variables.values}
-    idle = sorted(values.keys() - USED)
-    if idle:
-        notes.append(f"material of {part}: {', '.join(idle)} not used by {name}")
     if body.section("Tables").values:
         notes.append(f"material of {part}: Tables are not used by {name}")
     for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):

@@ -228,9 +228,9 @@ def run(actions: Sequence[Action], case: Case, values: Variables) -> list[str]:
     steps = [action.active(times) for action in actions]
     notes = []
     for action, active in zip(actions, steps, strict=True):
+        where = action.settings.path.removesuffix(".Parameters")
         if not active or not len(action.rows):
             why = "its interval holds no step" if not active else "its part has none to act on"
-            where = action.settings.path.removesuffix(".Parameters")
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif case.moved and active[-1] > 1 and action.depends_on_place():
             # Before the first step nothing has moved yet.
