@@ -172,9 +172,8 @@ def _property_lines(document: Document, problems: Problems, notes: list[Note]) -
                 written.add(number)
                 yield f"PROPERTIES[{number}][{name}] = {text};"
             else:
-                notes.append(
-                    Note(0, f"left out: {name} {value!r} of properties {number}; .prop files hold numbers only")
-                )
+                text = f"left out: {name} of properties {number}; .prop files hold numbers, not {value!r}"
+                notes.append(Note(0, text))
     used = {0, *(int(number) for block in document.mesh.blocks for number in np.unique(block.properties))}
     for number in sorted(used - written - {0}) if written else ():
         problems.add(f"properties {number} have no number to write, but elements use them; give them a value")
