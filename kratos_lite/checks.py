@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite.batches import Batch
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import tabulate
-from kratos_lite.errors import MAX_PROBLEMS, MeshError
+from kratos_lite.errors import MAX_PROBLEMS, MeshError, SolveError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -200,14 +200,20 @@ def _is_near_half(C: Array) -> bool:
 def check_rounding(
     noise: float, loads: Array, initial: Array, reactions: Array, supports: Supports
 ) -> list[str]:
-    """Warn where rounding of the internal forces, `noise` in N per node, is not small beside the loads."""
+    """Warn where rounding of the internal forces, `noise` in N per node, is not small beside the loads.
+
+    Raises SolveError where it is as large as the loads, to two digits: the solution means nothing.
+    """
     size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
     if supports.values.any() or noise <= 1e-6 * size:
         return []
-    return [
+    text = (
         f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
         "look for nearly free parts, spurious modes or very unlike stiffnesses"
-    ]
+    )
+    if noise > 1e-2 * size:
+        raise SolveError(text)
+    return [text]
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:

@@ -136,7 +136,8 @@ class Traction(Load):
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N t dA as nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
-        for block in _faces(mesh, self.where, f"a {type(self).__name__.lower()}", self.cells):
+        what = "a traction" if self.cells == SURFACES else "a line load"
+        for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
             add_nodal(total, block.nodes, surface_load(block.shape, mesh.points[block.nodes], self.traction))
         return total

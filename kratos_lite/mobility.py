@@ -19,7 +19,7 @@ from kratos_lite.supports import Supports, rigid_modes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-MAX_HINGED = 60
+MAX_HINGED = 300
 """More bodies than this that hang together by edges or corners are taken as one."""
 
 

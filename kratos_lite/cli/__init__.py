@@ -161,7 +161,8 @@ def _run(words: Sequence[str]) -> int:
         # The texts are written for Python; here the same choice is an option.
         print(f"error: {str(error).replace('strict=False', '--lenient')}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    sys.stdout.flush()  # a full disk shows here rather than after the end of the program
+    if sys.stdout:
+        sys.stdout.flush()  # a full disk shows here rather than after the end of the program
     return code
 
 

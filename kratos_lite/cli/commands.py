@@ -85,7 +85,9 @@ def _solve(options: Namespace, clock: float) -> int:
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
         lines = scene.evaluate(result)
         if not options.quiet:
-            print(result, flush=True)
+            print(result)
+            if sys.stdout:
+                sys.stdout.flush()
     finally:
         _write(result, targets, options.quiet)
         for line in lines:

@@ -61,6 +61,7 @@ class Mesh:
         self.conditions = list(conditions)
         self.parts = dict(parts or {})
         self.source = source
+        self._boundary: tuple[list[NDArray[np.int32]], list[Block]] = ([], [])
         self._check()
 
     def _check(self) -> None:
@@ -97,7 +98,7 @@ class Mesh:
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
 
-    @cached_property
+    @property
     def element_ids(self) -> Ints:
         """(m,) element ids through all blocks in order."""
         return np.concatenate([NO_ROWS, *(block.ids for block in self.blocks)])
@@ -227,13 +228,18 @@ class Mesh:
 
     # ---- faces -----------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def boundary(self) -> list[Block]:
         """Faces that belong to one element only, outward, one block per face shape.
 
-        ``ids`` holds the row of the parent element.
+        ``ids`` holds the row of the parent element.  Made anew when the blocks have changed.
         """
-        return topology.boundary(self.blocks, self.n_nodes)
+        nodes = [block.nodes for block in self.blocks]
+        known, faces = self._boundary
+        if len(known) != len(nodes) or any(a is not b for a, b in zip(known, nodes, strict=True)):
+            faces = topology.boundary(self.blocks, self.n_nodes)
+            self._boundary = (nodes, faces)
+        return faces
 
     def reoriented(self) -> Mesh:
         """Return the mesh with the node order of elements that are inside out turned around."""

@@ -177,3 +177,31 @@ def test_model_without_load_says_so():
     model = kl.Model(kl.box(), STEEL)
     model.fix("z-")
     assert any("no load" in text for text in model.solve().report.warnings)
+
+
+@pytest.mark.parametrize("n", [2, 61, 62, 200, 310])
+def test_chain_of_cells_that_share_single_edges_is_a_mechanism(n):
+    corner = kl.KinematicLinear3D8N.nodes / 2 + 0.5
+    every = np.vstack([corner + np.array([i, i, 0]) for i in range(n)])
+    points, rows = np.unique(every, axis=0, return_inverse=True)
+    ids = np.arange(1, n + 1)
+    nodes = rows.reshape(n, 8).astype(np.int32)
+    mesh = kl.Mesh(
+        points, [kl.Block("KinematicLinear3D8N", nodes, ids, ids * 0, kl.KinematicLinear3D8N.shape)]
+    )
+    model = kl.Model(mesh, STEEL)
+    model.fix(nodes[0])
+    model.add(kl.Gravity((1.0, -2.0, 0.0)))
+    with pytest.raises((kl.ModelError, kl.SolveError), match=r"can still move|hardly resists|backward error"):
+        model.solve()
+
+
+def test_boundary_follows_the_blocks():
+    mesh = kl.box(cells=(3, 3, 3))
+    before = sum(len(block) for block in mesh.boundary)
+    block = mesh.blocks[0]
+    inner = np.linalg.norm(mesh.points[block.nodes].mean(axis=1) - [0.5, 0.5, 5 / 6], axis=1) < 1e-9
+    mesh.blocks[0] = block.take(~inner)
+    assert sum(len(block) for block in mesh.boundary) == before - 1 + 5
+    assert len(mesh.element_ids) == 26
+    assert sum(len(face) for face in mesh.faces("z+")) == 8
