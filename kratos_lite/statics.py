@@ -76,25 +76,11 @@ def solve_static(
         if solution.method == method:
             solution = replace(solution, reason=reason)
     with phase("verify"):
-        u = np.where(model.supports.fixed, model.supports.values, 0.0)
-        u[active] = reduced.expand(solution.x).reshape(-1, 3)
-        residual = np.zeros_like(u)
-        residual[active] = (K @ u[active].ravel() - f).reshape(-1, 3)
-        reactions = np.where(constrained(model), residual, 0.0)
+        u, reactions = recover(model, active, reduced.expand(solution.x), K, f)
         noise = float(np.finfo(float).eps * solvers.matrix_norm(K) * np.abs(u).max(initial=0.0))
-        force, moment = checks.equilibrium(model.mesh.points, loads, reactions, noise * len(f) ** 0.5)
-        if not np.isfinite(u).all() or solution.backward_error > 1e-8:
-            raise SolveError(
-                f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
-                "ask for a smaller tolerance, or look for very thin elements, very unlike stiffnesses or "
-                "nearly free parts"
-            )
+        balance = checks.equilibrium(model.mesh.points, loads, reactions, noise * len(f) ** 0.5)
+        judge(solution, u, balance)
         warnings += checks.check_rounding(noise, loads, loads - forces, reactions, model.supports)
-        if max(force, moment) > 1e-2:
-            raise SolveError(
-                f"loads and reactions miss equilibrium by {force:.1e} (forces) and {moment:.1e} (moments) of "
-                "their size; look for very unlike stiffnesses, and please report a model that has none"
-            )
     report = Report(
         unknowns=len(reduced.free),
         total_load=loads.sum(axis=0),
@@ -103,14 +89,41 @@ def solve_static(
         reason=solution.reason,
         iterations=solution.iterations,
         backward_error=solution.backward_error,
-        force_error=force,
-        moment_error=moment,
+        force_error=balance[0],
+        moment_error=balance[1],
         seconds=phase.seconds,
         peak_memory=peak_memory(),
         warnings=warnings,
         notes=list(model.notes),
     )
     return Result(model.mesh, batches, u, reactions, loads, report, model.initial_displacement)
+
+
+def recover(
+    model: Model, active: NDArray[np.int64], displacement: Array, K: Any, f: Array
+) -> tuple[Array, Array]:
+    """Return displacements and reactions (n, 3) of all nodes from those of the active ones."""
+    u = np.where(model.supports.fixed, model.supports.values, 0.0)
+    u[active] = displacement.reshape(-1, 3)
+    residual = np.zeros_like(u)
+    residual[active] = (K @ displacement - f).reshape(-1, 3)
+    return u, np.where(constrained(model), residual, 0.0)
+
+
+def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:
+    """Raise SolveError for a solution that does not solve its equations or is not in equilibrium."""
+    if not np.isfinite(u).all() or solution.backward_error > 1e-8:
+        raise SolveError(
+            f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
+            "ask for a smaller tolerance, or look for very thin elements, very unlike stiffnesses or "
+            "nearly free parts"
+        )
+    if max(balance) > 1e-2:
+        raise SolveError(
+            f"loads and reactions miss equilibrium by {balance[0]:.1e} (forces) and {balance[1]:.1e} "
+            "(moments) of their size; look for very unlike stiffnesses, spurious modes or nearly free "
+            "parts, and please report a model that has none"
+        )
 
 
 def external_loads(model: Model, batches: Sequence[Batch]) -> Array:

@@ -68,11 +68,6 @@ class Shape:
         raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
 
 
-def coordinates(xi: ArrayLike) -> Array:
-    """Split points (..., d) into d arrays: ``r, s, t = coordinates(xi)``."""
-    return np.moveaxis(np.asarray(xi, dtype=float), -1, 0)
-
-
 def mid_edges(corners: ArrayLike, edges: tuple[tuple[int, int], ...]) -> Array:
     """Return the corners (n, d) followed by the middles of `edges`."""
     X = np.asarray(corners, dtype=float)

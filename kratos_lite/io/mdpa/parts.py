@@ -16,7 +16,6 @@ from kratos_lite.mesh import Part
 Ints = NDArray[np.int64]
 PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 """Names that may be part of a file name without harm."""
-MEMBERS = ("nodes", "elements", "conditions", "geometries", "constraints")
 
 
 class PartReader:

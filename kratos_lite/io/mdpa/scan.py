@@ -100,10 +100,6 @@ class Source:
         """Return the words in a piece of the text."""
         return WORD.finditer(self.data, *span)
 
-    def is_blank(self, span: Span) -> bool:
-        """Return whether a piece of the text holds no word."""
-        return WORD.search(self.data, *span) is None
-
 
 def scan(source: Source) -> Frame:
     """Return the root of the tree of blocks.
