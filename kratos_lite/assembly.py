@@ -1,6 +1,6 @@
 """Assembly: element matrices into one sparse matrix of 3x3 node blocks.
 
-The sparsity pattern is made once per mesh from the node graph; element matrices are computed in
+The sparsity pattern is made from the node graph, once for each connectivity; element matrices are computed in
 cache-sized chunks and added at known positions.  Neither all element matrices nor a triplet
 list of the whole model ever exists.
 """
@@ -77,7 +77,7 @@ class PatternCache:
 
     def get(self, n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> Pattern:
         """Return the pattern of this connectivity, made anew only if it differs from the last."""
-        key = (n_nodes, *(hash(nodes.tobytes()) for nodes in connectivity))
+        key = (n_nodes, *(hash((nodes.shape, nodes.tobytes())) for nodes in connectivity))
         if self._pattern is None or key != self._key:
             self._key, self._pattern = key, Pattern(n_nodes, connectivity)
         return self._pattern
@@ -105,13 +105,9 @@ def assemble_stiffness(
         k = batch.nodes.shape[1]
         for window in batch.chunks(SCATTER_BYTES):
             matrices = np.zeros((window.stop - window.start, 3, k, 3, k))
-            for chunk in batch.chunks():
-                low, high = max(chunk.start, window.start), min(chunk.stop, window.stop)
-                if low < high:
-                    element = batch.at(points, slice(low, high))
-                    matrices[low - window.start : high - window.start] = element.stiffness_by_axis(
-                        batch.material.C
-                    )
+            for chunk in batch.chunks(within=window):
+                place = slice(chunk.start - window.start, chunk.stop - window.start)
+                matrices[place] = batch.at(points, chunk).stiffness_by_axis(batch.material.C)
             _add_blocks(data, positions[window], matrices)
             done += len(matrices)
             if progress:

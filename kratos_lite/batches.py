@@ -47,13 +47,14 @@ class Batch:
         """Return the elements of a chunk, placed at `points` (n, 3)."""
         return self.element(points[self.nodes[chunk]], self.rule)
 
-    def chunks(self, memory: int = CHUNK_BYTES) -> Iterator[slice]:
-        """Cut the batch into slices whose matrices take about `memory` bytes each."""
+    def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
+        """Cut the batch, or a slice of it, into slices whose matrices take about `memory` bytes each."""
+        first, last = (within.start, within.stop) if within else (0, len(self))
         k = self.nodes.shape[1]
         per_element = 8 * (9 * k * k + 2 * len(self.rule) * 3 * k)
         step = max(1, memory // per_element)
-        for start in range(0, len(self), step):
-            yield slice(start, min(start + step, len(self)))
+        for start in range(first, last, step):
+            yield slice(start, min(start + step, last))
 
     def initial_stress(self, chunk: slice) -> Array | float:
         """Return the prestress of a chunk as (m, 1, 6), or 0."""

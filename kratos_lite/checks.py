@@ -127,9 +127,20 @@ def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
     return 3 * len(element.nodes) - 6 - rank
 
 
-def check_rules(batches: Sequence[Batch]) -> list[str]:
-    """Warn of rules that leave spurious zero-energy modes."""
-    found = {(b.element, b.rule) for b in batches if b.rule is not b.element.rule}
+def check_rules(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
+    """Check rules that replace an element's own: det J > 0 at their points; warn of spurious modes."""
+    replaced = [batch for batch in batches if batch.rule is not batch.element.rule]
+    for batch in replaced:
+        _, dN = tabulate(batch.element.shape, batch.rule)
+        for chunk in batch.chunks():
+            bad = (batch.at(mesh.points, chunk).determinants(dN) <= 0).any(axis=1)
+            if bad.any():
+                element = mesh.element_ids[batch.rows[chunk][int(np.argmax(bad))]]
+                raise MeshError(
+                    f"element {element} ({batch.element.__name__}): det J must be > 0 at all points of "
+                    f"{batch.rule}; the element's own rule, or a better shape, avoids this"
+                )
+    found = {(batch.element, batch.rule) for batch in replaced}
     return [
         f"{element.__name__} with {len(rule)} Gauss points has {n} spurious zero-energy modes; "
         f"its own rule has {len(element.rule)} points and none"
@@ -230,17 +241,3 @@ def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.
     force = float(np.abs(total.sum(axis=0)).max() / size)
     moment = float(np.abs(np.cross(X, total).sum(axis=0)).max() / (size * arm)) if arm > 0 else 0.0
     return force, moment
-
-
-__all__ = [
-    "check_blocks",
-    "check_coincident",
-    "check_jacobians",
-    "check_points",
-    "check_repeated_nodes",
-    "check_rounding",
-    "check_rules",
-    "check_scales",
-    "equilibrium",
-    "spurious_modes",
-]

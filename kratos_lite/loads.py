@@ -13,7 +13,7 @@ from kratos_lite.arguments import finite
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where, WhereElements, outward_signs
+from kratos_lite.mesh import Block, Mesh, Where, WhereElements, outward_signs, with_rows
 from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
@@ -247,10 +247,7 @@ class ConditionLoads(Load):
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return the nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
-        start = 0
-        for block in mesh.conditions:
-            rows = slice(start, start + len(block))
-            start += len(block)
+        for block, rows in with_rows(mesh.conditions):
             _check_loadable(block, bool(self.force[rows].any()), bool(self.pressure[rows].any()))
             if block.shape is None or not len(block):
                 continue

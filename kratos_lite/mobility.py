@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.supports import Supports, rigid_modes
 
 Array = NDArray[np.float64]
@@ -66,14 +66,12 @@ def all_faces(mesh: Mesh) -> Faces:
     """Return the faces of all elements."""
     key = node_keys(mesh)
     element, corners, nodes = [np.zeros(0, np.int64)], [np.zeros(0, np.uint64)], [np.zeros(0, np.uint64)]
-    start = 0
-    for block in mesh.blocks:
+    for block, at in with_rows(mesh.blocks):
         for face in block.shape.faces if block.shape is not None else ():
             mine = key[block.nodes[:, list(face)]]
-            element.append(np.arange(start, start + len(block)))
+            element.append(np.arange(at.start, at.stop))
             corners.append(mine[:, : 3 if len(face) in (3, 6) else 4].sum(axis=1))
             nodes.append(mine.sum(axis=1))
-        start += len(block)
     return Faces(np.concatenate(element), np.concatenate(corners), np.concatenate(nodes))
 
 
@@ -107,15 +105,14 @@ def check_joints(mesh: Mesh) -> list[str]:
 
 def _halved_squares(mesh: Mesh, key: NDArray[np.uint64]) -> Ints:
     """Return the elements with a four-sided face of which three corners are a triangular face."""
-    squares, triangles, elements, start = [], [], [np.zeros(0, np.int64)], 0
-    for block in mesh.blocks:
+    squares, triangles, elements = [], [], [np.zeros(0, np.int64)]
+    for block, at in with_rows(mesh.blocks):
         for face in block.shape.faces if block.shape is not None else ():
             if len(face) in (3, 6):
                 triangles.append(key[block.nodes[:, list(face[:3])]].sum(axis=1))
             else:
                 squares.append(key[block.nodes[:, list(face[:4])]])
-                elements.append(np.arange(start, start + len(block)))
-        start += len(block)
+                elements.append(np.arange(at.start, at.stop))
     if not (squares and triangles):
         return elements[0]
     corner = np.concatenate(squares)

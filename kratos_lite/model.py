@@ -16,7 +16,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Load
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Mesh, Where, WhereElements
+from kratos_lite.mesh import Block, Mesh, Where, WhereElements, with_rows
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.result import Result
 from kratos_lite.statics import solve_static
@@ -167,12 +167,9 @@ class Model:
         Raises ModelError for elements without material and InputError for unknown kinds.
         """
         found: list[Batch] = []
-        start = 0
-        for block in self.mesh.blocks:
-            rows = np.arange(start, start + len(block))
-            start += len(block)
+        for block, at in with_rows(self.mesh.blocks):
             if len(block):
-                found += self._split(block, rows)
+                found += self._split(block, np.arange(at.start, at.stop))
         if not found:
             raise ModelError("the model has no elements; nothing can be solved")
         return found
@@ -241,7 +238,7 @@ class Model:
         warnings = self.check_geometry()
         batches = self.batches()
         used = mesh.used_nodes()
-        warnings += checks.check_rules(batches)
+        warnings += checks.check_rules(mesh, batches)
         warnings += mobility.check_joints(mesh)
         warnings += checks.check_coincident(mesh, used)
         warnings += checks.check_scales(mesh, batches)

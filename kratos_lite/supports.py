@@ -6,7 +6,7 @@ T^T K T q = T^T (f - K c) keep symmetry and hold the constraints exactly (no pen
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -239,6 +239,3 @@ def rigid_modes(points: Array, centre: ArrayLike | None = None) -> Array:
     R[:, 0, 4], R[:, 2, 4] = z, -x
     R[:, 0, 5], R[:, 1, 5] = -y, x
     return R.reshape(-1, 6)
-
-
-__all__: Sequence[str] = ["Link", "Reduction", "Supports", "axis_numbers", "reduction", "rigid_modes"]

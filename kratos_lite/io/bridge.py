@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Document, Note, Properties
 from kratos_lite.io.output import replacing
-from kratos_lite.mesh import NO_ROWS, Block, Ints, Mesh, Part
+from kratos_lite.mesh import NO_ROWS, Block, Ints, Mesh, Part, with_rows
 from kratos_lite.shapes import SHAPES, Shape
 
 CELLS = {
@@ -92,12 +92,11 @@ def write_meshio(
     path = Path(path)
     check_ending(path)
     types = {shape: name for name, shape in CELLS.items()}
-    cells, slices, start = [], [], 0
-    for block in mesh.blocks:
+    cells, slices = [], []
+    for block, at in with_rows(mesh.blocks):
         if block.shape is not None and block.shape.__name__ in types:
             cells.append((types[block.shape.__name__], block.nodes[:, list(block.shape.to_vtk)]))
-            slices.append(slice(start, start + len(block)))
-        start += len(block)
+            slices.append(at)
     data = _gmsh_tags(path, cell_data or {}) if path.suffix.lower() == ".msh" else cell_data or {}
     cell_values = {name: [values[rows] for rows in slices] for name, values in data.items()}
     with replacing(path) as temporary, _guarded(path, "written") as (meshio, _):

@@ -1,6 +1,6 @@
 """Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, select
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select, with_rows
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
 from kratos_lite.mesh.topology import outward_signs
 
@@ -14,5 +14,7 @@ __all__ = [
     "Where",
     "WhereElements",
     "outward_signs",
+    "rows_of_ids",
     "select",
+    "with_rows",
 ]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.shapes import Shape
 
@@ -69,12 +69,33 @@ class Part:
         return ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
 
 
-def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
-    """Return the cells with these rows (counted through all blocks), block by block."""
-    chosen, start = [], 0
+def with_rows(blocks: Iterable[Block]) -> Iterator[tuple[Block, slice]]:
+    """Yield each block with the rows of its cells, which count through all blocks in order."""
+    start = 0
     for block in blocks:
-        keep = rows[(rows >= start) & (rows < start + len(block))] - start
+        yield block, slice(start, start + len(block))
         start += len(block)
-        if len(keep):
-            chosen.append(block.take(keep))
-    return chosen
+
+
+def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
+    """Return the cells with these rows, block by block."""
+    mine = [
+        (block, rows[(rows >= at.start) & (rows < at.stop)] - at.start) for block, at in with_rows(blocks)
+    ]
+    return [block.take(keep) for block, keep in mine if len(keep)]
+
+
+def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints:
+    """Return where each wanted id stands in `ids`; -1 where it does not.
+
+    Who asks often gives the `order` that sorts the ids.
+
+    >>> rows_of_ids(np.array([7, 3, 9]), [9, 4, 7]).tolist()
+    [2, -1, 0]
+    """
+    wanted = np.asarray(wanted, dtype=np.int64)
+    if not len(ids):
+        return np.full(wanted.shape, -1, dtype=np.int64)
+    order = np.argsort(ids, kind="stable") if order is None else order
+    rows = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
+    return np.where(ids[rows] == wanted, rows, -1)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh import topology
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, select
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select
 
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
@@ -110,14 +110,9 @@ class Mesh:
     def node_rows(self, ids: ArrayLike) -> Ints:
         """Return the rows of `points` that carry these node ids; -1 where there is none."""
         ids = np.asarray(ids, dtype=np.int64)
-        if self.n_nodes == 0:
-            return np.full(ids.shape, -1, dtype=np.int64)
         if self._is_counting:
             return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
-        order = self._node_order
-        place = np.searchsorted(self.node_ids, ids, sorter=order)
-        rows = order[np.minimum(place, self.n_nodes - 1)]
-        return np.where(self.node_ids[rows] == ids, rows, -1)
+        return rows_of_ids(self.node_ids, ids, self._node_order)
 
     @cached_property
     def _is_counting(self) -> bool:

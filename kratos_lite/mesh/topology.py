@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.mesh.blocks import Block, Ints
+from kratos_lite.mesh.blocks import Block, Ints, with_rows
 from kratos_lite.shapes import FACE_SHAPES, Shape
 
 
@@ -17,10 +17,8 @@ def boundary(blocks: Sequence[Block], n_nodes: int) -> list[Block]:
     ``ids`` holds the row of the parent element.
     """
     by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
-    start = 0
-    for block in blocks:
-        parents = np.arange(start, start + len(block))
-        start += len(block)
+    for block, at in with_rows(blocks):
+        parents = np.arange(at.start, at.stop)
         for face in block.shape.faces if block.shape is not None else ():
             by_size.setdefault(len(face), []).append((block.nodes[:, list(face)], parents))
     faces = []

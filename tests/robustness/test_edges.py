@@ -205,3 +205,23 @@ def test_boundary_follows_the_blocks():
     assert sum(len(block) for block in mesh.boundary) == before - 1 + 5
     assert len(mesh.element_ids) == 26
     assert sum(len(face) for face in mesh.faces("z+")) == 8
+
+
+def test_points_of_a_replaced_rule_must_see_a_positive_jacobian():
+    from kratos_lite.quadrature import hexahedron
+
+    points = kl.KinematicLinear3D8N.nodes / 2 + 0.5
+    points[6] = [0.48, 0.48, 0.9]  # a fold at one corner, slight enough for the own rule to be solved with
+    base = kl.box()
+    order = np.array([0, 1, 2, 3, 4, 5, 6, 7], dtype=np.int32)[None, :]
+    mesh = kl.Mesh(
+        points, [kl.Block(base.blocks[0].name, order, np.array([9]), np.array([1]), base.blocks[0].shape)]
+    )
+    element = kl.KinematicLinear3D8N(points)
+    fine = hexahedron(degree=19)
+    own = np.array([element.detJ(xi) for xi, _ in element.rule])
+    assert own.min() > 0 > min(element.detJ(xi) for xi, _ in fine)
+    model = kl.Model(mesh, STEEL)
+    model.use_rule(fine)
+    with pytest.raises(kl.MeshError, match=r"element 9 .* at all points of Rule"):
+        model.check()

@@ -13,7 +13,7 @@ from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.loads import Gravity
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Mesh, Part
+from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model import Model
 from kratos_lite.shapes import Point1
 
@@ -35,10 +35,8 @@ def document_from(model: Model) -> Document:
     mesh = model.mesh
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
-    blocks, start = [], 0
-    for block in mesh.blocks:
-        rows = slice(start, start + len(block))
-        start += len(block)
+    blocks = []
+    for block, rows in with_rows(mesh.blocks):
         blocks.append(Block(block.name, block.nodes, block.ids, numbers[rows], block.shape))
     forces = np.zeros_like(mesh.points)
     for load in others:

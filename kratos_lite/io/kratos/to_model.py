@@ -12,7 +12,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, VECTORS, Variables, components
-from kratos_lite.mesh import Block
+from kratos_lite.mesh import Block, rows_of_ids
 from kratos_lite.model import Model
 
 
@@ -103,11 +103,9 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
             model.notes.append(str(Note(data.line, text, data.source)))
     if document.condition_data:
         ids = np.concatenate([np.zeros(0, dtype=np.int64), *(block.ids for block in mesh.conditions)])
-        order = np.argsort(ids, kind="stable")
         for data in document.condition_data:
-            place = np.searchsorted(ids, data.ids, sorter=order).clip(max=max(len(ids) - 1, 0))
-            rows = order[place] if len(ids) else np.zeros(0, dtype=np.int64)
-            known = ids[rows] == data.ids if len(ids) else np.zeros(len(data.ids), dtype=bool)
+            rows = rows_of_ids(ids, data.ids)
+            known = rows >= 0
             if data.values.size and _fits(data, model, problems, mesh.source):
                 values.set_conditions(data.variable, rows[known], data.values[known])
     for data in document.element_data:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.loads import SURFACES, ConditionLoads, Gravity
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.model import Model
 
 Array = NDArray[np.float64]
@@ -101,10 +101,7 @@ class Variables:
         force = np.zeros((mesh.n_conditions, 3))
         nodal_force = {cell: self._vector(self.nodal, name, mesh.n_nodes) for cell, name in LOADS.items()}
         carried: set[str] = set()
-        start = 0
-        for block in mesh.conditions:
-            rows = slice(start, start + len(block))
-            start += len(block)
+        for block, rows in with_rows(mesh.conditions):
             if block.shape is not None and len(block):
                 variable = LOADS[block.shape.cell]
                 carried.add(variable)

@@ -11,7 +11,7 @@ from kratos_lite.io.document import Note
 from kratos_lite.io.mdpa.rows import Layout, read_rows
 from kratos_lite.io.mdpa.scan import LISTS, Frame, Source
 from kratos_lite.io.mdpa.values import read_values
-from kratos_lite.mesh import Part
+from kratos_lite.mesh import Part, rows_of_ids
 
 Ints = NDArray[np.int64]
 PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
@@ -73,10 +73,8 @@ class PartReader:
         is_number = kind in ("properties", "tables")
         read = read_rows(self.source, child.spans[0], Layout("id", "p" if kind == "properties" else "i"))
         ids = read.ints[:, 0]
-        order, known = self.order[kind], self.ids[kind]
-        place = np.searchsorted(known, ids, sorter=order).clip(max=max(len(known) - 1, 0))
-        rows = order[place] if len(known) else np.zeros(len(ids), dtype=np.int64)
-        exists = known[rows] == ids if len(known) else np.zeros(len(ids), dtype=bool)
+        rows = rows_of_ids(self.ids[kind], ids, self.order[kind])
+        exists = rows >= 0
         for i in np.flatnonzero(~exists)[:1000]:
             word = "Properties" if kind == "properties" else _singular(kind)
             text = f"SubModelPart {full} lists {word} {ids[i]}, which the file does not have"

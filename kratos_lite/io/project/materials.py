@@ -12,6 +12,7 @@ from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
 from kratos_lite.io.project.case import Case
 from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.mesh import with_rows
 
 
 def materials_of(
@@ -51,10 +52,8 @@ def _assign(entry: Settings, case: Case, document: Document, number: int) -> Non
         )
     mask = np.zeros(case.mesh.n_elements, dtype=bool)
     mask[rows] = True
-    start = 0
-    for block in case.mesh.blocks:
-        block.properties = np.where(mask[start : start + len(block)], number, block.properties)
-        start += len(block)
+    for block, at in with_rows(case.mesh.blocks):
+        block.properties = np.where(mask[at], number, block.properties)
     document.properties.setdefault(number, Properties(number))
 
 
