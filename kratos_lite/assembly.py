@@ -8,15 +8,12 @@ list of the whole model ever exists.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.batches import Batch, add_nodal
-
-if TYPE_CHECKING:
-    from scipy.sparse import bsr_array
+from kratos_lite.blockmatrix import BlockMatrix
 
 Array = NDArray[np.float64]
 SCATTER_BYTES = 64_000_000
@@ -48,7 +45,7 @@ class Pattern:
         graph = (incidence @ incidence.T).tocsr()
         graph.sort_indices()
         self.n_nodes = n_nodes
-        self.indptr, self.indices = graph.indptr, graph.indices
+        self.indptr, self.indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
         rows = np.repeat(np.arange(n_nodes, dtype=np.int64), np.diff(self.indptr))
         keys = rows * n_nodes + self.indices
         self.positions = [self._find(keys, nodes) for nodes in connectivity]
@@ -95,10 +92,8 @@ def _add_blocks(data: Array, positions: NDArray[np.int32], matrices: Array) -> N
 
 def assemble_stiffness(
     points: Array, batches: Sequence[Batch], pattern: Pattern, progress: Progress | None = None
-) -> bsr_array:
+) -> BlockMatrix:
     """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
-    from scipy.sparse import bsr_array
-
     data = np.zeros((len(pattern.indices), 3, 3))
     done, total = 0, sum(len(batch) for batch in batches)
     for batch, positions in zip(batches, pattern.positions, strict=True):
@@ -112,8 +107,7 @@ def assemble_stiffness(
             done += len(matrices)
             if progress:
                 progress("assemble", done / total)
-    n = 3 * pattern.n_nodes
-    return bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+    return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
 def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:

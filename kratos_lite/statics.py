@@ -17,7 +17,8 @@ from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.loads import check_loads
 from kratos_lite.result import Report, Result, peak_memory
-from kratos_lite.supports import Reduction, reduction, rigid_modes
+from kratos_lite.solvers.common import DENSE_MAX
+from kratos_lite.supports import reduction
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -62,8 +63,8 @@ def solve_static(
     reduced = reduction(model.supports, active)
     f = forces[active].ravel()
     method, reason = solvers.choose(solver, len(reduced.free), len(f))
-    if method == "dense" and len(f) > solvers.DENSE_MAX:
-        raise InputError(f"solver='dense' is for up to {solvers.DENSE_MAX} degrees of freedom; got {len(f)}")
+    if method == "dense" and len(f) > DENSE_MAX:
+        raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {len(f)}")
     with phase("assemble"):
         K: Any
         if method == "dense":
@@ -72,11 +73,10 @@ def solve_static(
             pattern = model.patterns.get(len(points), [batch.nodes for batch in local])
             K = assemble_stiffness(points, local, pattern, progress)
     with phase("solve"):
-        solution = solve_reduced(K, f, reduced, method, tolerance, points, progress)
-        if solution.method == method:
-            solution = replace(solution, reason=reason)
+        equations = solvers.Equations(K, reduced, points, method, reason)
+        solution = equations.solve(f, tolerance, progress)
     with phase("verify"):
-        u, reactions = recover(model, active, reduced.expand(solution.x), K, f)
+        u, reactions = recover(model, active, solution.x, K, f)
         noise = float(np.finfo(float).eps * solvers.matrix_norm(K) * np.abs(u).max(initial=0.0))
         balance = checks.equilibrium(model.mesh.points, loads, reactions, noise * len(f) ** 0.5)
         judge(solution, u, balance)
@@ -163,91 +163,3 @@ def constrained(model: Model) -> NDArray[np.bool_]:
     for link in model.supports.links:
         mask.flat[[link.slave, *link.masters]] = True
     return mask
-
-
-def solve_reduced(
-    K: Any,
-    f: Array,
-    reduced: Reduction,
-    method: str,
-    tolerance: float,
-    points: Array,
-    progress: Progress | None = None,
-) -> solvers.Solution:
-    """Solve T^T K T q = T^T (f - K c); fall back from multigrid to a factorisation if need be."""
-    b = reduced.reduce(f - K @ reduced.c)
-    if not len(b):
-        return solvers.Solution(b, method, "", 0, 0.0)
-    if method == "dense":
-        A = K[np.ix_(reduced.free, reduced.free)] if reduced.T is None else reduced.T.T @ K @ reduced.T
-        A = np.asarray(A)
-        q = solvers.solve_dense(A, b)
-        return solvers.Solution(q, method, "", 0, solvers.backward_error(A, q, b))
-    why = ""
-    if method == "amg":
-        solution = iterate(K, b, reduced, tolerance, points, progress)
-        if not solution.reason:
-            return solution
-        why = solution.reason
-        if len(b) > solvers.FALLBACK_LIMIT:
-            raise SolveError(
-                f"{why}; {len(b)} unknowns are too many to factorise instead; look for thin elements or "
-                "ν near 0.5, use quadratic elements, or ask for solver='direct'"
-            )
-    A = reduced_matrix(K, reduced)
-    q = solvers.solve_direct(A, b)
-    return solvers.Solution(q, "direct", why, 0, solvers.backward_error(A, q, b))
-
-
-def iterate(
-    K: Any, b: Array, reduced: Reduction, tolerance: float, points: Array, progress: Progress | None
-) -> solvers.Solution:
-    """Solve by multigrid; a solution with a reason is one that did not converge, and why.
-
-    Without links the fixed degrees of freedom stay in the matrix, uncoupled, so that it keeps its
-    3x3 blocks.
-    """
-    modes = rigid_modes(points)
-    if reduced.T is None:
-        free = np.zeros(len(reduced.c), dtype=bool)
-        free[reduced.free] = True
-        A, modes = uncoupled(K, free), modes * free[:, None]
-        rhs = np.zeros(len(free))
-        rhs[reduced.free] = b
-    else:
-        A, modes, rhs = reduced_matrix(K, reduced), modes[reduced.free], b
-    norm = solvers.matrix_norm(A)
-    x, iterations, converged = solvers.conjugate_gradients(
-        A, rhs, solvers.multigrid(A, modes), tolerance, norm, progress=progress
-    )
-    error = solvers.backward_error(A, x, rhs, norm)
-    q = x[reduced.free] if reduced.T is None else x
-    reason = "" if converged else f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
-    return solvers.Solution(q, "amg", reason, iterations, error)
-
-
-def uncoupled(K: Any, free: NDArray[np.bool_]) -> Any:
-    """Return a copy of K in 3x3 blocks with the rows and columns of fixed degrees of freedom cleared.
-
-    Their diagonal entries stay, so that the matrix keeps its scale.
-    """
-    from scipy.sparse import bsr_array
-
-    mask = free.reshape(-1, 3)
-    rows = np.repeat(np.arange(len(mask)), np.diff(K.indptr))
-    data = K.data * mask[rows][:, :, None] * mask[K.indices][:, None, :]
-    diagonal = np.flatnonzero(rows == K.indices)
-    for axis in range(3):
-        fixed = diagonal[~mask[rows[diagonal], axis]]
-        data[fixed, axis, axis] = K.data[fixed, axis, axis]
-    return bsr_array((data, K.indices, K.indptr), shape=K.shape)
-
-
-def reduced_matrix(K: Any, reduced: Reduction) -> Any:
-    """Return T^T K T as CSR."""
-    A = K.tocsr()
-    if reduced.T is not None:
-        return (reduced.T.T @ A @ reduced.T).tocsr()
-    if len(reduced.free) == A.shape[0]:
-        return A
-    return A[reduced.free][:, reduced.free]

@@ -11,8 +11,8 @@ import kratos_lite
 
 PACKAGE = Path(kratos_lite.__file__).parent
 FLOORS = [
-    {"errors"},
-    {"registry", "voigt", "arguments"},
+    {"errors", "native"},
+    {"blockmatrix", "registry", "voigt", "arguments"},
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},
     {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},

@@ -40,24 +40,24 @@ def test_a_slender_beam_converges_with_multigrid():
 
 
 def test_multigrid_that_stalls_falls_back_to_a_factorisation_and_says_so(monkeypatch):
-    from kratos_lite import solvers
+    from kratos_lite.solvers import equations, iteration
 
     def stalls(A, b, *args, **kwargs):
         return np.zeros_like(b), 500, False
 
-    monkeypatch.setattr(solvers, "conjugate_gradients", stalls)
+    monkeypatch.setattr(iteration, "conjugate_gradients", stalls)
     model = clamped(kl.box((4, 1, 1), (4, 1, 1)))
     result = model.solve("amg")
     assert result.report.solver == "direct"
     assert result.report.reason == "multigrid stopped after 500 iterations short of 1e-10"
     np.testing.assert_allclose(result.u, model.solve("dense").u, atol=1e-12 * np.abs(result.u).max())
-    monkeypatch.setattr(solvers, "FALLBACK_LIMIT", 10)
+    monkeypatch.setattr(equations, "FALLBACK_LIMIT", 10)
     with pytest.raises(kl.SolveError, match="too many to factorise instead"):
         model.solve("amg")
 
 
 def test_conjugate_gradients_give_up_on_an_indefinite_matrix():
-    from kratos_lite.solvers import conjugate_gradients
+    from kratos_lite.solvers.iteration import conjugate_gradients
 
     A = np.diag([1.0, -1.0, 2.0])
     _, iterations, ok = conjugate_gradients(A, np.ones(3), lambda r: r, 1e-10, norm_A=2.0)

@@ -1,0 +1,77 @@
+// The instruction set of this machine, chosen at run time.
+//
+// A kernel is a template over its vector width, forced inline into one function for each
+// instruction set:
+//
+//     template <int V> KL_INLINE void body(Args& args) { ... kl::vec<double, V> ... }
+//     KL_DISPATCH(kernel, body, double, Args&)
+//     kernel(args);  // runs body<8> with AVX-512, body<4> with AVX2 and FMA, else body<2>
+//
+// The width follows the instruction set: eight doubles at once would spill on AVX2.
+
+#pragma once
+#include <cstdlib>
+#include <cstring>
+
+#define KL_INLINE inline __attribute__((always_inline))
+
+namespace kl {
+
+enum class Isa { base, avx2, avx512 };
+
+inline Isa best_isa() {
+#if defined(__x86_64__)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
+        return Isa::avx512;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Isa::avx2;
+#endif
+    return Isa::base;
+}
+
+// KRATOS_LITE_ISA lowers the choice, never above what the machine has.
+inline Isa isa() {
+    static const Isa chosen = [] {
+        const Isa best = best_isa();
+        const char* wanted = std::getenv("KRATOS_LITE_ISA");
+        if (!wanted) return best;
+        if (!std::strcmp(wanted, "base")) return Isa::base;
+        if (!std::strcmp(wanted, "avx2") && best != Isa::base) return Isa::avx2;
+        return best;
+    }();
+    return chosen;
+}
+
+inline const char* isa_name() {
+    return isa() == Isa::avx512 ? "AVX-512" : isa() == Isa::avx2 ? "AVX2" : "baseline";
+}
+
+// GCC's vector extension: element-wise + - * / on V numbers.
+template <class T, int V>
+struct vec_of {
+    typedef T type __attribute__((vector_size(V * sizeof(T)), aligned(sizeof(T)), may_alias));
+};
+template <class T, int V>
+using vec = typename vec_of<T, V>::type;
+
+#if defined(__x86_64__)
+#define KL_DISPATCH(name, body, T, ...)                                                            \
+    __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"))) inline void             \
+    name##_avx512(__VA_ARGS__ args) { body<64 / sizeof(T)>(args); }                                \
+    __attribute__((target("avx2,fma"))) inline void name##_avx2(__VA_ARGS__ args) {                \
+        body<32 / sizeof(T)>(args);                                                                \
+    }                                                                                              \
+    inline void name##_base(__VA_ARGS__ args) { body<16 / sizeof(T)>(args); }                      \
+    inline void name(__VA_ARGS__ args) {                                                           \
+        const kl::Isa isa = kl::isa();                                                             \
+        isa == kl::Isa::avx512 ? name##_avx512(args)                                               \
+        : isa == kl::Isa::avx2 ? name##_avx2(args)                                                 \
+                               : name##_base(args);                                                \
+    }
+#else
+#define KL_DISPATCH(name, body, T, ...)                                                            \
+    inline void name(__VA_ARGS__ args) { body<16 / sizeof(T)>(args); }
+#endif
+
+}  // namespace kl

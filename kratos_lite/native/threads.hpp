@@ -1,0 +1,126 @@
+// A small pool of threads that wait passively.
+//
+// parallel(n, f) calls f(0) … f(n-1), each once, on any thread.  Callers cut their work into tasks
+// that do not depend on the number of threads, so that results do not either.
+
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+#ifndef _WIN32
+#include <unistd.h>
+#endif
+
+namespace kl {
+
+class Pool {
+public:
+    explicit Pool(int threads) {
+        for (int i = 1; i < threads; ++i) workers.emplace_back([this] { wait_for_work(); });
+    }
+
+    // The pool is left to the operating system at exit: joining there can hang after a fork.
+    // It returns when every task is done, whether or not all threads woke up in time to help.
+    void run(int64_t tasks, const std::function<void(int64_t)>& task) {
+        {
+            std::lock_guard<std::mutex> lock(mutex);
+            job = &task;
+            total = tasks;
+            next = 0;
+            ++generation;
+        }
+        start.notify_all();
+        work(task, tasks);
+        std::unique_lock<std::mutex> lock(mutex);
+        job = nullptr;
+        done.wait(lock, [this] { return helping == 0; });
+        if (error) std::rethrow_exception(std::exchange(error, nullptr));
+    }
+
+    int size() const { return static_cast<int>(workers.size()) + 1; }
+
+private:
+    void work(const std::function<void(int64_t)>& task, int64_t tasks) {
+        for (int64_t i; (i = next++) < tasks;) {
+            try {
+                task(i);
+            } catch (...) {
+                std::lock_guard<std::mutex> lock(mutex);
+                error = std::current_exception();
+                next = tasks;
+            }
+        }
+    }
+
+    void wait_for_work() {
+        std::unique_lock<std::mutex> lock(mutex);
+        for (uint64_t seen = 0;;) {
+            start.wait(lock, [&] { return generation != seen; });
+            seen = generation;
+            if (!job) continue;
+            const auto& task = *job;
+            const int64_t tasks = total;
+            ++helping;
+            lock.unlock();
+            work(task, tasks);
+            lock.lock();
+            if (--helping == 0) done.notify_one();
+        }
+    }
+
+    std::vector<std::thread> workers;
+    std::mutex mutex;
+    std::condition_variable start, done;
+    const std::function<void(int64_t)>* job = nullptr;
+    std::atomic<int64_t> next{0};
+    int64_t total = 0;
+    int helping = 0;
+    uint64_t generation = 0;
+    std::exception_ptr error;
+};
+
+inline int& wanted_threads() {
+    static int count = 1;
+    return count;
+}
+
+// One call of parallel at a time uses the pool; another one, from a second Python thread or from
+// within a task, runs its tasks itself.
+template <class F>
+void parallel(int64_t tasks, const F& f) {
+    static std::mutex busy;
+    static Pool* pool = nullptr;
+    static long owner = 0;
+#ifndef _WIN32
+    const long process = getpid();
+#else
+    const long process = 0;
+#endif
+    std::unique_lock<std::mutex> lock(busy, std::try_to_lock);
+    if (tasks <= 1 || wanted_threads() <= 1 || !lock) {
+        for (int64_t i = 0; i < tasks; ++i) f(i);
+        return;
+    }
+    if (!pool || owner != process || pool->size() != wanted_threads()) {
+        pool = new Pool(wanted_threads());  // a forked process has none of its parent's threads
+        owner = process;
+    }
+    pool->run(tasks, f);
+}
+
+// parallel over ranges [first, last) of at most `grain` of n items.
+template <class F>
+void parallel_ranges(int64_t n, int64_t grain, const F& f) {
+    parallel((n + grain - 1) / grain, [&](int64_t task) {
+        const int64_t first = task * grain;
+        f(first, first + grain < n ? first + grain : n);
+    });
+}
+
+}  // namespace kl

@@ -1,0 +1,68 @@
+"""What all solvers share: the solution, its backward error, and the choice of a method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.errors import InputError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+DENSE_LIMIT = 600
+"""Up to this many unknowns a full matrix needs no sparse library at all."""
+DENSE_MAX = 10_000
+"""Above this many degrees of freedom a full matrix is refused (it would take 0.8 GB several times)."""
+DIRECT_LIMIT = 10_000
+"""Up to this many unknowns factorising is the fastest sparse way."""
+METHODS = ("auto", "dense", "direct", "amg")
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The solution of A x = b and how it was found."""
+
+    x: Array
+    method: str
+    reason: str
+    iterations: int
+    backward_error: float
+
+
+def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) -> tuple[str, str]:
+    """Return the method to use for `unknowns` free ones of `dofs`, and the reason in words.
+
+    >>> choose("auto", 24)
+    ('dense', '24 unknowns ≤ 600: a full matrix is fastest')
+    """
+    if method not in METHODS:
+        raise InputError(f"solver must be one of {', '.join(METHODS)}; got {method!r}")
+    if method != "auto":
+        return method, "asked for"
+    if unknowns <= DENSE_LIMIT and dofs <= 4 * DENSE_LIMIT:
+        return "dense", f"{unknowns} unknowns ≤ {DENSE_LIMIT}: a full matrix is fastest"
+    if unknowns <= DIRECT_LIMIT:
+        return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorisation is fastest"
+    if not symmetric:
+        return "direct", "the matrix is not symmetric: conjugate gradients do not apply"
+    return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"
+
+
+def matrix_norm(A: Any) -> float:
+    """Return the largest row sum of |A|."""
+    if isinstance(A, BlockMatrix):
+        return A.norm()
+    return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
+
+
+def backward_error(A: Any, x: Array, b: Array, norm_A: float | None = None) -> float:
+    """Return |b - A x| / (|A| |x| + |b|) in the maximum norm; |A| may be given."""
+    norm_A = matrix_norm(A) if norm_A is None else norm_A
+    scale = norm_A * np.abs(x).max() + np.abs(b).max()
+    return float(np.abs(b - A @ x).max() / scale) if scale > 0 else 0.0

@@ -1,0 +1,58 @@
+"""Conjugate gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+
+def conjugate_gradients(
+    A: Any,
+    b: Array,
+    precondition: Callable[[Array], Array],
+    tolerance: float,
+    norm_A: float,
+    max_iterations: int = 500,
+    progress: Progress | None = None,
+) -> tuple[Array, int, bool]:
+    """Solve A x = b with symmetric positive definite A; return x, iterations and success.
+
+    It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
+    2 eps (|A| |x| + |b|); and gives up when 60 iterations bring no new smallest residual.
+    Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
+    """
+    x, r = np.zeros_like(b), b.copy()
+    norm_b = float(np.linalg.norm(b))
+    if norm_b == 0:
+        return x, 0, True
+    best, best_at, start = norm_b, 0, norm_b
+    z = precondition(r)
+    p, rz = z.copy(), float(r @ z)
+    for iteration in range(1, max_iterations + 1):
+        Ap = A @ p
+        curvature = float(p @ Ap)
+        if not (curvature > 0 and rz > 0):
+            return x, iteration, False
+        alpha = rz / curvature
+        x += alpha * p
+        r -= alpha * Ap
+        norm = float(np.linalg.norm(r))
+        if progress:
+            progress("solve", min(1.0, np.log(max(norm, 1e-300) / start) / np.log(tolerance)))
+        limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
+        if norm <= limit:
+            return x, iteration, True
+        if norm < best:
+            best, best_at = norm, iteration
+        elif iteration - best_at > 60:
+            return x, iteration, False
+        z = precondition(r)
+        rz, old = float(r @ z), rz
+        p = z + (rz / old) * p
+    return x, max_iterations, False
