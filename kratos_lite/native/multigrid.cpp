@@ -1,0 +1,130 @@
+// Algebraic multigrid for matrices of 3x3 blocks, as a preconditioner and as a solver.
+
+#include "arrays.hpp"
+#include "hierarchy.hpp"
+
+namespace {
+
+using kl::Array;
+namespace py = pybind11;
+
+struct Matrix {
+    Array<int32_t> indptr, indices;
+    Array<double> data;
+    kl::Graph graph() const { return {indptr.size() - 1, indptr.data(), indices.data()}; }
+    kl::Blocks<double> blocks() const { return {indptr.size() - 1, indptr.data(), indices.data(), data.data()}; }
+};
+
+std::vector<uint8_t> bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
+
+// Modes (3n, 6) with zeros at fixed components.
+std::vector<double> free_modes(const Array<double>& modes, const std::vector<uint8_t>& fixed) {
+    kl::require(modes.size() == 6 * static_cast<int64_t>(fixed.size()), "modes must be (3n, 6)");
+    std::vector<double> B(modes.data(), modes.data() + modes.size());
+    for (size_t i = 0; i < B.size(); ++i)
+        if (fixed[i / 6]) B[i] = 0;
+    return B;
+}
+
+class Multigrid {
+public:
+    Multigrid(Matrix matrix, Array<uint8_t> fixed, kl::Settings settings)
+        : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
+        kl::require(A.data.size() == 9 * A.indices.size(), "data must be (nnz, 3, 3)");
+        kl::require(fixed.size() == 3 * (A.indptr.size() - 1), "fixed must have one entry for each unknown");
+        py::gil_scoped_release release;
+        hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed);
+    }
+
+    // Smoothed aggregation below the finest level.
+    void aggregate(Array<double> modes) {
+        std::vector<double> B = free_modes(modes, fixed);
+        py::gil_scoped_release release;
+        hierarchy.coarsen(A.data.data(), fixed, std::move(B));
+    }
+
+    // A linear level below the finest one, and smoothed aggregation below that.
+    void aggregate_linear(Matrix linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
+                          Array<int32_t> indices, Array<double> weights, Array<double> modes) {
+        below = std::move(linear);
+        kl::require(linear_fixed.size() == 3 * (below.indptr.size() - 1), "one entry for each linear unknown");
+        kl::require(indptr.size() == A.indptr.size(), "weights must have one row for each node");
+        std::vector<uint8_t> apart = bytes_of(linear_fixed);
+        std::vector<double> B = free_modes(modes, apart);
+        kl::Transfer transfer;
+        transfer.indptr.assign(indptr.data(), indptr.data() + indptr.size());
+        transfer.indices.assign(indices.data(), indices.data() + indices.size());
+        transfer.data.assign(weights.data(), weights.data() + weights.size());
+        py::gil_scoped_release release;
+        hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed);
+        hierarchy.coarsen(below.data.data(), apart, std::move(B));
+        below.data = Array<double>();
+    }
+
+    Array<double> cycle(Array<double> r) {
+        kl::require(r.size() == static_cast<int64_t>(fixed.size()), "r must have one number for each unknown");
+        Array<double> z(r.size());
+        const double* from = r.data();
+        double* to = z.mutable_data();
+        py::gil_scoped_release release;
+        hierarchy.cycle(from, to);
+        return z;
+    }
+
+    py::tuple solve(Array<double> b, double tolerance, double norm, int most, py::object progress) {
+        kl::require(b.size() == static_cast<int64_t>(fixed.size()), "b must have one number for each unknown");
+        Array<double> x(b.size());
+        const double* from = b.data();
+        double* to = x.mutable_data();
+        const bool tell = !progress.is_none();
+        const auto each = [&](double residual) {
+            if (!tell) return true;
+            py::gil_scoped_acquire acquire;
+            progress(residual);
+            return true;
+        };
+        kl::Outcome outcome;
+        {
+            py::gil_scoped_release release;
+            outcome = kl::conjugate_gradients(A.blocks(), fixed, hierarchy, from, to, tolerance, norm, most, each);
+        }
+        return py::make_tuple(x, outcome.iterations, outcome.converged);
+    }
+
+    py::list sizes() const {
+        py::list out;
+        for (const kl::Level& level : hierarchy.levels) out.append(level.size());
+        return out;
+    }
+
+    Matrix A, below;
+    std::vector<uint8_t> fixed;
+    kl::Hierarchy hierarchy;
+};
+
+}  // namespace
+
+PYBIND11_MODULE(_multigrid, m) {
+    kl::common(m);
+    py::class_<Matrix>(m, "Matrix")
+        .def(py::init([](Array<int32_t> indptr, Array<int32_t> indices, Array<double> data) {
+                 return Matrix{indptr, indices, data};
+             }),
+             py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("data").noconvert());
+    py::class_<Multigrid>(m, "Multigrid")
+        .def(py::init([](Matrix A, Array<uint8_t> fixed, int degree, int quadratic, float ratio, double theta) {
+            kl::Settings settings;
+            settings.degree = degree;
+            settings.quadratic = quadratic;
+            settings.ratio = ratio;
+            settings.theta = theta;
+            return std::make_unique<Multigrid>(std::move(A), fixed, settings);
+        }))
+        .def("aggregate", &Multigrid::aggregate)
+        .def("aggregate_linear", &Multigrid::aggregate_linear)
+        .def("cycle", &Multigrid::cycle)
+        .def("solve", &Multigrid::solve)
+        .def("sizes", &Multigrid::sizes)
+        .def("bytes", [](const Multigrid& m) { return m.hierarchy.bytes(); })
+        .def("complexity", [](const Multigrid& m) { return m.hierarchy.complexity(); });
+}
