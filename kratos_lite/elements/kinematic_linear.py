@@ -241,7 +241,7 @@ class KinematicLinear:
         C = np.asarray(C, dtype=float)
         dV, D = self._gauss
         g, n = D.shape[-3], D.shape[-1]
-        if C.ndim == 2 and (lame := _isotropic(C)):
+        if C.ndim == 2 and (lame := lame_constants(C)):
             A = D.reshape(*D.shape[:-3], g, 3 * n)
             P = (np.swapaxes(A, -1, -2) * dV[..., None, :]) @ A
             P = P.reshape(*P.shape[:-2], 3, n, 3, n)
@@ -290,7 +290,7 @@ class KinematicLinear:
         return np.asarray(np.where((sums > 0).all(axis=-1)[..., None], sums, scaled))
 
 
-def _isotropic(C: Array) -> tuple[float, float] | None:
+def lame_constants(C: Array) -> tuple[float, float] | None:
     """Return (λ, μ) if C is an isotropic elasticity matrix to the last bits, else None."""
     lam, mu = float(C[0, 1]), float(C[3, 3])
     ideal = np.diag([2 * mu] * 3 + [mu] * 3)
