@@ -30,10 +30,9 @@ SCATTER_BYTES = 64_000_000
 """Memory of the element matrices that are added to the global matrix at once."""
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the share that is done, 0 … 1."""
+CONSTANT_JACOBIANS = "constant Jacobians"
 Kernel = Callable[[KinematicLinear], Array]
 """Gives matrices (m, k, k) of elements."""
-OWN_STIFFNESS = ("stiffness_by_axis", "stiffness", "B", "dNdX", "J", "_jacobian", "_gauss")
-"""What an element class may redefine so that its stiffness is not that of its tables."""
 
 
 class Pattern:
@@ -149,20 +148,15 @@ def assemble_stiffness(
     module = kernels("stiffness")
     done, total = 0, sum(len(batch) for batch in batches)
     for group, batch in enumerate(batches):
-        if module and _is_standard(batch.element):
+        if module and batch.element.stiffness_from_tables():
             parts = _compiled(module, points, batch, pattern, group, data, skipped)
         else:
-            parts = _computed(points, batch, pattern, group, data)
+            parts = _computed(points, batch, pattern, group, data, skipped)
         for count in parts:
             done += count
             if progress:
                 progress("assemble", done / total)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
-
-
-def _is_standard(element: type[KinematicLinear]) -> bool:
-    """Return whether the tables of shape and rule alone give the stiffness of an element class."""
-    return all(getattr(element, name) is getattr(KinematicLinear, name) for name in OWN_STIFFNESS)
 
 
 def _compiled(
@@ -182,18 +176,23 @@ def _compiled(
         points, pattern.connectivity[group], dN, weights, C, pattern.indptr, pattern.indices, data
     )
     if affine and skipped is not None:
-        skipped.add("constant Jacobians")
+        skipped.add(CONSTANT_JACOBIANS)
     yield len(batch)
 
 
-def _computed(points: Array, batch: Batch, pattern: Pattern, group: int, data: Array) -> Iterator[int]:
+def _computed(
+    points: Array, batch: Batch, pattern: Pattern, group: int, data: Array, skipped: set[str] | None
+) -> Iterator[int]:
     """Add the stiffness of a batch computed in NumPy; yield the number of elements of each part."""
     k = batch.nodes.shape[1]
     for window in batch.chunks(SCATTER_BYTES):
         matrices = np.zeros((window.stop - window.start, 3, k, 3, k))
         for chunk in batch.chunks(within=window):
             place = slice(chunk.start - window.start, chunk.stop - window.start)
-            matrices[place] = batch.at(points, chunk).stiffness_by_axis(batch.material.C)
+            elements = batch.at(points, chunk)
+            matrices[place] = elements.stiffness_by_axis(batch.material.C)
+            if skipped is not None and elements.stiffness_from_tables() and elements.constant_jacobian:
+                skipped.add(CONSTANT_JACOBIANS)
         pattern.add(data, group, window, matrices)
         yield len(matrices)
 
