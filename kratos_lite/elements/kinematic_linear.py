@@ -290,7 +290,7 @@ class KinematicLinear:
         n = len(self.nodes)
         return np.swapaxes(K.reshape(*J.shape[:-2], 3, 3, n, n), -3, -2)
 
-    @property
+    @cached_property
     def constant_jacobian(self) -> bool:
         """Whether J is the same at all Gauss points of each element, but for the rounding of its sums."""
         J = self._jacobian(tabulate(self.shape, self.rule)[1])

@@ -99,7 +99,7 @@ void add_matrices(Array<int32_t> nodes, Array<double> matrices, Array<int32_t> i
     const kl::Graph graph{indptr.size() - 1, indptr.data(), indices.data()};
     const int64_t each = data.ndim() == 3 ? 9 : 1;
     require(data.size() == each * indices.size(), "data must be (nnz, 3, 3) or (nnz,)");
-    require(matrices.size() == each * mesh.count * mesh.k * mesh.k, "matrices must be (m, 3, k, 3, k) or (m, k, k)");
+    require(matrices.size() == each * mesh.count * mesh.k * mesh.k, "matrices must be (m, k, k, 3, 3) or (m, k, k)");
     const double* from = matrices.data();
     double* to = data.mutable_data();
     py::gil_scoped_release release;

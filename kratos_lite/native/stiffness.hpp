@@ -296,26 +296,19 @@ inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const C
     return affine;
 }
 
-// Add given element matrices (count, R, k, R, k) to data (nnz, R, R).
+// Add given element matrices, R x R blocks (count, k, k, R, R), to data (nnz, R, R).
 template <int R>
-void add_matrices(const Connectivity& mesh, const double* matrices, const Graph& graph, double* data) {
+void add_matrices(const Connectivity& mesh, const double* blocks, const Graph& graph, double* data) {
     const Shares one(graph.rows, mesh, 1, 1);
-    const int64_t block = std::max<int64_t>(8, BLOCK_PAIRS / (mesh.k * mesh.k)), k = mesh.k;
-    Places places(graph, mesh, one, 0, block);
-    std::vector<int64_t> elements(block);
-    for (int64_t from = 0; from < mesh.count; from += block) {
-        const int64_t count = std::min(block, mesh.count - from);
+    const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k, most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
+    Places places(graph, mesh, one, 0, most);
+    std::vector<int64_t> elements(most);
+    for (int64_t from = 0; from < mesh.count; from += most) {
+        const int64_t count = std::min(most, mesh.count - from);
         for (int64_t e = 0; e < count; ++e) elements[e] = from + e;
         const int32_t* place = places.find(elements.data(), count);
-        for (int64_t e = 0; e < count; ++e) {
-            const double* K = matrices + (from + e) * R * R * k * k;
-            for (int64_t a = 0; a < k; ++a)
-                for (int64_t b = 0; b < k; ++b) {
-                    double* to = data + R * R * static_cast<int64_t>(place[(e * k + a) * k + b]);
-                    for (int i = 0; i < R; ++i)
-                        for (int j = 0; j < R; ++j) to[R * i + j] += K[((i * k + a) * R + j) * k + b];
-                }
-        }
+        for (int64_t p = 0; p < count * pairs; ++p, blocks += R * R)
+            for (int i = 0; i < R * R; ++i) data[R * R * static_cast<int64_t>(place[p]) + i] += blocks[i];
     }
 }
 
