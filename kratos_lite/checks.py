@@ -159,8 +159,8 @@ def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
     if len(rows) < 2:
         return []
     X = mesh.points[rows]
-    extent = np.ptp(X, axis=0)
-    spacing = float(extent.max()) / len(rows) ** (1 / 3)
+    extent = max(float(np.ptp(x)) for x in X.T)
+    spacing = extent / len(rows) ** (1 / 3)
     along = X @ np.array([0.5257311, 0.6180340, 0.5844215])  # no plane of a usual mesh is normal to it
     order = np.argsort(along, kind="stable")
     X, along, rows = X[order], along[order], rows[order]
@@ -184,7 +184,7 @@ def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
 def check_scales(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
     """Warn where the numbers themselves cost accuracy: far from the origin, or very unlike stiffnesses."""
     warnings = []
-    extent = float(np.ptp(mesh.points, axis=0).max())
+    extent = max(float(np.ptp(x)) for x in mesh.points.T)
     spacing = extent / max(1.0, mesh.n_elements ** (1 / 3))
     loss = float(np.finfo(float).eps * np.abs(mesh.points).max() / spacing) if spacing > 0 else 0.0
     if loss > 1e-9:
@@ -243,5 +243,6 @@ def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.
     if size <= noise:
         return 0.0, 0.0
     force = float(np.abs(total.sum(axis=0)).max() / size)
-    moment = float(np.abs(np.cross(X, total).sum(axis=0)).max() / (size * arm)) if arm > 0 else 0.0
+    M = X.T @ total
+    moment = float(np.abs(M - M.T).max() / (size * arm)) if arm > 0 else 0.0
     return force, moment

@@ -95,7 +95,13 @@ def clear(
 
 
 def volumes(points: Array, batch: Batch) -> Array:
-    """Return the volume of each Gauss point, γ det J, as (m, g) in m³."""
+    """Return the volume of each Gauss point, γ det J, as (m, g) in m³.
+
+    >>> from kratos_lite import Isotropic3D, Model, box
+    >>> model = Model(box(cells=(2, 1, 1)), Isotropic3D(E=1.0, nu=0.3))
+    >>> volumes(model.mesh.points, model.batches()[0]).sum(axis=1).round(12).tolist()
+    [0.5, 0.5]
+    """
     if module := _compiled(batch.element, *GEOMETRY):
         return np.asarray(module.volumes(*_placed(points, batch)))
     return np.concatenate([batch.at(points, chunk).dV for chunk in batch.chunks()])

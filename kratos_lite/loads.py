@@ -58,13 +58,12 @@ class BodyForce(Load):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
         total = np.zeros_like(mesh.points)
-        mask = np.zeros(mesh.n_elements, dtype=bool)
-        mask[mesh.elements(self.where)] = True
+        chosen = np.zeros(mesh.n_elements, dtype=bool)
+        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
         for batch in batches:
-            b = self.per_volume(batch)
-            chosen = mask[batch.rows]
-            if b.any() and chosen.any():
-                total += fields.body_force(mesh.points, batch.take(chosen), b)
+            b, part = self.per_volume(batch), batch.take(chosen[batch.rows])
+            if b.any() and len(part):
+                total += fields.body_force(mesh.points, part, b)
         return total
 
 

@@ -16,7 +16,7 @@ KL_INLINE void clear_body(const Gauss& w) {
     lane* X = reinterpret_cast<lane*>(w.space);
     for (int64_t e = w.first; e < w.last; e += V) {
         gather_points<V>(w, e, X);
-        lane mean = {}, lowest = lane{} + __builtin_inf(), sine = lowest;
+        lane mean = {}, lowest = lane{} + __builtin_inf(), upright = lane{} + 1.0;
         for (int q = 0; q < w.g; ++q) {
             lane J[3][3], cofactors[3][3], det, product = lane{} + 1.0;
             reference_gradient<V>(X, w.dN + 3 * static_cast<int64_t>(w.k) * q, w.k, J);
@@ -24,11 +24,11 @@ KL_INLINE void clear_body(const Gauss& w) {
             for (int j = 0; j < 3; ++j) product *= J[0][j] * J[0][j] + J[1][j] * J[1][j] + J[2][j] * J[2][j];
             const lane margin = det * det - CLEAR_SINE_SQUARED * product;
             lowest = det < lowest ? det : lowest;
-            sine = margin < sine ? margin : sine;
-            mean += w.weights[q] * (det < 0.0 ? -det : det);  // not a number stays so, and is not clear
+            upright = margin > 0.0 ? upright : lane{};  // what is not a number, here and below, is not clear
+            mean += w.weights[q] * (det < 0.0 ? -det : det);
         }
         for (int l = 0; l < V && e + l < w.last; ++l)
-            w.out[e + l - w.origin] = lowest[l] > CLEAR_SHARE * mean[l] && sine[l] > 0;
+            w.out[e + l - w.origin] = lowest[l] > CLEAR_SHARE * mean[l] && upright[l] > 0;
     }
 }
 
