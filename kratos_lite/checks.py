@@ -83,7 +83,7 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
         _, dN = tabulate(shape, kind.rule)
         dN = np.concatenate([dN, [shape.dN(xi) for xi in shape.nodes]])
         limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
-        doubtful = np.flatnonzero(~fields.clear(mesh.points, block.nodes, kind, dN, g))
+        doubtful = np.flatnonzero(~fields.clearly_positive(mesh.points, block.nodes, kind, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))
         for start in range(0, len(doubtful), step):
             cells = doubtful[start : start + step]
@@ -135,7 +135,7 @@ def check_rules(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
     replaced = [batch for batch in batches if batch.rule is not batch.element.rule]
     for batch in replaced:
         _, dN = tabulate(batch.element.shape, batch.rule)
-        part = batch.take(~fields.clear(mesh.points, batch.nodes, batch.element, dN, len(dN)))
+        part = batch.take(~fields.clearly_positive(mesh.points, batch.nodes, batch.element, dN, len(dN)))
         for chunk in part.chunks():
             bad = (part.at(mesh.points, chunk).determinants(dN) <= 0).any(axis=1)
             if bad.any():

@@ -79,19 +79,19 @@ def _strained(points: Array, batch: Batch, u: Array, stress: bool = True) -> tup
 # ---- geometry ------------------------------------------------------------------------------------
 
 
-def clear(
+def clearly_positive(
     points: Array, nodes: NDArray[Any], element: type[KinematicLinear], dN: Array, g: int
 ) -> NDArray[np.bool_]:
-    """Return a mask (m,) of the elements whose det J is clearly > 0, so that none needs a closer look.
+    """Return a mask (m,) of the elements whose det J is so clearly > 0 that none needs a closer look.
 
-    Clearly: at all points of `dN` (g', k, 3) above 1e-9 of its mean at the first `g`, and above 1e-10 of
-    the product of the lengths of the columns of J.  Without kernels no element is clear.
+    At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above 1e-10 of
+    the product of the lengths of the columns of J.  Without kernels every element needs the closer look.
     """
     module = _compiled(element, "__init__", "_jacobian", "determinants")
     if module is None:
         return np.zeros(len(nodes), dtype=bool)
     weights = np.where(np.arange(len(dN)) < g, 1 / g, 0.0)
-    return np.asarray(module.clear(_floats(points), _rows(nodes), _floats(dN), weights) > 0)
+    return np.asarray(module.clearly_positive(_floats(points), _rows(nodes), _floats(dN), weights) > 0)
 
 
 def volumes(points: Array, batch: Batch) -> Array:

@@ -23,8 +23,8 @@ using Floats = const Array<double>&;
 using Rows = const Array<int32_t>&;
 using Kernel = void (*)(const Gauss&);
 
-constexpr int64_t GRAIN = 256;     // elements of one task
-constexpr int64_t CHUNK = 16384;   // elements whose vectors are added together
+constexpr int64_t GRAIN = 256;    // elements of one task
+constexpr int64_t CHUNK = 16384;  // elements whose vectors are added together
 
 bool has_shape(Floats array, int64_t rows, int64_t columns) {
     return array.ndim() == 2 && array.shape(0) == rows && array.shape(1) == columns;
@@ -94,8 +94,8 @@ void scatter(Kernel kernel, Gauss w, int64_t m, double* total) {
         const int64_t last = std::min(m, w.origin + CHUNK);
         run(kernel, w, w.origin, last);
         const double* from = w.out;
-        for (const int32_t* node = w.nodes + w.origin * w.k; node < w.nodes + last * w.k; ++node, from += WIDTH)
-            for (int i = 0; i < WIDTH; ++i) total[static_cast<int64_t>(*node) * WIDTH + i] += from[i];
+        for (int64_t a = w.origin * w.k; a < last * w.k; ++a, from += WIDTH)
+            for (int i = 0; i < WIDTH; ++i) total[static_cast<int64_t>(w.nodes[a]) * WIDTH + i] += from[i];
     }
 }
 
@@ -118,8 +118,8 @@ Array<double> per_element(Kernel kernel, Gauss w, std::vector<py::ssize_t> shape
     return out;
 }
 
-Array<double> clear(Floats points, Rows nodes, Floats dN, Floats weights) {
-    return per_element(kl::clear, elements(points, nodes, dN, weights), {nodes.shape(0)});
+Array<double> clearly_positive(Floats points, Rows nodes, Floats dN, Floats weights) {
+    return per_element(kl::clearly_positive, elements(points, nodes, dN, weights), {nodes.shape(0)});
 }
 
 Array<double> volumes(Floats points, Rows nodes, Floats dN, Floats weights) {
@@ -147,14 +147,16 @@ Array<double> body_force(Floats points, Rows nodes, Floats N, Floats dN, Floats 
     return scattered<3>(kl::body_force, w, nodes, points);
 }
 
-Gauss strained(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C, const py::object& prestress) {
+Gauss strained(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C,
+               const py::object& prestress) {
     Gauss w = elements(points, nodes, dN, weights);
     add_field(w, points, u);
     add_law(w, nodes, C, prestress);
     return w;
 }
 
-Array<double> stress(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C, py::object prestress) {
+Array<double> stress(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C,
+                     py::object prestress) {
     const Gauss w = strained(points, nodes, dN, weights, u, C, prestress);
     return per_element(kl::stress, w, {nodes.shape(0), dN.shape(0), 6});
 }
@@ -166,7 +168,8 @@ Array<double> internal_load(Floats points, Rows nodes, Floats dN, Floats weights
 }
 
 // Energy, largest von Mises stress and its element; sums of GRAIN elements are added in order.
-py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C, py::object prestress) {
+py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C,
+                 py::object prestress) {
     Gauss w = strained(points, nodes, dN, weights, u, C, prestress);
     const int64_t m = nodes.shape(0);
     double energy = 0, largest = 0;
@@ -191,8 +194,8 @@ py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats u,
     return py::make_tuple(energy, std::sqrt(largest), element);
 }
 
-py::tuple averages(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C, py::object prestress,
-                   Floats to_nodes) {
+py::tuple averages(Floats points, Rows nodes, Floats dN, Floats weights, Floats u, Floats C,
+                   py::object prestress, Floats to_nodes) {
     Gauss w = strained(points, nodes, dN, weights, u, C, prestress);
     require(has_shape(to_nodes, w.k, w.g), "to_nodes must be (k, g)");
     w.to_nodes = to_nodes.data();
@@ -209,17 +212,19 @@ PYBIND11_MODULE(_gauss, m) {
     const auto N = py::arg("N").noconvert(), dN = py::arg("dN").noconvert();
     const auto weights = py::arg("weights").noconvert(), u = py::arg("u").noconvert();
     const auto C = py::arg("C").noconvert(), prestress = py::arg("prestress");
-    m.def("clear", &clear, "1 for elements with det J clearly > 0 at all points, else 0: (m,)", points, nodes, dN,
-          weights);
+    m.def("clearly_positive", &clearly_positive, "1 for elements with det J clearly > 0 everywhere, else 0: (m,)",
+          points, nodes, dN, weights);
     m.def("volumes", &volumes, "γ det J (m, g)", points, nodes, dN, weights);
     m.def("shares", &shares, "∫ N dV of each node, (n, 1)", points, nodes, N, dN, weights);
-    m.def("mass_sums", &mass_sums, "row sums and diagonal of ∫ N N dV, each (m, k)", points, nodes, N, dN, weights);
+    m.def("mass_sums", &mass_sums, "row sums and diagonal of ∫ N N dV, each (m, k)", points, nodes, N, dN,
+          weights);
     m.def("body_force", &body_force, "∫ N b dV of a nodal b, (n, 3)", points, nodes, N, dN, weights,
           py::arg("force").noconvert());
     m.def("stress", &stress, "C ε + σ0 (m, g, 6)", points, nodes, dN, weights, u, C, prestress);
-    m.def("internal_load", &internal_load, "∫ B^T (C ε + σ0) dV, (n, 3)", points, nodes, dN, weights, u, C, prestress);
-    m.def("totals", &totals, "½ ∫ ε C ε dV, largest von Mises stress, its element", points, nodes, dN, weights, u, C,
+    m.def("internal_load", &internal_load, "∫ B^T (C ε + σ0) dV, (n, 3)", points, nodes, dN, weights, u, C,
           prestress);
+    m.def("totals", &totals, "½ ∫ ε C ε dV, largest von Mises stress, its element", points, nodes, dN, weights,
+          u, C, prestress);
     m.def("averages", &averages, "sum of nodal stresses (n, 6), mean of each element (m, 6)", points, nodes, dN,
           weights, u, C, prestress, py::arg("to_nodes").noconvert());
 }

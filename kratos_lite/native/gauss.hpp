@@ -65,7 +65,8 @@ KL_INLINE void reference_gradient(const vec<double, V>* field, const double* dN,
 
 // cofactors = det(J) J^-1
 template <int V>
-KL_INLINE void invert(const vec<double, V> (&J)[3][3], vec<double, V> (&cofactors)[3][3], vec<double, V>& det) {
+KL_INLINE void invert(const vec<double, V> (&J)[3][3], vec<double, V> (&cofactors)[3][3],
+                      vec<double, V>& det) {
     for (int i = 0; i < 3; ++i) {
         const int b = (i + 1) % 3, c = (i + 2) % 3;
         for (int j = 0; j < 3; ++j) {
@@ -86,8 +87,8 @@ KL_INLINE void jacobian(const Gauss& w, const vec<double, V>* X, int q, vec<doub
 
 // Strain in Voigt order xx yy zz xy yz zx with engineering shear; inverse = J^-1.
 template <int V>
-KL_INLINE void strain_at(const Gauss& w, const vec<double, V>* u, int q, const vec<double, V> (&inverse)[3][3],
-                         vec<double, V> (&strain)[6]) {
+KL_INLINE void strain_at(const Gauss& w, const vec<double, V>* u, int q,
+                         const vec<double, V> (&inverse)[3][3], vec<double, V> (&strain)[6]) {
     vec<double, V> H[3][3], D[3][3];
     reference_gradient<V>(u, w.dN + 3 * static_cast<int64_t>(w.k) * q, w.k, H);
     for (int i = 0; i < 3; ++i)
@@ -106,7 +107,8 @@ struct State {
 };
 
 template <int V>
-KL_INLINE void state_at(const Gauss& w, const vec<double, V>* X, const vec<double, V>* u, int q, State<V>& s) {
+KL_INLINE void state_at(const Gauss& w, const vec<double, V>* X, const vec<double, V>* u, int q,
+                        State<V>& s) {
     vec<double, V> det;
     jacobian<V>(w, X, q, s.inverse, det);
     const vec<double, V> share = 1.0 / det;

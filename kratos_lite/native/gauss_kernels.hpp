@@ -11,7 +11,7 @@ namespace kl {
 constexpr double CLEAR_SHARE = 1e-9, CLEAR_SINE_SQUARED = 1e-20;
 
 template <int V>
-KL_INLINE void clear_body(const Gauss& w) {
+KL_INLINE void clearly_positive_body(const Gauss& w) {
     typedef vec<double, V> lane;
     lane* X = reinterpret_cast<lane*>(w.space);
     for (int64_t e = w.first; e < w.last; e += V) {
@@ -140,7 +140,8 @@ KL_INLINE void internal_load_body(const Gauss& w) {
             const double* dN = w.dN + 3 * static_cast<int64_t>(w.k) * q;
             for (int a = 0; a < w.k; ++a)
                 for (int i = 0; i < 3; ++i)
-                    force[3 * a + i] += P[i][0] * dN[3 * a] + P[i][1] * dN[3 * a + 1] + P[i][2] * dN[3 * a + 2];
+                    force[3 * a + i] +=
+                        P[i][0] * dN[3 * a] + P[i][1] * dN[3 * a + 1] + P[i][2] * dN[3 * a + 2];
         }
         store<V>(w, force, 3 * w.k, e, w.out);
     }
@@ -167,7 +168,8 @@ KL_INLINE void totals_body(const Gauss& w) {
             }
             found[0] += 0.5 * energy * s.dV;
             const lane xy = t[0] - t[1], yz = t[1] - t[2], zx = t[2] - t[0];
-            const lane square = 0.5 * (xy * xy + yz * yz + zx * zx) + 3.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
+            const lane square =
+                0.5 * (xy * xy + yz * yz + zx * zx) + 3.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
             found[1] = square > found[1] ? square : found[1];
         }
         store<V>(w, found, 2, e, w.out);
@@ -209,7 +211,7 @@ KL_INLINE void averages_body(const Gauss& w) {
     }
 }
 
-KL_DISPATCH(clear, clear_body, double, const Gauss&)
+KL_DISPATCH(clearly_positive, clearly_positive_body, double, const Gauss&)
 KL_DISPATCH(volumes, volumes_body, double, const Gauss&)
 KL_DISPATCH(shares, shares_body, double, const Gauss&)
 KL_DISPATCH(body_force, body_force_body, double, const Gauss&)
