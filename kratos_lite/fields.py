@@ -84,8 +84,8 @@ def clearly_positive(
 ) -> NDArray[np.bool_]:
     """Return a mask (m,) of the elements whose det J is so clearly > 0 that none needs a closer look.
 
-    At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above 1e-10 of
-    the product of the lengths of the columns of J.  Without kernels every element needs the closer look.
+    At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
+    times what rounding of the coordinates makes of it.  Without kernels every element needs the closer look.
     """
     module = _compiled(element, "__init__", "_jacobian", "determinants")
     if module is None:

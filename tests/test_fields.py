@@ -349,6 +349,20 @@ def test_both_ways_judge_bad_shapes_alike(spoil, text, numpy_only):
     assert verdict(mesh, KinematicLinear3D8N) == found
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_both_ways_judge_flat_elements_alike(name, numpy_only):
+    kind, found = ELEMENTS[name], []
+    for seed in range(8):
+        mesh = kl.box(cells=(2, 2, 1), element=name)
+        turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+        mesh.points[:] = mesh.points * [1, 1, 0] @ turn + seed  # in a plane but for rounding
+        found.append((mesh, verdict(mesh, kind)))
+    numpy_only()
+    for mesh, text in found:
+        assert "must be > 0" in text
+        assert verdict(mesh, kind) == text
+
+
 @pytest.mark.parametrize("scale", [1e-60, 1e-6, 1.0, 1e6, 1e60])
 def test_a_tetrahedron_with_two_nodes_at_one_place_has_no_volume_at_any_scale(scale):
     points = scale * np.array([[0.1, 0.2, 0.3], [1.3, 0.7, 0.2], [0.4, 1.1, 0.9], [0.4, 1.1, 0.9]])

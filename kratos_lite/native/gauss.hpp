@@ -45,10 +45,29 @@ KL_INLINE void gather(const Gauss& w, const double* values, int64_t e, vec<doubl
 }
 
 template <int V>
+KL_INLINE void shift_to_first_node(vec<double, V>* X, int k) {
+    for (int a = k - 1; a >= 0; --a)
+        for (int i = 0; i < 3; ++i) X[3 * a + i] -= X[i];
+}
+
+template <int V>
 KL_INLINE void gather_points(const Gauss& w, int64_t e, vec<double, V>* X) {
     gather<V>(w, w.points, e, X);
-    for (int a = w.k - 1; a >= 0; --a)
-        for (int i = 0; i < 3; ++i) X[3 * a + i] -= X[i];
+    shift_to_first_node<V>(X, w.k);
+}
+
+template <int V>
+KL_INLINE void absolute(const vec<double, V>& x, vec<double, V>& out) { out = x < 0.0 ? -x : x; }
+
+// Largest absolute value of `count` vectors, lane by lane.
+template <int V>
+KL_INLINE void largest(const vec<double, V>* values, int count, vec<double, V>& out) {
+    out = vec<double, V>{};
+    for (int i = 0; i < count; ++i) {
+        vec<double, V> size;
+        absolute<V>(values[i], size);
+        out = size > out ? size : out;
+    }
 }
 
 // d field_i / d xi_j

@@ -6,29 +6,30 @@
 namespace kl {
 
 // out (m): 1 where det J is clearly positive at every point, beside the weighted mean of |det J| and
-// beside the lengths of the columns of J; 0 leaves the judgement to the caller.  So nothing is decided
-// here near det J = 0, where rounding would decide.
-constexpr double CLEAR_SHARE = 1e-9, CLEAR_SINE_SQUARED = 1e-20;
+// beside the rounding of coordinates of its size; 0 leaves the judgement to the caller.  So nothing
+// is decided here near det J = 0, where rounding would decide.
+constexpr double CLEAR_SHARE = 1e-9, CLEAR_ROUNDING = 1e-12;
 
 template <int V>
 KL_INLINE void clearly_positive_body(const Gauss& w) {
     typedef vec<double, V> lane;
     lane* X = reinterpret_cast<lane*>(w.space);
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        lane mean = {}, lowest = lane{} + __builtin_inf(), upright = lane{} + 1.0;
+        lane reach, size, mean = {}, lowest = lane{} + __builtin_inf();
+        gather<V>(w, w.points, e, X);
+        largest<V>(X, 3 * w.k, reach);
+        shift_to_first_node<V>(X, w.k);
+        largest<V>(X, 3 * w.k, size);
         for (int q = 0; q < w.g; ++q) {
-            lane J[3][3], cofactors[3][3], det, product = lane{} + 1.0;
-            reference_gradient<V>(X, w.dN + 3 * static_cast<int64_t>(w.k) * q, w.k, J);
-            invert<V>(J, cofactors, det);
-            for (int j = 0; j < 3; ++j) product *= J[0][j] * J[0][j] + J[1][j] * J[1][j] + J[2][j] * J[2][j];
-            const lane margin = det * det - CLEAR_SINE_SQUARED * product;
+            lane cofactors[3][3], det, size_of_det;
+            jacobian<V>(w, X, q, cofactors, det);
             lowest = det < lowest ? det : lowest;
-            upright = margin > 0.0 ? upright : lane{};  // what is not a number, here and below, is not clear
-            mean += w.weights[q] * (det < 0.0 ? -det : det);
+            absolute<V>(det, size_of_det);
+            mean += w.weights[q] * size_of_det;  // not a number stays so, and is not clear
         }
+        const lane bound = CLEAR_ROUNDING * size * size * (size + reach);
         for (int l = 0; l < V && e + l < w.last; ++l)
-            w.out[e + l - w.origin] = lowest[l] > CLEAR_SHARE * mean[l] && upright[l] > 0;
+            w.out[e + l - w.origin] = lowest[l] > CLEAR_SHARE * mean[l] && lowest[l] > bound[l];
     }
 }
 
