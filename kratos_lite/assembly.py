@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.batches import Batch, add_nodal
+from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import lame_constants, tabulate
@@ -242,14 +242,3 @@ def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:
             matrices = batch.at(points, chunk).stiffness_by_axis(batch.material.C)
             K += np.bincount(places, weights=matrices.ravel(), minlength=n * n)
     return K.reshape(n, n)
-
-
-def internal_load(points: Array, batches: Sequence[Batch], u: Array) -> Array:
-    """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
-    total = np.zeros_like(points)
-    for batch in batches:
-        for chunk in batch.chunks():
-            element, nodes = batch.at(points, chunk), batch.nodes[chunk]
-            stress = batch.material.stress(element.strain(u[nodes])) + batch.initial_stress(chunk)
-            add_nodal(total, nodes, element.internal_load(stress))
-    return total

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import checks, solvers
-from kratos_lite.assembly import Progress, assemble_dense, assemble_stiffness, internal_load
+from kratos_lite.assembly import Progress, assemble_dense, assemble_stiffness
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.fields import internal_load
 from kratos_lite.loads import check_loads
 from kratos_lite.result import Report, Result, peak_memory
 from kratos_lite.solvers.common import DENSE_MAX

@@ -16,6 +16,7 @@ FLOORS = [
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},
     {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},
+    {"fields"},
     {"assembly", "loads", "mobility", "solvers", "testing", "view"},
     {"checks", "linear_level"},
     {"io.mdpa", "io.elem", "io.vtu", "io.bridge"},
