@@ -17,7 +17,7 @@ FLOORS = [
     {"elements", "materials", "mesh"},
     {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},
     {"assembly", "loads", "mobility", "solvers", "testing", "view"},
-    {"checks"},
+    {"checks", "system"},
     {"io.mdpa", "io.elem", "io.vtu", "io.bridge"},
     {"io.results", "io.documents"},
     {"result"},

@@ -232,7 +232,7 @@ class Mesh:
         nodes = [block.nodes for block in self.blocks]
         known, faces = self._boundary
         if len(known) != len(nodes) or any(a is not b for a, b in zip(known, nodes, strict=True)):
-            faces = topology.boundary(self.blocks, self.n_nodes)
+            faces = topology.boundary(self.blocks)
             self._boundary = (nodes, faces)
         return faces
 
