@@ -12,12 +12,12 @@ from kratos_lite import checks, mobility
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import PatternCache, Progress
 from kratos_lite.batches import Batch
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.grouping import batches_of, element_class
 from kratos_lite.loads import Load
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Faces, Mesh, Where, WhereElements, with_rows
-from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.mesh import Mesh, Where, WhereElements
+from kratos_lite.quadrature import Rule
 from kratos_lite.result import Result
 from kratos_lite.statics import StaticSystem, solve_static
 from kratos_lite.supports import AXES, Link, Supports, rigid_modes
@@ -166,53 +166,9 @@ class Model:
 
         Raises ModelError for elements without material and InputError for unknown kinds.
         """
-        found: list[Batch] = []
-        for block, at in with_rows(self.mesh.blocks):
-            if len(block):
-                found += self._split(block, at)
-        if not found:
-            raise ModelError("the model has no elements; nothing can be solved")
-        return found
-
-    def _split(self, block: Block, at: slice) -> list[Batch]:
-        element = self._element_class(block)
-        material, rule = self._material_of[at], self._rule_of[at]
-        if material.min() < 0:
-            e = int(np.argmax(material < 0))
-            raise ModelError(
-                f"{self.mesh.place(block, e)} has no material (property {block.properties[e]}); "
-                "give one with Model(mesh, material), model.assign or --material"
-            )
-        rows = np.arange(at.start, at.stop)
-        pairs = (material * (len(self._rules) + 1) + rule + 1).astype(np.int64)
-        if pairs.min() == pairs.max():
-            return [self._batch(element, material[0], rule[0], block.nodes, rows)]
-        batches = []
-        for pair in np.unique(pairs):
-            mine = np.flatnonzero(pairs == pair)
-            one = mine[0]
-            batches.append(self._batch(element, material[one], rule[one], block.nodes[mine], rows[mine]))
-        return batches
-
-    def _batch(self, element: Any, material: int, rule: int, nodes: Any, rows: NDArray[np.int64]) -> Batch:
-        """Return the batch of elements that share number of material and of rule."""
-        chosen = self._rules.get(int(rule), element.rule)
-        if isinstance(chosen, int):
-            chosen = by_order(element.shape.cell, chosen)
-        if abs(chosen.weights.sum() / element.rule.weights.sum() - 1) > 1e-9:
-            raise InputError(
-                f"{chosen} does not fit {element.__name__}: its weights miss the volume of the cell"
-            )
-        stress = None if self.prestress is None else self.prestress[rows]
-        return Batch(element, chosen, self._materials[material], nodes, rows, stress)
-
-    def _element_class(self, block: Block) -> Any:
-        if block.name not in ELEMENTS:
-            try:
-                ELEMENTS[block.name]
-            except InputError as error:
-                raise InputError(f"{self.mesh.place(block, 0)}: {error}") from None
-        return ELEMENTS[block.name]
+        return batches_of(
+            self.mesh, self._materials, self._material_of, self._rules, self._rule_of, self.prestress
+        )
 
     # ---- solving -------------------------------------------------------------------------------
 
@@ -224,7 +180,7 @@ class Model:
         MeshError, InputError
             With every element that is wrong.
         """
-        kinds = [self._element_class(block) for block in self.mesh.blocks]
+        kinds = [element_class(self.mesh, block) for block in self.mesh.blocks]
         checks.check_blocks(self.mesh, kinds)
         checks.check_points(self.mesh)
         checks.check_repeated_nodes(self.mesh)
@@ -248,7 +204,7 @@ class Model:
         mesh = self.mesh
         warnings = self.check_geometry()
         batches = self.batches()
-        used, faces = mesh.used_nodes(), Faces(mesh.blocks)
+        used, faces = mesh.used_nodes(), mesh.all_faces(anew=True)
         warnings += checks.check_rules(mesh, batches)
         warnings += mobility.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used)

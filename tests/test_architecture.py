@@ -16,7 +16,7 @@ FLOORS = [
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},
     {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},
-    {"assembly", "loads", "mobility", "solvers", "testing", "view"},
+    {"assembly", "grouping", "loads", "mobility", "solvers", "testing", "view"},
     {"checks", "system"},
     {"io.mdpa", "io.elem", "io.vtu", "io.bridge"},
     {"io.results", "io.documents"},

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, Ints, with_rows
 from kratos_lite.native import kernels
+from kratos_lite.shapes import FACE_SHAPES
 
 Sets: TypeAlias = "tuple[NDArray[Any], Sequence[Sequence[int]]]"
 """Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
@@ -111,12 +112,29 @@ class Faces:
         open_ = keys[self.one] != keys[self.other]
         return self.one[open_], self.other[open_]
 
-    def single(self) -> NDArray[np.bool_]:
-        """Return a mask of the faces that no other face meets."""
+    @cached_property
+    def boundary(self) -> list[Block]:
+        """Faces that belong to one element only, outward, one block per face shape.
+
+        ``ids`` holds the row of the parent element.
+        """
         alone = np.ones(sum(len(block) * len(faces_of(block)) for block in self.blocks), dtype=bool)
-        alone[self.one] = False
-        alone[self.other] = False
-        return alone
+        alone[self.one] = alone[self.other] = False
+        by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
+        start = 0
+        for block, at in with_rows(self.blocks):
+            for face in faces_of(block):
+                cells = np.flatnonzero(alone[start : start + len(block)])
+                start += len(block)
+                chosen = block.nodes[cells][:, list(face)]
+                by_size.setdefault(len(face), []).append((chosen, at.start + cells))
+        faces = []
+        for size, groups in by_size.items():
+            nodes, parents = np.vstack([f for f, _ in groups]), np.concatenate([p for _, p in groups])
+            shape = FACE_SHAPES[size]
+            if len(parents):
+                faces.append(Block(shape.__name__, nodes, parents, 0 * parents, shape))
+        return faces
 
 
 def faces_of(block: Block) -> tuple[tuple[int, ...], ...]:

@@ -1,4 +1,4 @@
-"""Topology: the faces on the boundary of a mesh, and cells that are turned inside out."""
+"""Topology: how faces lie on the boundary of a mesh, and cells that are turned inside out."""
 
 from __future__ import annotations
 
@@ -7,33 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.mesh.blocks import Block, Ints, with_rows
-from kratos_lite.mesh.connections import Faces, faces_of
-from kratos_lite.shapes import FACE_SHAPES, Shape
-
-
-def boundary(blocks: Sequence[Block]) -> list[Block]:
-    """Return the faces that belong to one element only, outward, one block per face shape.
-
-    ``ids`` holds the row of the parent element.
-    """
-    alone = Faces(blocks).single()
-    by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
-    start = 0
-    for block, at in with_rows(blocks):
-        for face in faces_of(block):
-            cells = np.flatnonzero(alone[start : start + len(block)])
-            start += len(block)
-            by_size.setdefault(len(face), []).append((block.nodes[cells][:, list(face)], at.start + cells))
-    faces = []
-    for size, groups in by_size.items():
-        parents = np.concatenate([p for _, p in groups])
-        shape = FACE_SHAPES[size]
-        if len(parents):
-            faces.append(
-                Block(shape.__name__, np.vstack([f for f, _ in groups]), parents, 0 * parents, shape)
-            )
-    return faces
+from kratos_lite.mesh.blocks import Block, Ints
+from kratos_lite.shapes import Shape
 
 
 def outward_signs(boundary: Sequence[Block], block: Block) -> NDArray[np.float64]:

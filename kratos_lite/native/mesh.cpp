@@ -11,7 +11,7 @@ namespace {
 using kl::Array;
 namespace py = pybind11;
 
-constexpr int64_t GRAIN = 16384;  // sets of one task
+constexpr int64_t GRAIN = 4096;  // cells of one task
 
 // The numbers of a set are mixed and added up, so that their order does not matter (SplitMix64,
 // Steele, Lea and Flood 2014): two sets of a mesh that differ have the same key with a chance of 2^-64.
@@ -30,14 +30,15 @@ struct Cells {
 };
 
 void add_keys(const Cells& cells, uint64_t* key) {
-    kl::parallel_ranges(cells.p * cells.m, GRAIN, [&](int64_t first, int64_t last) {
-        for (int64_t set = first; set < last; ++set) {
-            const int32_t* pick = cells.picks + set / cells.m * cells.w;
-            const int32_t* nodes = cells.nodes + set % cells.m * cells.k;
-            uint64_t sum = 0;
-            for (int64_t i = 0; i < cells.w; ++i)
-                if (pick[i] >= 0) sum += mixed(static_cast<uint64_t>(nodes[pick[i]]));
-            key[set] = sum;
+    kl::parallel_ranges(cells.m, GRAIN, [&](int64_t first, int64_t last) {
+        for (int64_t p = 0; p < cells.p; ++p) {
+            const int32_t* pick = cells.picks + p * cells.w;
+            for (int64_t cell = first; cell < last; ++cell) {
+                uint64_t sum = 0;
+                for (int64_t i = 0; i < cells.w; ++i)
+                    if (pick[i] >= 0) sum += mixed(static_cast<uint64_t>(cells.nodes[cell * cells.k + pick[i]]));
+                key[p * cells.m + cell] = sum;
+            }
         }
     });
 }
