@@ -45,6 +45,7 @@ class Report:
     seconds : per phase.
     peak_memory : bytes.
     warnings, notes : what the checks and the reader found.
+    skipped : what this solution did without, as it would have changed nothing.
     """
 
     unknowns: int
@@ -60,6 +61,7 @@ class Report:
     peak_memory: int
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
 
 
 class Result:
@@ -209,6 +211,8 @@ class Result:
             ("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())),
             ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
         ]
+        if report.skipped:
+            rows.append(("skipped", "; ".join(report.skipped)))
         rows += [("warning", text) for text in report.warnings]
         return rows + [("note", text) for text in report.notes]
 

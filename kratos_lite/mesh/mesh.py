@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh import topology
 from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select
+from kratos_lite.mesh.connections import Faces
 
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
@@ -61,7 +62,7 @@ class Mesh:
         self.conditions = list(conditions)
         self.parts = dict(parts or {})
         self.source = source
-        self._boundary: tuple[list[NDArray[np.int32]], list[Block]] = ([], [])
+        self._faces: tuple[list[NDArray[np.int32]], Faces | None] = ([], None)
         self._check()
 
     def _check(self) -> None:
@@ -229,11 +230,19 @@ class Mesh:
 
         ``ids`` holds the row of the parent element.  Made anew when the blocks have changed.
         """
+        return self.all_faces().boundary
+
+    def all_faces(self, *, anew: bool = False) -> Faces:
+        """Return all faces of the elements and which of them coincide.
+
+        They are kept until a block is exchanged; `anew` finds them in any case.
+        """
         nodes = [block.nodes for block in self.blocks]
-        known, faces = self._boundary
-        if len(known) != len(nodes) or any(a is not b for a, b in zip(known, nodes, strict=True)):
-            faces = topology.boundary(self.blocks, self.n_nodes)
-            self._boundary = (nodes, faces)
+        known, faces = self._faces
+        same = len(known) == len(nodes) and all(a is b for a, b in zip(known, nodes, strict=True))
+        if faces is None or anew or not same:
+            faces = Faces(self.blocks)
+            self._faces = (nodes, faces)
         return faces
 
     def reoriented(self) -> Mesh:
