@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh import Mesh, distinct, with_rows
 from kratos_lite.supports import Supports, rigid_modes
 
 Array = NDArray[np.float64]
@@ -58,8 +58,14 @@ class Faces:
 
 
 def node_keys(mesh: Mesh) -> NDArray[np.uint64]:
-    """Return one random number per node; sums of them tell sets of nodes apart."""
-    return np.random.default_rng(1).integers(0, 2**64, mesh.n_nodes, dtype=np.uint64)
+    """Return one hashed number per node; sums of them tell sets of nodes apart.
+
+    Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014): SplitMix64.
+    """
+    x = np.arange(1, mesh.n_nodes + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
+    return x ^ x >> np.uint64(31)
 
 
 def all_faces(mesh: Mesh) -> Faces:
@@ -154,21 +160,22 @@ def bodies(mesh: Mesh) -> Bodies:
     one, other = faces.pairs()
     joined = np.stack([faces.element[one], faces.element[other]], axis=1)
     root = components(mesh.n_elements, [joined] if len(joined) else [])
-    names, body = np.unique(root, return_inverse=True)
+    names = distinct(root)
+    body = np.searchsorted(names, root)
     nodes = np.concatenate([b.nodes.ravel() for b in mesh.blocks])
     size = np.concatenate([np.full(len(b), b.nodes.shape[1]) for b in mesh.blocks])
     owners = np.repeat(body, size)
     found = _of_pairs(mesh.n_nodes, nodes.astype(np.int64), owners)
-    if len(np.unique(found.joints[1])) > MAX_HINGED:
+    if len(distinct(found.joints[1])) > MAX_HINGED:
         label = components(len(names), [np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)])
-        label = np.unique(label, return_inverse=True)[1]
+        label = np.searchsorted(distinct(label), label)
         found = _of_pairs(mesh.n_nodes, found.node, label[found.body])
     return found
 
 
 def _of_pairs(n_nodes: int, node: Ints, body: Ints) -> Bodies:
     count = int(body.max()) + 1
-    node, body = np.divmod(np.unique(node * count + body), count)
+    node, body = np.divmod(distinct(node * count + body), count)
     part = np.full(n_nodes, -1)
     part[node[::-1]] = body[::-1]
     return Bodies(part, node, body)
@@ -219,7 +226,7 @@ def _groups(n_bodies: int, equations: Equations) -> list[list[int]]:
     order = np.argsort(equations.row, kind="stable")
     row, body = equations.row[order], equations.body[order]
     tied = (row[1:] == row[:-1]) & (body[1:] != body[:-1])
-    pairs = np.unique(np.stack([body[1:][tied], body[:-1][tied]], axis=1), axis=0)
+    pairs = np.stack([body[1:][tied], body[:-1][tied]], axis=1)
     label = components(n_bodies, [pairs] if len(pairs) else [])
     members = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[members])) + 1
@@ -234,7 +241,8 @@ def _free_modes(
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
     mine = np.isin(equations.body, group)
-    rows, row = np.unique(equations.row[mine], return_inverse=True)
+    rows = distinct(equations.row[mine])
+    row = np.searchsorted(rows, equations.row[mine])
     dof, body, weight = equations.dof[mine], equations.body[mine], equations.weight[mine]
     C = np.zeros((len(rows), 6 * len(group)))
     for i, p in enumerate(group):

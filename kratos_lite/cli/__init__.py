@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import atexit
+import gc
 import io
 import os
 import sys
@@ -20,13 +22,23 @@ EXIT_CODES = """exit codes:
   130  interrupted with Ctrl-C"""
 
 
+def _help(prog: str) -> argparse.HelpFormatter:
+    """Return a formatter as wide as the terminal; argparse would import shutil to find the width."""
+    width = os.environ.get("COLUMNS", "")
+    try:
+        columns = int(width) if width.isdigit() else os.get_terminal_size().columns
+    except (OSError, ValueError):
+        columns = 0
+    return argparse.RawDescriptionHelpFormatter(prog, width=(columns or 80) - 2)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = argparse.ArgumentParser(
         prog="kratos-lite",
         description="Finite elements for solids: from an input file to displacements and stresses.",
         epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_help,
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -68,7 +80,7 @@ def _add(commands: object, name: str, text: str, example: str) -> argparse.Argum
         help=text,
         description=text[0].upper() + text[1:] + ".",
         epilog=f"examples:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_help,
     )
     command.add_argument(
         "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
@@ -114,6 +126,7 @@ def _add_solve(commands: object) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code, one of `EXIT_CODES`."""
+    atexit.register(gc.freeze)  # at its end Python would look through all objects for garbage, for 15 ms
     _escape_unknown_characters()
     words = _join_negative(sys.argv[1:] if arguments is None else arguments)
     try:

@@ -142,7 +142,7 @@ def _document(options: Namespace) -> Document:
     from kratos_lite.io.documents import read_document
 
     if Path(options.input).suffix.lower() == ".json":
-        from kratos_lite.io.kratos import document_from
+        from kratos_lite.io.kratos.to_document import document_from
         from kratos_lite.io.project import read_project
 
         model = read_project(options.input).model

@@ -6,7 +6,6 @@ Source of the format and of the node orders: VTK User's Guide, "VTK File Formats
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from html import escape
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -101,7 +100,9 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
     --------
     >>> write_pvd(getfixture("tmp_path") / "swing.pvd", [(0.0, "swing_0.vtu"), (0.1, "swing_1.vtu")])
     """
-    sets = [f'<DataSet timestep="{float(time)!r}" part="0" file="{escape(name)}"/>\n' for time, name in steps]
+    sets = [
+        f'<DataSet timestep="{float(time)!r}" part="0" file="{_escaped(name)}"/>\n' for time, name in steps
+    ]
     text = _HEAD.format("Collection") + f"<Collection>\n{''.join(sets)}</Collection>\n</VTKFile>\n"
     write_whole(path, text.encode())
 
@@ -154,10 +155,17 @@ def _header(groups: dict[str, Named], n_points: int, n_cells: int) -> str:
 
 def _describe(name: str, array: Array) -> str:
     """Return type, name and, for more than one number per row, the components as XML attributes."""
-    text = f'type="{_TYPES[array.dtype.str]}" Name="{escape(name)}"'
+    text = f'type="{_TYPES[array.dtype.str]}" Name="{_escaped(name)}"'
     if array.ndim > 1:
         count = int(np.prod(array.shape[1:]))
         text += f' NumberOfComponents="{count}"'
         names = _COMPONENTS.get(count, ()) if name != "Points" else ()
         text += "".join(f' ComponentName{i}="{part}"' for i, part in enumerate(names))
     return text
+
+
+def _escaped(name: str) -> str:
+    """Return a name as the value of an XML attribute."""
+    for sign, word in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
+        name = name.replace(sign, word)
+    return name

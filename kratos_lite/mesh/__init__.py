@@ -1,6 +1,17 @@
 """Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select, with_rows
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Floats,
+    Ints,
+    Part,
+    distinct,
+    rows_of_ids,
+    select,
+    with_rows,
+    without_repeats,
+)
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
 from kratos_lite.mesh.topology import outward_signs
 
@@ -13,8 +24,10 @@ __all__ = [
     "Part",
     "Where",
     "WhereElements",
+    "distinct",
     "outward_signs",
     "rows_of_ids",
     "select",
     "with_rows",
+    "without_repeats",
 ]
