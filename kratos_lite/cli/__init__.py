@@ -1,4 +1,4 @@
-"""The command line: ``kratos-lite solve | info | check | convert``."""
+"""The command line: ``kratos-lite solve | info | check | convert | bench``."""
 
 from __future__ import annotations
 
@@ -63,6 +63,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     convert.add_argument("input", help=INPUT)
     convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, by its ending")
+    # All its words, also --help, are for the program that it runs.
+    bench = commands.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
+    bench.set_defaults(debug=False)
     return parser
 
 
@@ -95,6 +98,11 @@ def _add_solve(commands: object) -> None:
     out = solve.add_argument_group("output")
     out.add_argument("-o", "--output", metavar="OUT.vtu", help="results for ParaView (or .vtk, .json)")
     out.add_argument("--json", metavar="OUT.json", help="summary, displacements and reactions by node id")
+    out.add_argument(
+        "--vtu",
+        choices=("binary", "compressed", "ascii"),
+        help="how a .vtu output stores its numbers: quickest, smallest, or to be read by eye (binary)",
+    )
     out.add_argument("--picture", metavar="OUT.png", help="picture of the deformed body")
     given = solve.add_argument_group(
         "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
@@ -121,6 +129,7 @@ def _add_solve(commands: object) -> None:
     how = solve.add_argument_group("solver")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
+    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 
 
@@ -163,7 +172,11 @@ def _run(words: Sequence[str]) -> int:
     """Run one command; errors of the user's end in one line."""
     from kratos_lite.errors import KratosLiteError
 
-    options = build_parser().parse_args(words)
+    parser = build_parser()
+    options, rest = parser.parse_known_args(words)
+    options.rest = rest
+    if rest and options.command != "bench":
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
     try:
         from kratos_lite.cli import commands
 

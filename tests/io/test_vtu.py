@@ -183,7 +183,7 @@ def test_compressed_numbers_come_back_whether_or_not_they_fill_their_blocks(tmp_
 
 
 def test_an_unknown_mode_is_refused(tmp_path):
-    with pytest.raises(InputError, match="a .vtu file is written as binary, compressed, ascii; got 'text'"):
+    with pytest.raises(InputError, match=r"a \.vtu file is written as binary, compressed, ascii; got 'text'"):
         write_vtu(tmp_path / "a.vtu", Mesh(np.eye(3)), mode="text")
     assert list(tmp_path.iterdir()) == []
 
