@@ -122,14 +122,14 @@ def write_json(path: str | Path, result: Result) -> None:
 
     from kratos_lite import __version__
 
-    ids = [str(i) for i in result.mesh.node_ids]
+    ids = list(map(str, result.mesh.node_ids.tolist()))
     held = np.flatnonzero((result.reactions != 0).any(axis=1))
     content = {
         "kratos_lite": __version__,
         "units": "SI",
         **summary(result),
         "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
-        "reaction": {ids[row]: result.reactions[row].tolist() for row in held},
+        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
     }
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
