@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, equal_sets, with_rows
+from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
 from kratos_lite.mesh.connections import Sets, corners, faces_of, set_keys
 from kratos_lite.supports import Supports, rigid_modes
 
@@ -112,9 +112,10 @@ def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
     is_root = root == np.arange(len(root))
     body = (np.cumsum(is_root) - 1)[root]
     found = _of_elements(mesh, body)
-    if len(np.unique(found.joints[1])) > MAX_HINGED:
+    if len(distinct(found.joints[1])) > MAX_HINGED:
         pairs = np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)
-        label = np.unique(components(int(is_root.sum()), pairs), return_inverse=True)[1]
+        label = components(int(is_root.sum()), pairs)
+        label = np.searchsorted(distinct(label), label)
         found = _of_elements(mesh, label[body])
     return found
 
@@ -138,7 +139,7 @@ def _of_elements(mesh: Mesh, body: Ints) -> Bodies:
     further, owner = (np.concatenate(both) for both in zip(*shared, strict=True))
     count = int(body.max()) + 1
     every = np.concatenate([node * count + part[node], further.astype(np.int64) * count + owner])
-    node, owner = np.divmod(np.unique(every), count)
+    node, owner = np.divmod(distinct(every), count)
     part[node[::-1]] = owner[::-1]
     return Bodies(part, node, owner)
 
@@ -221,7 +222,8 @@ def _free_modes(
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
-    rows, row = np.unique(equations.row, return_inverse=True)
+    rows = distinct(equations.row)
+    row = np.searchsorted(rows, equations.row)
     if len(rows) > 2 * SAMPLE * len(group):
         count = SAMPLE * len(group)
         chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3

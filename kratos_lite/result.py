@@ -221,11 +221,14 @@ class Result:
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
-    def save(self, path: str | Path) -> None:
-        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json."""
+    def save(self, path: str | Path, mode: str | None = None) -> None:
+        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json.
+
+        The mode of a .vtu file is ``binary`` (the default), ``compressed`` or ``ascii``.
+        """
         from kratos_lite.io.results import write_result
 
-        write_result(path, self)
+        write_result(path, self, mode)
 
     def plot(self, path: str | Path, values: str = "VON_MISES_STRESS") -> None:
         """Write a picture (.png) of the deformed body coloured by a nodal field."""

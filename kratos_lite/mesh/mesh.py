@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh import topology
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Floats,
+    Ints,
+    Part,
+    distinct,
+    rows_of_ids,
+    select,
+    without_repeats,
+)
 from kratos_lite.mesh.connections import Faces
 
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
@@ -175,8 +185,7 @@ class Mesh:
         rows = chosen.astype(np.int64).ravel()
         if len(rows) and (rows.min() < 0 or rows.max() >= self.n_nodes):
             raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows.min()} … {rows.max()}")
-        _, first = np.unique(rows, return_index=True)
-        return rows[np.sort(first)]
+        return without_repeats(rows)
 
     def used_nodes(self) -> NDArray[np.bool_]:
         """Return a mask (n,) of the nodes that belong to an element."""
@@ -197,7 +206,7 @@ class Mesh:
             rows = np.flatnonzero(ids == where)
             if not len(rows):
                 raise MeshError(
-                    f"no element has property {where}; the properties are {np.unique(ids).tolist()}"
+                    f"no element has property {where}; the properties are {distinct(ids).tolist()}"
                 )
             return rows
         if isinstance(where, str):
