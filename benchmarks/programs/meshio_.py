@@ -1,0 +1,18 @@
+"""meshio: reads the `.mdpa` file, nothing more."""
+
+from __future__ import annotations
+
+from benchmarks.programs.common import Array, Job, run
+
+
+def work(job: Job) -> Array | None:
+    """Do the job."""
+    with job.phase("import"):
+        import meshio
+    job.answer["version"] = meshio.__version__
+    with job.phase("read"):
+        meshio.read(f"{job.stem}.mdpa")
+
+
+if __name__ == "__main__":
+    run(work)

@@ -1,0 +1,398 @@
+"""From rows to tables, ratios, sentences, the picture, and docs/benchmarks.md."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Row = dict[str, Any]
+LEVELS = (1e-2, 1e-3, 1e-4)
+SOLVER_PHASES = ("setup", "set-up", "solve")
+"""Phases of a report that belong to the linear solver."""
+OURS, THEIRS = "kratos_lite", "Kratos"
+
+
+def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table, or "" without rows.
+
+    >>> print(table(["a", "b"], [["1", "2"]]))
+    | a | b |
+    | --- | --- |
+    | 1 | 2 |
+    <BLANKLINE>
+    """
+    lines = ["| " + " | ".join(row) + " |" for row in body]
+    if not lines:
+        return ""
+    return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines]) + "\n"
+
+
+def ratio(ours: float | None, theirs: float | None) -> str:
+    """Return ours / theirs in two digits."""
+    return f"{ours / theirs:.2g}" if ours and theirs else ""
+
+
+def seconds(value: float | None) -> str:
+    """Return a time in three digits; three decimals are enough below a second."""
+    if value is None:
+        return ""
+    return f"{value:.3f}" if value < 1 else f"{value:.3g}"
+
+
+def linear_solver(row: Row) -> float | None:
+    """Return the seconds of the linear solver of a row."""
+    found = [s for name, s in row.get("phases", {}).items() if name in SOLVER_PHASES]
+    return sum(found) if found else None
+
+
+def of(rows: Iterable[Row], group: str) -> list[Row]:
+    """Return the rows of a group that hold measurements."""
+    return [row for row in rows if row["group"] == group and "failed" not in row]
+
+
+def by_place(rows: Iterable[Row]) -> dict[tuple[str, str, int], dict[str, Row]]:
+    """Return the rows of each scene, kind and size by program."""
+    found: dict[tuple[str, str, int], dict[str, Row]] = defaultdict(dict)
+    for row in rows:
+        found[row["scene"], row["kind"], row["n"]][row["program"]] = row
+    return dict(found)
+
+
+def label(place: tuple[str, str, int]) -> str:
+    """Return the name of a scene, kind and size."""
+    scene, kind, n = place
+    return " ".join(word for word in (scene, kind, f"n = {n}" if n else "") if word)
+
+
+# ---- goal rows -------------------------------------------------------------------------------------
+
+
+def goals(rows: Sequence[Row]) -> str:
+    """Return whole processes beside Kratos: seconds, memory, and their ratios."""
+    body = []
+    for place, found in by_place(rows).items():
+        ours, theirs = found.get(OURS), found.get(THEIRS)
+        if ours is None:
+            continue
+        other = theirs or {}
+        numpy = found.get("kratos_lite NumPy", {})
+        difference = other.get("errors", {}).get("difference")
+        body.append(
+            [
+                label(place),
+                str(ours.get("unknowns", "")),
+                seconds(ours["process"]),
+                seconds(numpy.get("process")),
+                seconds(other.get("process")),
+                ratio(ours["process"], other.get("process")),
+                f"{ours['peak'] / 1e6:.0f}",
+                f"{other['peak'] / 1e6:.0f}" if other else "",
+                ratio(ours["peak"], other.get("peak")),
+                ratio(linear_solver(ours), linear_solver(other)),
+                "" if difference is None else f"{difference:.0e}",
+            ]
+        )
+    head = [
+        "scene",
+        "unknowns",
+        "kratos_lite s",
+        "NumPy s",
+        "Kratos s",
+        "time",
+        "kratos_lite MB",
+        "Kratos MB",
+    ]
+    return table([*head, "memory", "solver", "difference"], body)
+
+
+def phases(rows: Sequence[Row], scale: float = 1.0) -> str:
+    """Return the phases of every row, in seconds."""
+    names = list(dict.fromkeys(name for row in rows for name in row.get("phases", {}) if name != "answer"))
+    body = [
+        [
+            label((row["scene"], row["kind"], row["n"])),
+            row["program"],
+            *(seconds(row["phases"].get(name)) for name in names),
+            seconds(row["process"]),
+        ]
+        for row in rows
+    ]
+    return table(["scene", "program", *names, "process"], body)
+
+
+# ---- time against error ------------------------------------------------------------------------------
+
+
+def curves(rows: Iterable[Row]) -> dict[tuple[str, str, str], tuple[np.ndarray, np.ndarray]]:
+    """Return seconds and errors, by rising size, of each scene, program and element kind."""
+    points: dict[tuple[str, str, str], list[tuple[int, float, float]]] = defaultdict(list)
+    for row in rows:
+        error = row.get("errors", {}).get("displacement")
+        if error is not None:
+            points[row["scene"], row["program"], row["kind"]].append((row["n"], row["work"], error))
+    made = {}
+    for key, found in points.items():
+        ordered = np.array(sorted(found))
+        made[key] = ordered[:, 1], np.maximum(ordered[:, 2], 1e-16)
+    return made
+
+
+def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, bool] | None:
+    """Return the seconds to an error, on straight lines between log time and log error.
+
+    The second value is True where the smallest size measured already reaches it, so that the time is
+    an upper bound.  None where no size reaches it.
+
+    >>> time_to(1e-2, np.array([1.0, 4.0]), np.array([1e-1, 1e-3]))
+    (2.0, False)
+    """
+    reached = np.flatnonzero(found <= level)
+    if not len(reached):
+        return None
+    i = int(reached[0])
+    if i == 0:
+        return float(times[0]), True
+    t, e = np.log(times[i - 1 : i + 1]), np.log(found[i - 1 : i + 1])
+    share = (np.log(level) - e[0]) / (e[1] - e[0])
+    return float(np.exp(t[0] + share * (t[1] - t[0]))), False
+
+
+def time_to_error(rows: Iterable[Row]) -> str:
+    """Return the table of seconds to each error per scene, program and element."""
+    body = []
+    for (scene, program, kind), (times, found) in curves(rows).items():
+        cells = []
+        for level in LEVELS:
+            reached = time_to(level, times, found)
+            cells.append("—" if reached is None else ("≤ " if reached[1] else "") + seconds(reached[0]))
+        body.append([scene, program, kind, *cells, f"{found.min():.1e}"])
+    return table(["scene", "program", "element", "1 %", "0.1 %", "0.01 %", "least error"], body)
+
+
+def cheapest(rows: Iterable[Row], program: str = OURS) -> list[str]:
+    """Return one sentence per scene: which element costs least for an error that most of them reach."""
+    by_scene: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = defaultdict(dict)
+    for (scene, name, kind), curve in curves(rows).items():
+        if name == program:
+            by_scene[scene][kind] = curve
+    return [_sentence(scene, kinds) for scene, kinds in by_scene.items()]
+
+
+def _sentence(scene: str, kinds: dict[str, tuple[np.ndarray, np.ndarray]]) -> str:
+    for level in reversed(LEVELS):
+        reached = {kind: time_to(level, *curve) for kind, curve in kinds.items()}
+        times = {kind: found[0] for kind, found in reached.items() if found is not None}
+        if len(times) >= 2 or (times and level == LEVELS[0]):
+            break
+    else:
+        best = min(kinds, key=lambda kind: kinds[kind][1].min())
+        error = kinds[best][1].min()
+        return f"{scene}: no element reaches 1 % at these sizes; {best} comes closest ({error:.1e})."
+    order = sorted(times, key=lambda kind: times[kind])
+    rest = ", ".join(f"{kind} takes {times[kind] / times[order[0]]:.2g} times as long" for kind in order[1:])
+    missing = [kind for kind in kinds if kind not in times]
+    text = f"{scene}: for an error of {level:.2%} take {order[0]} ({seconds(times[order[0]])} s)"
+    text += f"; {rest}" if rest else ""
+    return text + (f"; {', '.join(missing)} do not reach it." if missing else ".")
+
+
+def picture(rows: Sequence[Row], path: Path) -> None:
+    """Draw log error over log seconds: one field per scene, one curve per program and element."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    found = curves(rows)
+    scenes = list(dict.fromkeys(scene for scene, _, _ in found))
+    programs = list(dict.fromkeys(program for _, program, _ in found))
+    kinds = list(dict.fromkeys(kind for _, _, kind in found))
+    if not scenes:
+        return
+    columns = min(3, len(scenes))
+    lines = -(-len(scenes) // columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(5 * columns, 4 * lines), squeeze=False)
+    for ax in axes.ravel()[len(scenes) :]:
+        ax.axis("off")
+    for (scene, program, kind), (times, error) in found.items():
+        ax = axes.ravel()[scenes.index(scene)]
+        ax.loglog(
+            times,
+            error,
+            color=f"C{programs.index(program)}",
+            marker="ov^sD"[kinds.index(kind) % 5],
+            linewidth=2.0 if program == OURS else 0.8,
+            markersize=4,
+        )
+    for scene, ax in zip(scenes, axes.ravel(), strict=False):
+        ax.set(title=scene, xlabel="seconds (read … solve)", ylabel="relative error of displacement")
+        ax.grid(True, which="both", alpha=0.2)
+    handles = [plt.Line2D([], [], color=f"C{i}", label=name) for i, name in enumerate(programs)]
+    handles += [
+        plt.Line2D([], [], color="k", linestyle="", marker="ov^sD"[i % 5], label=kind)
+        for i, kind in enumerate(kinds)
+    ]
+    figure.legend(handles=handles, loc="lower center", ncols=8, fontsize="small")
+    figure.tight_layout(rect=(0, 0.06 if lines > 1 else 0.12, 1, 1))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+# ---- growth and the rest -----------------------------------------------------------------------------
+
+
+def exponent(unknowns: Sequence[float], values: Sequence[float]) -> float:
+    """Return p of the fit values ~ unknowns^p.
+
+    >>> round(exponent([1, 10, 100], [2, 20, 200]), 6)
+    1.0
+    """
+    return float(np.polyfit(np.log(unknowns), np.log(values), 1)[0])
+
+
+def growth(rows: Sequence[Row]) -> str:
+    """Return iterations, seconds and bytes per degree of freedom by size, with the fitted exponent."""
+    body = [
+        [
+            row["program"],
+            row["kind"],
+            str(row["n"]),
+            str(row.get("unknowns", "")),
+            str(row.get("iterations", "")),
+            seconds(row["work"]),
+            f"{1e6 * row['work'] / row['unknowns']:.3g}",
+            f"{row['peak'] / row['unknowns']:.0f}",
+        ]
+        for row in rows
+        if row.get("unknowns")
+    ]
+    text = table(
+        ["program", "element", "n", "unknowns", "iterations", "s", "µs per unknown", "B per unknown"], body
+    )
+    for program, kind in dict.fromkeys((row["program"], row["kind"]) for row in rows):
+        mine = [
+            r for r in rows if (r["program"], r["kind"]) == (program, kind) and r.get("unknowns", 0) > 20_000
+        ]
+        if len(mine) > 1:
+            p = exponent([r["unknowns"] for r in mine], [r["work"] for r in mine])
+            text += f"\n{program}, {kind}: seconds grow as unknowns^{p:.2f} (fit above 20 000 unknowns).\n"
+    return text
+
+
+def compared(rows: Sequence[Row], names: Sequence[str], process: bool = False) -> str:
+    """Return phases of all programs on each scene, with the ratio of kratos_lite to each of them."""
+    body = []
+    for place, found in by_place(rows).items():
+        ours = found.get(OURS)
+        for program, row in found.items():
+            times = {name: row["phases"].get(name) for name in names}
+            times |= {"process": row["process"]} if process else {}
+            mine = {name: ours["phases"].get(name) for name in names} if ours else {}
+            mine |= {"process": ours["process"]} if ours and process else {}
+            cells = [
+                seconds(t)
+                + (f" ({ratio(mine.get(name), t)})" if t and mine.get(name) and row is not ours else "")
+                for name, t in times.items()
+            ]
+            body.append([label(place), program, *cells])
+    return table(["scene", "program", *names, *(["process"] if process else [])], body)
+
+
+def skips(rows: Sequence[Row]) -> str:
+    """Return what each skip is worth: seconds and memory beside the row it is compared with."""
+    pairs = {"half_unloaded": "two_bodies", "unreferenced": "block", "unloaded": "block", "block": "block"}
+    plain = {row["scene"]: row for row in rows if row["variant"] in ("plain", "two bodies, both loaded")}
+    body = []
+    for row in rows:
+        base = plain.get(pairs.get(row["scene"], row["scene"]))
+        time = ratio(row["process"], base["process"]) if base else ""
+        memory = ratio(row["peak"], base["peak"]) if base else ""
+        name = label((row["scene"], row["kind"], row["n"]))
+        body.append([row["variant"], name, seconds(row["process"]), time, f"{row['peak'] / 1e6:.0f}", memory])
+    return table(["what", "scene", "process s", "of plain", "MB", "of plain"], body)
+
+
+def failures(rows: Iterable[Row]) -> str:
+    """Return what did not end well."""
+    return table(
+        ["scene", "program", "what happened"],
+        [[label((r["scene"], r["kind"], r["n"])), r["program"], r["failed"]] for r in rows if "failed" in r],
+    )
+
+
+SECTIONS = {
+    "goal": ("From `.mdpa` to a result file, whole processes", goals),
+    "case": ("Real scenes, whole processes", goals),
+    "error": ("Run time against error", time_to_error),
+    "growth": ("Growth: the clamped block up to the memory", growth),
+    "assembly": ("Assembly alone", lambda rows: compared(rows, ("pattern", "matrix", "matrix, again"))),
+    "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read",), process=True)),
+    "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
+    "skips": ("What need not be computed", skips),
+}
+"""Title and table of each group of rows."""
+NOTES = {
+    "goal": "Ratios are kratos_lite / Kratos. Goals: time ≤ 0.5, memory ≤ 0.6, solver (set-up and solve) ≤ 0.6.",
+    "case": "Ratios are kratos_lite / Kratos; the files are small, so this is starting, reading and writing.",
+    "error": "Seconds from reading to the solution (without start and output) to relative errors of "
+    "displacement; ≤ where the smallest size measured is already better, — where the largest is not good enough.",
+    "growth": "Goal: at most 2000 B per unknown for 8N.",
+    "assembly": "Seconds, in brackets kratos_lite / program. Programs without a pattern of their own make it "
+    "within the matrix; `again` is the shortest of further times.",
+    "parse": "Seconds, in brackets kratos_lite / program.",
+    "cube1": "Seconds, in brackets kratos_lite / program; `import numpy` is a process that does that alone.",
+    "skips": "Whole processes; the ratio is to the plain row of the same scene.",
+}
+
+
+def text(rows: Sequence[Row]) -> str:
+    """Return all tables of the rows as Markdown."""
+    parts = []
+    for group, (title, make) in SECTIONS.items():
+        mine = of(rows, group)
+        body = make(mine) if mine else ""
+        if not body:
+            continue
+        parts += [f"## {title}\n", NOTES[group] + "\n", body]
+        if group == "goal":
+            parts += ["Phases in seconds:\n", phases(mine)]
+        if group == "error":
+            sentences = cheapest(mine)
+            parts += ["### Which element\n", *(f"- {sentence}" for sentence in sentences), ""]
+    if lost := failures(rows):
+        parts += ["## What did not end well\n", lost]
+    return "\n".join(parts)
+
+
+def page(kept: Sequence[dict[str, Any]], image: str = "images/benchmark.png") -> str:
+    """Return docs/benchmarks.md of the results kept."""
+    rows = [row for found in kept for row in found["rows"]]
+    lines = [
+        "# Benchmarks\n",
+        "This page is made by `python -m benchmarks report` from `benchmarks/results/`; what is measured "
+        "and how is stated in [the charter](../benchmarks/README.md). Compare ratios, not seconds: each "
+        "table is from one run, in which the programs took turns.\n",
+        table(
+            ["run", "date", "machine", "versions"],
+            [
+                [
+                    f"`{found['command']}`",
+                    found["date"],
+                    f"{found['machine']['processor']}, {found['machine']['cores']} cores",
+                    ", ".join(f"{name} {version}" for name, version in found["versions"].items()),
+                ]
+                for found in kept
+            ],
+        ),
+    ]
+    body = text(rows)
+    if of(rows, "error"):
+        picture_line = f"![Error over seconds, one curve per program and element]({image})\n"
+        title = f"## {SECTIONS['error'][0]}\n"
+        body = body.replace(title, f"{title}\n{picture_line}", 1)
+    return "\n".join([*lines, body])
