@@ -37,7 +37,9 @@ def quick(options: argparse.Namespace, folder: Path) -> list[Run]:
 
 def kratos(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return the goal rows and the real scenes."""
-    goals = [goal for goal in sets.GOALS if goal[2] in (options.cells or (goal[2],))]
+    goals = sets.GOALS
+    if options.cells:
+        goals = tuple((*kind, n) for kind in dict.fromkeys(goal[:2] for goal in goals) for n in options.cells)
     given = options.cases
     files = cases.prepared(given, folder) if given.is_dir() else []
     return sets.goal_runs(options.programs, goals) + sets.case_runs(options.programs, files)
@@ -119,7 +121,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     add("--cells", nargs="+", type=int, metavar="N", help="cells along an edge, in place of those of the set")
     add("--repeats", type=int, metavar="N", help="runs of each measurement; their median counts")
     add("--python", action="append", default=[], metavar="[PROGRAM=]PATH",
-        help="interpreter of all programs but kratos_lite, or of one; or KRATOS_LITE_BENCH_PYTHON")  # fmt: skip
+        help="interpreter of the other programs, or of one; or KRATOS_LITE_BENCH_PYTHON")  # fmt: skip
     add("--cases", type=Path, default=ROOT.parent / "shared" / "cases", metavar="FOLDER",
         help="real scenes, each a folder with case.json")  # fmt: skip
     add("--limit", type=float, default=1800.0, metavar="SECONDS", help="after which one run is stopped")

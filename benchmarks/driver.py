@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import statistics
 import subprocess
 import sys
@@ -140,7 +141,7 @@ class Driver:
 
     def python(self, program: str) -> str:
         """Return the interpreter of a program."""
-        if program.startswith("kratos_lite"):
+        if program.startswith("kratos_lite") or program == "pyamg":
             return self.pythons.get("kratos_lite", sys.executable)
         return self.pythons.get(program, self.pythons.get("", sys.executable))
 
@@ -211,7 +212,8 @@ class Driver:
         return dict(json.loads(report.read_text()))
 
     def _last_words(self) -> str:
-        lines = (self.folder / "output.txt").read_text(errors="replace").strip().splitlines()
+        output = (self.folder / "output.txt").read_text(errors="replace")
+        lines = re.sub(r"(/[^/\s'\"]+)+/", "", output).strip().splitlines()  # no paths of this machine
         return "failed: " + (lines[-1][:200] if lines else "without a word")
 
     def _errors(self, run: Run, u: np.ndarray) -> dict[str, float]:

@@ -61,8 +61,8 @@ def takes(program: str, scene: str, kind: str) -> bool:
 
 
 def goal_runs(programs: Sequence[str], goals: Iterable[tuple[str, str, int]] = GOALS) -> list[Run]:
-    """Return whole processes from `.mdpa` to VTK files: kratos_lite and Kratos."""
-    chosen = [program for program in FROM_FILES if program in programs]
+    """Return whole processes from `.mdpa` to VTK files, and pyamg as it comes for its solver alone."""
+    chosen = [program for program in (*FROM_FILES, "pyamg") if program in programs]
     options = (("write", True),)
     return [Run("goal", program, *goal, options=options) for goal in goals for program in chosen]
 
@@ -88,7 +88,7 @@ def error_runs(
                 runs += [
                     Run("error", program, scene, kind, n, options=options)
                     for program in programs
-                    if takes(program, scene, kind)
+                    if program in PROGRAMS and takes(program, scene, kind)
                 ]
     return runs
 
@@ -117,7 +117,7 @@ def growth_runs(
 
 def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None, repeat: int = 4) -> list[Run]:
     """Return pattern and matrix alone, on the clamped block."""
-    wanted = [p for p in programs if p != "CalculiX"]
+    wanted = [p for p in programs if p in PROGRAMS and p != "CalculiX"]
     return [
         Run("assembly", program, "block", kind, n, "assembly", (("repeat", repeat),))
         for kind, n in (sizes or ASSEMBLY).items()

@@ -19,7 +19,8 @@ DIRECT_LIMIT = 30_000
 
 def work(job: Job) -> Array | None:
     """Do the job."""
-    program = shutil.which("ccx")
+    with job.phase("import"):
+        program = shutil.which("ccx")
     if program is None:
         raise ModuleNotFoundError("the program ccx is not there")
     job.answer["version"] = version(program)

@@ -172,15 +172,20 @@ def rigid_modes(points: Array) -> Array:
     return modes.reshape(-1, 6)
 
 
+def uncoupled(K: Any, free: NDArray[np.bool_]) -> Any:
+    """Return a copy of a CSR matrix whose rows and columns that are not free hold their diagonal alone."""
+    rows = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
+    K = K.copy()
+    K.data = np.where((free[rows] & free[K.indices]) | (rows == K.indices), K.data, 0.0)
+    return K
+
+
 def _multigrid(job: Job, K: Any, free: NDArray[np.bool_], b: Array) -> Array:
     """Solve by the fastest settings of pyamg that were measured; fixed components stay in, uncoupled."""
     import pyamg
     import scipy.sparse as sp
 
-    rows = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
-    K = K.copy()
-    K.data = np.where((free[rows] & free[K.indices]) | (rows == K.indices), K.data, 0.0)
-    A = sp.bsr_matrix(K, blocksize=(3, 3))
+    A = sp.bsr_matrix(uncoupled(K, free), blocksize=(3, 3))
     smoother = ("chebyshev", {"degree": 2, "iterations": 1})
     hierarchy = pyamg.smoothed_aggregation_solver(
         A,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ def work(job: Job) -> Array | None:
         import KratosMultiphysics.LinearSolversApplication
         import KratosMultiphysics.StructuralMechanicsApplication as SMA
     KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
-    job.answer["version"] = KM.KratosGlobals.Kernel.Version()
+    job.answer["version"] = ".".join(re.findall(r"\d+", KM.KratosGlobals.Kernel.Version())[:3])
     with job.phase("read"):
         part = read(job, KM, SMA)
     if job.task == "parse":
@@ -104,8 +105,8 @@ def solve(job: Job, KM: Any, part: Any) -> None:
         scheme.Update(part, builder.GetDofSet(), A, x, b)
         builder.CalculateReactions(scheme, part, A, x, b)
     job.answer["unknowns"] = b.Size()
-    if hasattr(solver, "GetIterationsNumber"):
-        job.answer["iterations"] = solver.GetIterationsNumber()
+    if iterations := solver.GetIterationsNumber():
+        job.answer["iterations"] = iterations
 
 
 def build(space: Any, builder: Any, scheme: Any, part: Any, A: Any, b: Any) -> None:

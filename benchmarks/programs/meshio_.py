@@ -1,4 +1,4 @@
-"""meshio: reads the `.mdpa` file, nothing more."""
+"""meshio: reads nodes and cells of the `.mdpa` file (elements get a wrong cell type, but are read)."""
 
 from __future__ import annotations
 
