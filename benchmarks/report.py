@@ -247,8 +247,9 @@ def picture(rows: Sequence[Row], path: Path) -> None:
         plt.Line2D([], [], color="k", linestyle="", marker="ov^sD"[i % 5], label=kind)
         for i, kind in enumerate(kinds)
     ]
-    figure.legend(handles=handles, loc="lower center", ncols=8, fontsize="small")
-    figure.tight_layout(rect=(0, 0.06 if lines > 1 else 0.12, 1, 1))
+    across = 3 * columns
+    figure.legend(handles=handles, loc="lower center", ncols=across, fontsize="small")
+    figure.tight_layout(rect=(0, (0.2 + 0.25 * -(-len(handles) // across)) / (4 * lines), 1, 1))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
     plt.close(figure)
