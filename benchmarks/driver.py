@@ -100,11 +100,16 @@ class Driver:
             failed = {row["program"] for row in made if "failed" in row}
             beyond |= {run.series for run in here if run.program in failed}
             rows += made
-            for place in {run.place for run in here} & set(self.stems):
-                stem = self.stems.pop(place)
-                for old in stem.parent.glob(f"{stem.name}.*"):
-                    old.unlink()
+            for place in {run.place for run in here}:
+                self._forget(place)
         return rows
+
+    def _forget(self, place: tuple[str, str, int]) -> None:
+        """Remove the files and the solution of a scene."""
+        self.reference.pop(place, None)
+        if (stem := self.stems.pop(place, None)) is not None:
+            for old in stem.parent.glob(f"{stem.name}.*"):
+                old.unlink()
 
     def _interleaved(self, runs: list[Run]) -> list[dict[str, Any]]:
         found: dict[int, list[dict[str, Any]]] = {i: [] for i in range(len(runs))}

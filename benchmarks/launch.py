@@ -16,14 +16,15 @@ def main() -> None:
     report, limit, memory, command = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
     resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
     start = time.perf_counter()
-    child = os.posix_spawnp(command[0], command, os.environ)
+    child = os.posix_spawnp(command[0], command, os.environ, setpgroup=0)
     late = []
 
     def stop(*_: object) -> None:
         late.append(True)
-        os.kill(child, signal.SIGKILL)
+        os.killpg(child, signal.SIGKILL)  # what it started, too
 
-    signal.signal(signal.SIGALRM, stop)
+    for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     signal.setitimer(signal.ITIMER_REAL, limit)
     _, status, usage = os.wait4(child, 0)
     seconds = time.perf_counter() - start

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks import __main__ as command  # noqa: E402
-from benchmarks import cases, driver, errors, fields, report, scenes, sets  # noqa: E402
+from benchmarks import cases, curves, driver, errors, fields, meshes, report, scenes, sets, tables  # noqa: E402
 from benchmarks.programs import PROGRAMS  # noqa: E402
 
 E, NU = 1.0, 0.3
@@ -219,12 +219,12 @@ def rows_of(times):
 def test_sentence_names_the_cheapest_element():
     bricks = {"8N": [(1.0, 0.1), (100.0, 0.001)], "27N": [(1.0, 0.01), (2.0, 0.001)]}
     rows = rows_of(bricks | {"4N": [(1.0, 0.9)]})
-    (sentence,) = report.cheapest(rows)
+    (sentence,) = curves.cheapest(rows)
     assert sentence.startswith("s: for an error of 0.10% take 27N (2 s); 8N takes 50 times as long;")
     assert sentence.endswith("; 4N do not reach it.")
-    assert "| s | kratos_lite | 8N | 10 | 100 | — | 1.0e-03 |" in report.time_to_error(rows)
-    assert report.time_to(1e-4, np.array([1.0]), np.array([1e-3])) is None
-    assert report.time_to(1e-2, np.array([1.0]), np.array([1e-3])) == (1.0, True)
+    assert "| s | kratos_lite | 8N | 10 | 100 | — | 1.0e-03 |" in curves.time_to_error(rows)
+    assert curves.time_to(1e-4, np.array([1.0]), np.array([1e-3])) is None
+    assert curves.time_to(1e-2, np.array([1.0]), np.array([1e-3])) == (1.0, True)
 
 
 def test_goal_table_gives_ratios():
@@ -236,7 +236,7 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [report, sets, scenes, command])
+@pytest.mark.parametrize("module", [curves, tables, meshes, sets, command])
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 

@@ -122,7 +122,7 @@ def solve(job: Job, K: Any, dofs: NDArray[np.int64]) -> Array:
 
         direct = _direct(int((~job.fixed).sum()))
         if not direct:
-            import pyamg  # noqa: F401
+            need_pyamg()
     with job.phase("constrain"):
         order = dofs.ravel()
         K = sp.csr_matrix(K)
@@ -159,6 +159,14 @@ def _direct(unknowns: int) -> Callable[[Any, Array], Array] | None:
         return np.asarray(factors.solve(b))
 
     return factorised
+
+
+def need_pyamg() -> None:
+    """Import pyamg; a program that is there but has no solver fails rather than being absent."""
+    try:
+        import pyamg  # noqa: F401
+    except ImportError:
+        raise RuntimeError(f"more than {DIRECT_LIMIT} unknowns need pyamg in this interpreter") from None
 
 
 def rigid_modes(points: Array) -> Array:
