@@ -6,14 +6,14 @@ A machine without a compiler installs the package all the same and computes with
 import sys
 from pathlib import Path
 
-from pybind11.setup_helpers import ParallelCompile, Pybind11Extension, naive_recompile
+from pybind11.setup_helpers import Pybind11Extension
 from setuptools import setup
 
 NATIVE = Path("kratos_lite/native")
 FLAGS = ["/O2"] if sys.platform == "win32" else ["-O3", "-pthread", "-fno-math-errno", "-Wall", "-Wextra"]
 
-ParallelCompile("MAX_JOBS", default=2, needs_recompile=naive_recompile).install()
 setup(
+    options={"build_ext": {"parallel": 2}},
     ext_modules=[
         Pybind11Extension(
             f"kratos_lite.native._{source.stem}",
