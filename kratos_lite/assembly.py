@@ -1,57 +1,71 @@
-"""Assembly: element matrices into one sparse matrix of 3x3 node blocks.
+"""Assembly: element matrices into one sparse matrix of node blocks.
 
-The sparsity pattern is made from the node graph, once for each connectivity; element matrices are computed in
-cache-sized chunks and added at known positions.  Neither all element matrices nor a triplet
-list of the whole model ever exists.
+The sparsity pattern is made from the node graph, once for each connectivity.  Compiled, elements are
+computed and added a few at a time by several threads; in NumPy, element matrices are computed in
+cache-sized chunks and added at known positions.  Neither all element matrices nor a triplet list of
+the whole model ever exists.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.batches import Batch, add_nodal
+from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear import lame_constants, tabulate
+from kratos_lite.native import kernels
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int32]
 SCATTER_BYTES = 64_000_000
 """Memory of the element matrices that are added to the global matrix at once."""
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the share that is done, 0 … 1."""
+CONSTANT_JACOBIANS = "constant Jacobians"
+Kernel = Callable[[KinematicLinear], Array]
+"""Gives matrices (m, k, k) of elements."""
 
 
 class Pattern:
-    """Sparsity of the node graph in rows of node blocks, with the place of every element entry.
+    """Sparsity of the node graph in rows of node blocks.
 
     Parameters
     ----------
     n_nodes : number of nodes.
     connectivity : (m, k) node rows of each group of elements.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int32, where the row of each node starts; nodes without elements have empty rows.
+    indices : (nnz,) int32, sorted within a row: the nodes that share an element with it.
     """
 
-    def __init__(self, n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> None:
-        from scipy.sparse import csr_array, hstack
-
-        groups = []
-        for nodes in connectivity:
-            m, k = nodes.shape
-            pointer = np.arange(0, m * k + 1, k)
-            # booleans, as the product only asks whether two nodes share an element, however many
-            ones = np.ones(m * k, dtype=bool)
-            groups.append(csr_array((ones, nodes.ravel(), pointer), shape=(m, n_nodes)).T)
-        incidence = hstack(groups, format="csr", dtype=bool)
-        graph = (incidence @ incidence.T).tocsr()
-        graph.sort_indices()
+    def __init__(self, n_nodes: int, connectivity: Sequence[Ints]) -> None:
         self.n_nodes = n_nodes
-        self.indptr, self.indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
-        rows = np.repeat(np.arange(n_nodes, dtype=np.int64), np.diff(self.indptr))
-        keys = rows * n_nodes + self.indices
-        self.positions = [self._find(keys, nodes) for nodes in connectivity]
+        self.connectivity = [np.ascontiguousarray(nodes, dtype=np.int32) for nodes in connectivity]
+        module = kernels("stiffness")
+        make = module.pattern if module else _pattern
+        self.indptr: Ints
+        self.indices: Ints
+        self.indptr, self.indices = make(n_nodes, self.connectivity)
 
-    def _find(self, keys: NDArray[np.int64], nodes: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the position of each node pair of each element, (m, k, k)."""
+    @cached_property
+    def positions(self) -> list[Ints]:
+        """Position of each node pair of each element, (m, k, k) of each group."""
+        rows = np.repeat(np.arange(self.n_nodes, dtype=np.int64), np.diff(self.indptr))
+        keys = rows * self.n_nodes + self.indices
+        return [self._find(keys, nodes) for nodes in self.connectivity]
+
+    def _find(self, keys: NDArray[np.int64], nodes: Ints) -> Ints:
         m, k = nodes.shape
         found = np.zeros((m, k, k), dtype=np.int32)
         step = max(1, 1_000_000 // (k * k))
@@ -64,6 +78,31 @@ class Pattern:
             found[start : start + step] = place
         return found
 
+    def add(self, data: Array, group: int, window: slice, matrices: Array) -> None:
+        """Add matrices of some elements of a group: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
+        if module := kernels("stiffness"):
+            matrices = np.ascontiguousarray(matrices)
+            module.add_matrices(self.connectivity[group][window], matrices, self.indptr, self.indices, data)
+        else:
+            _add_blocks(data, self.positions[group][window], matrices)
+
+
+def _pattern(n_nodes: int, connectivity: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """Return rows (indptr, indices) of the nodes that share an element."""
+    from scipy.sparse import csr_array, hstack
+
+    groups = []
+    for nodes in connectivity:
+        m, k = nodes.shape
+        pointer = np.arange(0, m * k + 1, k)
+        # booleans, as the product only asks whether two nodes share an element, however many
+        ones = np.ones(m * k, dtype=bool)
+        groups.append(csr_array((ones, nodes.ravel(), pointer), shape=(m, n_nodes)).T)
+    incidence = hstack(groups, format="csr", dtype=bool)
+    graph = (incidence @ incidence.T).tocsr()
+    graph.sort_indices()
+    return graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
+
 
 class PatternCache:
     """The last pattern made, for as long as the connectivity stays the same."""
@@ -72,7 +111,7 @@ class PatternCache:
         self._key: tuple[int, ...] = ()
         self._pattern: Pattern | None = None
 
-    def get(self, n_nodes: int, connectivity: Sequence[NDArray[np.int32]]) -> Pattern:
+    def get(self, n_nodes: int, connectivity: Sequence[Ints]) -> Pattern:
         """Return the pattern of this connectivity, made anew only if it differs from the last."""
         key = (n_nodes, *(hash((nodes.shape, nodes.tobytes())) for nodes in connectivity))
         if self._pattern is None or key != self._key:
@@ -80,34 +119,115 @@ class PatternCache:
         return self._pattern
 
 
-def _add_blocks(data: Array, positions: NDArray[np.int32], matrices: Array) -> None:
-    """Add element matrices (m, 3, k, 3, k) to node blocks `data` (nnz, 3, 3)."""
+def _add_blocks(data: Array, positions: Ints, matrices: Array) -> None:
+    """Add element matrices to node blocks `data`; see `Pattern.add`."""
+    from scipy.sparse import csc_array
+
     low, high = int(positions.min()), int(positions.max()) + 1
     flat = positions.ravel() - low
-    for i in range(3):
-        for j in range(3):
-            weights = matrices[:, i, :, j, :].ravel()
-            data[low:high, i, j] += np.bincount(flat, weights=weights, minlength=high - low)
+    # the matrix that takes each block to its place, by columns: a product adds one block after the other
+    selection = csc_array((np.ones(len(flat)), flat, np.arange(len(flat) + 1)), shape=(high - low, len(flat)))
+    total = np.asarray(selection @ matrices.reshape(len(flat), -1))
+    data[low:high] += total.reshape(data[low:high].shape)
 
 
 def assemble_stiffness(
-    points: Array, batches: Sequence[Batch], pattern: Pattern, progress: Progress | None = None
+    points: Array,
+    batches: Sequence[Batch],
+    pattern: Pattern,
+    progress: Progress | None = None,
+    skipped: set[str] | None = None,
 ) -> BlockMatrix:
-    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
+    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m.
+
+    `skipped` collects what made a part of the work unnecessary, in words for the report.
+    """
     data = np.zeros((len(pattern.indices), 3, 3))
+    points = np.ascontiguousarray(points, dtype=float)
+    module = kernels("stiffness")
     done, total = 0, sum(len(batch) for batch in batches)
-    for batch, positions in zip(batches, pattern.positions, strict=True):
-        k = batch.nodes.shape[1]
-        for window in batch.chunks(SCATTER_BYTES):
-            matrices = np.zeros((window.stop - window.start, 3, k, 3, k))
-            for chunk in batch.chunks(within=window):
-                place = slice(chunk.start - window.start, chunk.stop - window.start)
-                matrices[place] = batch.at(points, chunk).stiffness_by_axis(batch.material.C)
-            _add_blocks(data, positions[window], matrices)
-            done += len(matrices)
+    for group, batch in enumerate(batches):
+        if module and batch.element.stiffness_from_tables():
+            parts = _compiled(module, points, batch, pattern, group, data, skipped)
+        else:
+            parts = _computed(points, batch, pattern, group, data, skipped)
+        for count in parts:
+            done += count
             if progress:
                 progress("assemble", done / total)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
+
+
+def _compiled(
+    module: Any,
+    points: Array,
+    batch: Batch,
+    pattern: Pattern,
+    group: int,
+    data: Array,
+    skipped: set[str] | None,
+) -> Iterator[int]:
+    """Add the stiffness of a batch in one compiled pass; yield the number of elements."""
+    dN = np.ascontiguousarray(tabulate(batch.element.shape, batch.rule)[1])
+    weights = np.ascontiguousarray(batch.rule.weights)
+    C = np.ascontiguousarray(lame_constants(batch.material.C) or batch.material.C, dtype=float)
+    affine = module.add_stiffness(
+        points, pattern.connectivity[group], dN, weights, C, pattern.indptr, pattern.indices, data
+    )
+    if affine and skipped is not None:
+        skipped.add(CONSTANT_JACOBIANS)
+    yield len(batch)
+
+
+def _computed(
+    points: Array, batch: Batch, pattern: Pattern, group: int, data: Array, skipped: set[str] | None
+) -> Iterator[int]:
+    """Add the stiffness of a batch computed in NumPy; yield the number of elements of each part."""
+    k = batch.nodes.shape[1]
+    for window in batch.chunks(SCATTER_BYTES):
+        matrices = np.empty((window.stop - window.start, k, k, 3, 3))
+        for chunk in batch.chunks(within=window):
+            place = slice(chunk.start - window.start, chunk.stop - window.start)
+            elements = batch.at(points, chunk)
+            matrices[place] = elements.stiffness_by_axis(batch.material.C).transpose(0, 2, 4, 1, 3)
+            if skipped is not None and elements.stiffness_from_tables() and elements.constant_jacobian:
+                skipped.add(CONSTANT_JACOBIANS)
+        pattern.add(data, group, window, matrices)
+        yield len(matrices)
+
+
+def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, kernel: Kernel) -> csr_array:
+    """Return the sum of element matrices with one number for each pair of nodes, (n, n).
+
+    Parameters
+    ----------
+    points : (n, 3) float, m.
+    batches : elements with these points.
+    pattern : the sparsity of their nodes, in the order of the batches.
+    kernel : function of elements, X (m, k, 3), that gives (m, k, k), symmetric or not.
+
+    Returns
+    -------
+    scipy.sparse.csr_array on the rows of the pattern.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box((1, 1, 1), cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
+    >>> batches = model.batches()
+    >>> pattern = Pattern(model.mesh.n_nodes, [batch.nodes for batch in batches])
+    >>> volume = assemble_scalar(model.mesh.points, batches, pattern, lambda e: e.scalar_mass())
+    >>> round(float(volume.sum()), 12)
+    1.0
+    """
+    from scipy.sparse import csr_array
+
+    data = np.zeros(len(pattern.indices))
+    for group, batch in enumerate(batches):
+        for chunk in batch.chunks():
+            pattern.add(data, group, chunk, kernel(batch.at(points, chunk)))
+    n = pattern.n_nodes
+    return csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
 
 
 def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:
@@ -122,14 +242,3 @@ def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:
             matrices = batch.at(points, chunk).stiffness_by_axis(batch.material.C)
             K += np.bincount(places, weights=matrices.ravel(), minlength=n * n)
     return K.reshape(n, n)
-
-
-def internal_load(points: Array, batches: Sequence[Batch], u: Array) -> Array:
-    """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
-    total = np.zeros_like(points)
-    for batch in batches:
-        for chunk in batch.chunks():
-            element, nodes = batch.at(points, chunk), batch.nodes[chunk]
-            stress = batch.material.stress(element.strain(u[nodes])) + batch.initial_stress(chunk)
-            add_nodal(total, nodes, element.internal_load(stress))
-    return total

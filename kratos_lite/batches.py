@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,13 @@ class Batch:
     def at(self, points: Array, chunk: slice = slice(None)) -> KinematicLinear:
         """Return the elements of a chunk, placed at `points` (n, 3)."""
         return self.element(points[self.nodes[chunk]], self.rule)
+
+    def take(self, chosen: NDArray[np.bool_]) -> Batch:
+        """Return the batch of the chosen elements, a mask (m,)."""
+        if chosen.all():
+            return self
+        stress = None if self.prestress is None else self.prestress[chosen]
+        return replace(self, nodes=self.nodes[chosen], rows=self.rows[chosen], prestress=stress)
 
     def chunks(self, memory: int = CHUNK_BYTES, within: slice | None = None) -> Iterator[slice]:
         """Cut the batch, or a slice of it, into slices whose matrices take about `memory` bytes each."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite import fields
 from kratos_lite.arguments import finite
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
@@ -57,20 +58,12 @@ class BodyForce(Load):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
         total = np.zeros_like(mesh.points)
-        mask = None
-        if self.where is not None:
-            mask = np.zeros(mesh.n_elements, dtype=bool)
-            mask[mesh.elements(self.where)] = True
+        chosen = np.zeros(mesh.n_elements, dtype=bool)
+        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
         for batch in batches:
-            b = self.per_volume(batch)
-            if not b.any():
-                continue
-            for chunk in batch.chunks():
-                nodes = batch.nodes[chunk]
-                share = batch.at(mesh.points, chunk).body_force(b if b.ndim == 1 else b[nodes])
-                if mask is not None:
-                    share = share * mask[batch.rows[chunk], None, None]
-                add_nodal(total, nodes, share)
+            b, part = self.per_volume(batch), batch.take(chosen[batch.rows])
+            if b.any() and len(part):
+                total += fields.body_force(mesh.points, part, b)
         return total
 
 

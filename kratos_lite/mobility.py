@@ -7,117 +7,73 @@ and joints are the equations that these must meet.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
+from kratos_lite.mesh.connections import Sets, corners, faces_of, set_keys
 from kratos_lite.supports import Supports, rigid_modes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 MAX_HINGED = 300
 """More bodies than this that hang together by edges or corners are taken as one."""
+FREE = 1e-7
+"""Singular value, as a share of the largest, up to which a rigid mode is free."""
+SAMPLE = 48
+"""Equations for each body that are looked at first: a few of very many show that nothing is free."""
 
 
-def components(n_nodes: int, connectivity: Sequence[NDArray[np.integer]]) -> Ints:
-    """Return for each node the smallest node row of its connected part (itself where unconnected)."""
-    labels = np.arange(n_nodes)
-    while True:
-        before = labels.copy()
-        for nodes in connectivity:
-            smallest = labels[nodes].min(axis=1)
-            np.minimum.at(labels, nodes.ravel(), np.repeat(smallest, nodes.shape[1]))
-        labels = labels[labels]
-        if (labels == before).all():
-            return labels
-
-
-@dataclass(frozen=True)
-class Faces:
-    """Every face of every element, with keys that are equal for equal sets of nodes.
-
-    Attributes
-    ----------
-    element : (f,) int, row of the element.
-    corners, nodes : (f,) keys of the corner nodes and of all nodes.
-    """
-
-    element: Ints
-    corners: NDArray[np.uint64]
-    nodes: NDArray[np.uint64]
-
-    def pairs(self) -> tuple[Ints, Ints]:
-        """Return rows of faces that have the same corners, as two arrays."""
-        order = np.argsort(self.corners, kind="stable")
-        same = np.flatnonzero(self.corners[order][1:] == self.corners[order][:-1])
-        return order[same], order[same + 1]
-
-
-def node_keys(mesh: Mesh) -> NDArray[np.uint64]:
-    """Return one random number per node; sums of them tell sets of nodes apart."""
-    return np.random.default_rng(1).integers(0, 2**64, mesh.n_nodes, dtype=np.uint64)
-
-
-def all_faces(mesh: Mesh) -> Faces:
-    """Return the faces of all elements."""
-    key = node_keys(mesh)
-    element, corners, nodes = [np.zeros(0, np.int64)], [np.zeros(0, np.uint64)], [np.zeros(0, np.uint64)]
-    for block, at in with_rows(mesh.blocks):
-        for face in block.shape.faces if block.shape is not None else ():
-            mine = key[block.nodes[:, list(face)]]
-            element.append(np.arange(at.start, at.stop))
-            corners.append(mine[:, : 3 if len(face) in (3, 6) else 4].sum(axis=1))
-            nodes.append(mine.sum(axis=1))
-    return Faces(np.concatenate(element), np.concatenate(corners), np.concatenate(nodes))
-
-
-def check_joints(mesh: Mesh) -> list[str]:
+def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    key, warnings = node_keys(mesh), []
-    ids = mesh.element_ids
-    sums = np.concatenate([key[block.nodes].sum(axis=1) for block in mesh.blocks if len(block)])
-    order = np.argsort(sums, kind="stable")
-    twins = np.flatnonzero(sums[order][1:] == sums[order][:-1])
-    if len(twins):
-        a, b = sorted(ids[order[twins[0] : twins[0] + 2]].tolist())
-        warnings.append(f"{len(twins)} elements have the same nodes as another ({a} and {b}): both count")
-    faces = all_faces(mesh)
-    one, other = faces.pairs()
-    open_ = np.flatnonzero(faces.nodes[one] != faces.nodes[other])
-    if len(open_):
-        a, b = sorted((ids[faces.element[one[open_[0]]]].item(), ids[faces.element[other[open_[0]]]].item()))
+    faces = faces or mesh.all_faces()
+    warnings = []
+    one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
+    if len(one):
+        ids = mesh.element_ids
+        a, b = sorted((ids[one[0]].item(), ids[other[0]].item()))
+        warnings.append(f"{len(one)} elements have the same nodes as another ({a} and {b}): both count")
+    one, other = faces.gaping()
+    if len(one):
+        a, b = sorted(mesh.element_ids[faces.element[[one[0], other[0]]]].tolist())
         warnings.append(
-            f"{len(open_)} pairs of elements ({a} and {b}) share the corners of a face but not its further "
+            f"{len(one)} pairs of elements ({a} and {b}) share the corners of a face but not its further "
             "nodes: the face can gape; use the same order on both sides"
         )
-    halves = _halved_squares(mesh, key)
+    halves = _halved_squares(mesh)
     if len(halves):
         warnings.append(
-            f"{len(halves)} four-sided faces (the first of element {ids[halves[0]]}) meet triangles: "
-            "the faces can gape; put a pyramid or a wedge between"
+            f"{len(halves)} four-sided faces (the first of element {mesh.element_ids[halves[0]]}) meet "
+            "triangles: the faces can gape; put a pyramid or a wedge between"
         )
     return warnings
 
 
-def _halved_squares(mesh: Mesh, key: NDArray[np.uint64]) -> Ints:
+def _halved_squares(mesh: Mesh) -> Ints:
     """Return the elements with a four-sided face of which three corners are a triangular face."""
-    squares, triangles, elements = [], [], [np.zeros(0, np.int64)]
+    sizes = {len(corners(face)) for block in mesh.blocks if len(block) for face in faces_of(block)}
+    if sizes != {3, 4}:
+        return NO_ROWS
+    triangles: list[Sets] = []
+    thirds: list[Sets] = []
+    elements = [NO_ROWS]
     for block, at in with_rows(mesh.blocks):
-        for face in block.shape.faces if block.shape is not None else ():
-            if len(face) in (3, 6):
-                triangles.append(key[block.nodes[:, list(face[:3])]].sum(axis=1))
-            else:
-                squares.append(key[block.nodes[:, list(face[:4])]])
-                elements.append(np.arange(at.start, at.stop))
-    if not (squares and triangles):
-        return elements[0]
-    corner = np.concatenate(squares)
-    three = corner.sum(axis=1, keepdims=True) - corner
-    return np.concatenate(elements)[np.isin(three, np.concatenate(triangles)).any(axis=1)]
+        found = [corners(face) for face in faces_of(block)]
+        triangles.append((block.nodes, [face for face in found if len(face) == 3]))
+        for square in (face for face in found if len(face) == 4):
+            thirds.append((block.nodes, [square[:i] + square[i + 1 :] for i in range(4)]))
+            elements.append(np.arange(at.start, at.stop))
+    keys = set_keys(triangles + thirds)
+    n_triangles = sum(len(cells) * len(columns) for cells, columns in triangles)
+    meets, start = [], n_triangles
+    for cells, columns in thirds:
+        stop = start + len(cells) * len(columns)
+        meets.append(np.isin(keys[start:stop].reshape(4, -1), keys[:n_triangles]).any(axis=0))
+        start = stop
+    return np.concatenate(elements)[np.concatenate(meets)]
 
 
 @dataclass(frozen=True)
@@ -148,44 +104,63 @@ class Bodies:
         return (low + high) / 2, np.maximum((high - low).max(axis=1), np.finfo(float).tiny)
 
 
-def bodies(mesh: Mesh) -> Bodies:
+def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
     """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    faces = all_faces(mesh)
-    one, other = faces.pairs()
-    joined = np.stack([faces.element[one], faces.element[other]], axis=1)
-    root = components(mesh.n_elements, [joined] if len(joined) else [])
-    names, body = np.unique(root, return_inverse=True)
-    nodes = np.concatenate([b.nodes.ravel() for b in mesh.blocks])
-    size = np.concatenate([np.full(len(b), b.nodes.shape[1]) for b in mesh.blocks])
-    owners = np.repeat(body, size)
-    found = _of_pairs(mesh.n_nodes, nodes.astype(np.int64), owners)
-    if len(np.unique(found.joints[1])) > MAX_HINGED:
-        label = components(len(names), [np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)])
-        label = np.unique(label, return_inverse=True)[1]
-        found = _of_pairs(mesh.n_nodes, found.node, label[found.body])
+    faces = faces or mesh.all_faces()
+    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
+    root = components(mesh.n_elements, joined)
+    is_root = root == np.arange(len(root))
+    body = (np.cumsum(is_root) - 1)[root]
+    found = _of_elements(mesh, body)
+    if len(distinct(found.joints[1])) > MAX_HINGED:
+        pairs = np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)
+        label = components(int(is_root.sum()), pairs)
+        label = np.searchsorted(distinct(label), label)
+        found = _of_elements(mesh, label[body])
     return found
 
 
-def _of_pairs(n_nodes: int, node: Ints, body: Ints) -> Bodies:
+def _of_elements(mesh: Mesh, body: Ints) -> Bodies:
+    """Return the bodies of the nodes from those of the elements."""
+    part = np.full(mesh.n_nodes, -1)
+    if not body.any():
+        part[mesh.used_nodes()] = 0
+        node = np.flatnonzero(part == 0)
+        return Bodies(part, node, np.zeros_like(node))
+    pairs = []
+    for block, at in with_rows(mesh.blocks):
+        owner = np.broadcast_to(body[at, None], block.nodes.shape)
+        part[block.nodes] = owner
+        pairs.append((block.nodes, owner))
+    node = np.flatnonzero(part >= 0)
+    shared = [(nodes[mask], owner[mask]) for nodes, owner in pairs if (mask := part[nodes] != owner).any()]
+    if not shared:
+        return Bodies(part, node, part[node])
+    further, owner = (np.concatenate(both) for both in zip(*shared, strict=True))
     count = int(body.max()) + 1
-    node, body = np.divmod(np.unique(node * count + body), count)
-    part = np.full(n_nodes, -1)
-    part[node[::-1]] = body[::-1]
-    return Bodies(part, node, body)
+    every = np.concatenate([node * count + part[node], further.astype(np.int64) * count + owner])
+    node, owner = np.divmod(distinct(every), count)
+    part[node[::-1]] = owner[::-1]
+    return Bodies(part, node, owner)
 
 
-def check_supports(mesh: Mesh, supports: Supports) -> None:
-    """Raise ModelError that names the rigid modes which the supports leave free, part by part."""
-    found = bodies(mesh)
+def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) -> Ints:
+    """Raise ModelError that names the rigid modes which the supports leave free, part by part.
+
+    Return the number of the part of each node (n,), -1 for nodes without elements: parts are bodies
+    that neither nodes nor constraints tie to others.
+    """
+    found = found or bodies(mesh)
     equations = _equations(found, supports)
     frames = found.frames(mesh.points)
+    group_of = _groups(len(frames[0]), equations)
     problems = []
-    for group in _groups(len(frames[0]), equations):
-        modes = _free_modes(mesh, frames, group, equations)
-        problems += _name_modes(mesh, found, group, modes)
+    for group, mine in zip(*_by_group(group_of, equations), strict=True):
+        problems += _name_modes(mesh, found, group, _free_modes(mesh, frames, group, mine))
     if problems:
         shown = "; ".join(problems[:MAX_PROBLEMS])
         raise ModelError(f"the supports leave rigid motions free: {shown}. Fix more nodes or components")
+    return np.where(found.part >= 0, group_of[found.part], -1)
 
 
 @dataclass(frozen=True)
@@ -196,6 +171,10 @@ class Equations:
     dof: Ints
     body: Ints
     weight: Array
+
+    def take(self, rows: Ints) -> Equations:
+        """Return some of the entries."""
+        return Equations(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
 
 
 def _equations(found: Bodies, supports: Supports) -> Equations:
@@ -214,29 +193,58 @@ def _equations(found: Bodies, supports: Supports) -> Equations:
     return Equations(row[known], dof[known], body[known], weight[known])
 
 
-def _groups(n_bodies: int, equations: Equations) -> list[list[int]]:
-    """Return the bodies in groups that equations tie together."""
+def _groups(n_bodies: int, equations: Equations) -> Ints:
+    """Return for each body (b,) the number of its group: bodies that equations tie together."""
+    if n_bodies == 1:
+        return np.zeros(1, dtype=np.int64)
     order = np.argsort(equations.row, kind="stable")
     row, body = equations.row[order], equations.body[order]
     tied = (row[1:] == row[:-1]) & (body[1:] != body[:-1])
-    pairs = np.unique(np.stack([body[1:][tied], body[:-1][tied]], axis=1), axis=0)
-    label = components(n_bodies, [pairs] if len(pairs) else [])
-    members = np.argsort(label, kind="stable")
-    cuts = np.flatnonzero(np.diff(label[members])) + 1
-    return [group.tolist() for group in np.split(members, cuts)]
+    label = components(n_bodies, np.stack([body[1:][tied], body[:-1][tied]], axis=1))
+    return (np.cumsum(label == np.arange(n_bodies)) - 1)[label]
+
+
+def _by_group(group_of: Ints, equations: Equations) -> tuple[list[list[int]], list[Equations]]:
+    """Return the bodies of each group, and its equations."""
+    numbers = np.arange(1, int(group_of.max()) + 1)
+    members = np.argsort(group_of, kind="stable")
+    groups = np.split(members, np.searchsorted(group_of[members], numbers))
+    owner = group_of[equations.body]
+    order = np.argsort(owner, kind="stable")
+    mine = np.split(order, np.searchsorted(owner[order], numbers))
+    return [group.tolist() for group in groups], [equations.take(rows) for rows in mine]
 
 
 def _free_modes(
     mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: Equations
 ) -> list[Array]:
-    """Return the free modes (6, k) of each body of a group.
+    """Return the free modes (6, k) of each body of a group under its equations.
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
-    mine = np.isin(equations.body, group)
-    rows, row = np.unique(equations.row[mine], return_inverse=True)
-    dof, body, weight = equations.dof[mine], equations.body[mine], equations.weight[mine]
-    C = np.zeros((len(rows), 6 * len(group)))
+    rows = distinct(equations.row)
+    row = np.searchsorted(rows, equations.row)
+    if len(rows) > 2 * SAMPLE * len(group):
+        count = SAMPLE * len(group)
+        chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3
+        some = np.full(len(rows), -1)
+        some[chosen] = np.arange(count)
+        mine = np.flatnonzero(some[row] >= 0)
+        least = _spectrum(mesh, frames, group, equations.take(mine), some[row[mine]])[0].min()
+        # further equations lift the smallest value; the largest is at most the root of all squares
+        if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
+            return [np.zeros((6, 0))] * len(group)
+    values, directions = _spectrum(mesh, frames, group, equations, row)
+    free = directions[values <= FREE * max(float(values.max(initial=0)), np.finfo(float).tiny)].T
+    return [free[6 * i : 6 * i + 6] for i in range(len(group))]
+
+
+def _spectrum(
+    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: Equations, row: Ints
+) -> tuple[Array, Array]:
+    """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
+    dof, body, weight = equations.dof, equations.body, equations.weight
+    C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     for i, p in enumerate(group):
         centre, size = frames[0][p], float(frames[1][p])
         here = body == p
@@ -246,8 +254,7 @@ def _free_modes(
     C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
-    free = directions[values <= 1e-7 * max(float(values.max(initial=0)), np.finfo(float).tiny)].T
-    return [free[6 * i : 6 * i + 6] for i in range(len(group))]
+    return values, directions
 
 
 def _name_modes(mesh: Mesh, found: Bodies, group: list[int], modes: list[Array]) -> list[str]:

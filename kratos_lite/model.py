@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from kratos_lite import checks, mobility
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import PatternCache, Progress
 from kratos_lite.batches import Batch
-from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.grouping import batches_of, element_class
 from kratos_lite.loads import Load
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Mesh, Where, WhereElements, with_rows
-from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.mesh import Mesh, Where, WhereElements
+from kratos_lite.quadrature import Rule
 from kratos_lite.result import Result
-from kratos_lite.statics import solve_static
+from kratos_lite.statics import StaticSystem, solve_static
 from kratos_lite.supports import AXES, Link, Supports, rigid_modes
 
 Array = NDArray[np.float64]
@@ -166,45 +166,9 @@ class Model:
 
         Raises ModelError for elements without material and InputError for unknown kinds.
         """
-        found: list[Batch] = []
-        for block, at in with_rows(self.mesh.blocks):
-            if len(block):
-                found += self._split(block, np.arange(at.start, at.stop))
-        if not found:
-            raise ModelError("the model has no elements; nothing can be solved")
-        return found
-
-    def _split(self, block: Block, rows: NDArray[np.int64]) -> list[Batch]:
-        element = self._element_class(block)
-        material, rule = self._material_of[rows], self._rule_of[rows]
-        if (material < 0).any():
-            e = int(np.argmax(material < 0))
-            raise ModelError(
-                f"{self.mesh.place(block, e)} has no material (property {block.properties[e]}); "
-                "give one with Model(mesh, material), model.assign or --material"
-            )
-        batches = []
-        for m, r in sorted(set(zip(material.tolist(), rule.tolist(), strict=True))):
-            mine = (material == m) & (rule == r)
-            chosen = self._rules.get(r, element.rule)
-            if isinstance(chosen, int):
-                chosen = by_order(element.shape.cell, chosen)
-            if abs(chosen.weights.sum() / element.rule.weights.sum() - 1) > 1e-9:
-                raise InputError(
-                    f"{chosen} does not fit {element.__name__}: its weights miss the volume of the cell"
-                )
-            stress = None if self.prestress is None else self.prestress[rows[mine]]
-            nodes = block.nodes if mine.all() else block.nodes[mine]
-            batches.append(Batch(element, chosen, self._materials[m], nodes, rows[mine], stress))
-        return batches
-
-    def _element_class(self, block: Block) -> Any:
-        if block.name not in ELEMENTS:
-            try:
-                ELEMENTS[block.name]
-            except InputError as error:
-                raise InputError(f"{self.mesh.place(block, 0)}: {error}") from None
-        return ELEMENTS[block.name]
+        return batches_of(
+            self.mesh, self._materials, self._material_of, self._rules, self._rule_of, self.prestress
+        )
 
     # ---- solving -------------------------------------------------------------------------------
 
@@ -216,7 +180,7 @@ class Model:
         MeshError, InputError
             With every element that is wrong.
         """
-        kinds = [self._element_class(block) for block in self.mesh.blocks]
+        kinds = [element_class(self.mesh, block) for block in self.mesh.blocks]
         checks.check_blocks(self.mesh, kinds)
         checks.check_points(self.mesh)
         checks.check_repeated_nodes(self.mesh)
@@ -230,24 +194,27 @@ class Model:
         MeshError, ModelError, InputError
             With every element or part that is wrong.
         """
-        return self.checked_batches()[1]
+        return self.checked()[2]
 
-    def checked_batches(self) -> tuple[list[Batch], list[str]]:
-        """Return the batches and the warnings of a model that passes all checks of `check`."""
+    def checked(self) -> tuple[list[Batch], NDArray[np.int64], list[str]]:
+        """Return the batches, the part of each node and the warnings of a model that passes all checks.
+
+        Parts are numbered from 0; they neither share nodes nor constraints.  Nodes without elements have -1.
+        """
         mesh = self.mesh
         warnings = self.check_geometry()
         batches = self.batches()
-        used = mesh.used_nodes()
+        used, faces = mesh.used_nodes(), mesh.all_faces(anew=True)
         warnings += checks.check_rules(mesh, batches)
-        warnings += mobility.check_joints(mesh)
+        warnings += mobility.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used)
         warnings += checks.check_scales(mesh, batches)
         if not used.all():
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
-        mobility.check_supports(mesh, self.supports)
-        return batches, warnings
+        bodies = mobility.bodies(mesh, faces)
+        return batches, mobility.check_supports(mesh, self.supports, bodies), warnings
 
     def solve(
         self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
@@ -273,6 +240,45 @@ class Model:
             If the accuracy asked for cannot be reached.
         """
         return solve_static(self, solver, tolerance, progress)
+
+    def system(
+        self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+    ) -> StaticSystem:
+        """Check the model and make it ready to be solved for many load sets; arguments as for `solve`.
+
+        ``system.solve(loads)`` is `solve` with these loads in place of those of the model; matrix, factors
+        or multigrid are made once.
+
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0, density=1000.0))
+        >>> model.fix("z-")
+        >>> system = model.system()
+        >>> pull, push = (system.solve([kl.Traction("z+", (0, 0, t))]) for t in (1e6, -2e6))
+        >>> print(f"{pull.u[:, 2].max():.1e} m, {push.u[:, 2].min():.1e} m")
+        1.0e-03 m, -2.0e-03 m
+        """
+        return StaticSystem(self, solver, tolerance, progress)
+
+    def solve_cases(
+        self,
+        cases: Mapping[str, Sequence[Load]],
+        solver: str = "auto",
+        tolerance: float = 1e-10,
+        progress: Progress | None = None,
+    ) -> dict[str, Result]:
+        """Solve the model for several load cases: each has the loads given, not those of the model.
+
+        Returns the result of each case by its name; other arguments and errors as for `solve`.
+        """
+        return StaticSystem(self, solver, tolerance, progress).solve_cases(cases)
+
+    def state(self) -> list[Any]:
+        """Return copies of all that matters to the equations of the model, but for prescribed values."""
+        mesh, arrays = self.mesh, [self._material_of, self._rule_of, self.supports.fixed]
+        arrays += [mesh.points, *(block.nodes for block in mesh.blocks)]
+        arrays += [array for array in (self.prestress, self.initial_displacement) if array is not None]
+        things = [block.name for block in mesh.blocks], self.prestress is None, tuple(self.supports.links)
+        return [*(array.copy() for array in arrays), things, tuple(self._materials), dict(self._rules)]
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of a summary: label and value."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,23 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite import voigt
+from kratos_lite import fields, voigt
 from kratos_lite.batches import Batch
-from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
-from kratos_lite.quadrature import Rule
-from kratos_lite.registry import remembered
-from kratos_lite.shapes import Hexahedron8, Pyramid5, Shape, Tetrahedron4, Wedge6
 
 Array = NDArray[np.float64]
 PLACES = ("gauss", "element", "node")
-CORNER_SHAPES: dict[str, type[Shape]] = {
-    "tetrahedron": Tetrahedron4,
-    "hexahedron": Hexahedron8,
-    "wedge": Wedge6,
-    "pyramid": Pyramid5,
-}
 
 
 def peak_memory() -> int:
@@ -55,6 +45,7 @@ class Report:
     seconds : per phase.
     peak_memory : bytes.
     warnings, notes : what the checks and the reader found.
+    skipped : what this solution did without, as it would have changed nothing.
     """
 
     unknowns: int
@@ -70,22 +61,7 @@ class Report:
     peak_memory: int
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-
-
-@remembered
-def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
-    """Return the matrix (n, g) from values at Gauss points to values at nodes.
-
-    The values are fitted by least squares with the functions of the corner cell (trilinear in a
-    hexahedron), where stresses of displacement elements are most accurate, and read off at the nodes.
-    """
-    corner = CORNER_SHAPES.get(element.shape.cell)
-    if corner is None:
-        return np.full((len(element.nodes), len(rule)), 1 / len(rule))
-    at_points = np.array([corner.N(xi) for xi in rule.points])
-    at_nodes = np.array([corner.N(xi) for xi in element.nodes])
-    mean = np.full((len(rule), len(rule)), 1 / len(rule))  # apart, so that few points still give constants
-    return np.asarray(at_nodes @ np.linalg.pinv(at_points) @ (np.eye(len(rule)) - mean) + mean[:1])
+    skipped: list[str] = field(default_factory=list)
 
 
 class Result:
@@ -123,64 +99,39 @@ class Result:
 
     # ---- element values ------------------------------------------------------------------------
 
-    def _at_gauss(self, stress: bool) -> Iterator[tuple[Batch, Array, Array]]:
-        """Yield batch, strain or stress (m, g, 6), and volumes (m, g)."""
-        for batch in self.batches:
-            values, volumes = [], []
-            for chunk in batch.chunks():
-                element = batch.at(self.mesh.points, chunk)
-                value = element.strain(self._strained[batch.nodes[chunk]])
-                if stress:
-                    value = batch.material.stress(value) + batch.initial_stress(chunk)
-                values.append(value)
-                volumes.append(element.dV)
-            yield batch, np.concatenate(values), np.concatenate(volumes)
-
     def _field(self, at: str, stress: bool) -> Any:
         if at not in PLACES:
             raise InputError(f"at must be one of {', '.join(PLACES)}; got {at!r}")
-        parts = list(self._at_gauss(stress))
         if at == "gauss":
-            return self._by_element(parts)
-        return self._means(parts) if at == "element" else self._average(parts)
+            return self._by_element(stress)
+        return self._averages(stress)[PLACES.index(at) - 1]
 
-    def _by_element(self, parts: list[tuple[Batch, Array, Array]]) -> Any:
+    def _by_element(self, stress: bool) -> Any:
         """Return (m, g, 6), or a list of (g, 6) where elements have different numbers of points."""
-        if len({len(batch.rule) for batch, _, _ in parts}) > 1:
-            rows: list[Any] = [None] * self.mesh.n_elements
-            for batch, values, _ in parts:
-                for row, value in zip(batch.rows.tolist(), values, strict=True):
+        points, m = self.mesh.points, self.mesh.n_elements
+        parts = [fields.at_gauss(points, batch, self._strained, stress=stress) for batch in self.batches]
+        if len(parts) == 1 and (self.batches[0].rows == np.arange(m)).all():
+            return parts[0]
+        if len({part.shape[1] for part in parts}) > 1:
+            rows: list[Any] = [None] * m
+            for batch, part in zip(self.batches, parts, strict=True):
+                for row, value in zip(batch.rows.tolist(), part, strict=True):
                     rows[row] = value
             return rows
-        out = np.zeros((self.mesh.n_elements, *parts[0][1].shape[1:]))
-        for batch, values, _ in parts:
-            out[batch.rows] = values
+        out = np.zeros((m, *parts[0].shape[1:]))
+        for batch, part in zip(self.batches, parts, strict=True):
+            out[batch.rows] = part
         return out
 
-    def _means(self, parts: list[tuple[Batch, Array, Array]]) -> Array:
-        """Return the mean over the volume of each element, (m, 6)."""
-        out = np.zeros((self.mesh.n_elements, 6))
-        for batch, values, volumes in parts:
-            share = volumes / volumes.sum(axis=1, keepdims=True)
-            out[batch.rows] = (values * share[..., None]).sum(axis=1)
-        return out
+    def _averages(self, stress: bool) -> tuple[Array, Array]:
+        """Return the mean over the volume of each element (m, 6) and nodal values (n, 6)."""
+        m = self.mesh.n_elements
+        return fields.averages(self.mesh.points, self.batches, self._strained, m, stress=stress)
 
     def stress_at_nodes_and_elements(self) -> tuple[Array, Array]:
         """Return nodal stresses (n, 6) and element means (m, 6) in Pa from one pass over the elements."""
-        parts = list(self._at_gauss(stress=True))
-        return self._average(parts), self._means(parts)
-
-    def _average(self, parts: list[tuple[Batch, Array, Array]]) -> Array:
-        """Return nodal values (n, 6): the mean over the elements around each node."""
-        total = np.zeros((self.mesh.n_nodes, 6))
-        count = np.zeros(self.mesh.n_nodes)
-        for batch, values, _ in parts:
-            nodal = extrapolation(batch.element, batch.rule) @ values
-            flat = batch.nodes.ravel()
-            for c in range(6):
-                total[:, c] += np.bincount(flat, weights=nodal[..., c].ravel(), minlength=len(total))
-            count += np.bincount(flat, minlength=len(total))
-        return total / np.maximum(count, 1)[:, None]
+        means, nodal = self._averages(stress=True)
+        return nodal, means
 
     def strain(self, at: str = "gauss") -> Any:
         """Return strains, Voigt order with engineering shear.
@@ -212,17 +163,7 @@ class Result:
     @cached_property
     def _totals(self) -> tuple[float, float, int]:
         """Strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
-        energy, largest, row = 0.0, 0.0, 0
-        for batch in self.batches:
-            for chunk in batch.chunks():
-                element = batch.at(self.mesh.points, chunk)
-                strain = element.strain(self._strained[batch.nodes[chunk]])
-                elastic = batch.material.stress(strain)
-                energy += float(((strain * elastic).sum(axis=-1) * element.dV).sum()) / 2
-                mises = voigt.von_mises(elastic + batch.initial_stress(chunk)).max(axis=1)
-                if mises.max() > largest:
-                    largest, row = float(mises.max()), int(batch.rows[chunk][int(mises.argmax())])
-        return energy, largest, row
+        return fields.totals(self.mesh.points, self.batches, self._strained)
 
     def totals(self) -> tuple[float, float, int]:
         """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, its element row."""
@@ -270,6 +211,8 @@ class Result:
             ("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())),
             ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
         ]
+        if report.skipped:
+            rows.append(("skipped", "; ".join(report.skipped)))
         rows += [("warning", text) for text in report.warnings]
         return rows + [("note", text) for text in report.notes]
 
@@ -278,11 +221,14 @@ class Result:
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
-    def save(self, path: str | Path) -> None:
-        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json."""
+    def save(self, path: str | Path, mode: str | None = None) -> None:
+        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json.
+
+        The mode of a .vtu file is ``binary`` (the default), ``compressed`` or ``ascii``.
+        """
         from kratos_lite.io.results import write_result
 
-        write_result(path, self)
+        write_result(path, self, mode)
 
     def plot(self, path: str | Path, values: str = "VON_MISES_STRESS") -> None:
         """Write a picture (.png) of the deformed body coloured by a nodal field."""

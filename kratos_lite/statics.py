@@ -1,10 +1,10 @@
-"""Statics: from a model to displacements in one linear solve."""
+"""Statics: from a model to displacements, one linear solve for each set of loads."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -12,18 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import checks, solvers
-from kratos_lite.assembly import Progress, assemble_dense, assemble_stiffness, internal_load
+from kratos_lite.assembly import Progress
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.loads import check_loads
+from kratos_lite.fields import internal_load
+from kratos_lite.loads import Load, check_loads
+from kratos_lite.mesh import Mesh
 from kratos_lite.result import Report, Result, peak_memory
-from kratos_lite.solvers.common import DENSE_MAX
-from kratos_lite.supports import reduction
+from kratos_lite.supports import resolve
+from kratos_lite.system import System, among
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class Phases:
@@ -46,68 +49,231 @@ def solve_static(
     model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
 ) -> Result:
     """Solve K u = f with the supports of a model eliminated; see `Model.solve`."""
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
-        raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
-    solvers.choose(solver, 0)
-    phase = Phases()
-    with phase("check"):
-        batches, warnings = model.checked_batches()
-    with phase("load"):
-        loads = external_loads(model, batches)
-        forces = loads - initial_loads(model, batches)
-    active, local = renumber(model, batches, forces)
-    warnings += check_loads(model.loads, batches, forces, model.supports)
-    points = model.mesh.points[active]
-    reduced = reduction(model.supports, active)
-    f = forces[active].ravel()
-    method, reason = solvers.choose(solver, len(reduced.free), len(f))
-    if method == "dense" and len(f) > DENSE_MAX:
-        raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {len(f)}")
-    with phase("assemble"):
-        K: Any
-        if method == "dense":
-            K = assemble_dense(points, local)
-        else:
-            pattern = model.patterns.get(len(points), [batch.nodes for batch in local])
-            K = assemble_stiffness(points, local, pattern, progress)
-    with phase("solve"):
-        equations = solvers.Equations(K, reduced, points, method, reason)
-        solution = equations.solve(f, tolerance, progress)
-    with phase("verify"):
-        u, reactions = recover(model, active, solution.x, K, f)
-        noise = float(np.finfo(float).eps * solvers.matrix_norm(K) * np.abs(u).max(initial=0.0))
-        balance = checks.equilibrium(model.mesh.points, loads, reactions, noise * len(f) ** 0.5)
-        judge(solution, u, balance)
-        warnings += checks.check_rounding(noise, loads, loads - forces, reactions, model.supports)
-    report = Report(
-        unknowns=len(reduced.free),
-        total_load=loads.sum(axis=0),
-        total_reaction=reactions.sum(axis=0),
-        solver=solution.method,
-        reason=solution.reason,
-        iterations=solution.iterations,
-        backward_error=solution.backward_error,
-        force_error=balance[0],
-        moment_error=balance[1],
-        seconds=phase.seconds,
-        peak_memory=peak_memory(),
-        warnings=warnings,
-        notes=list(model.notes),
-    )
-    return Result(model.mesh, batches, u, reactions, loads, report, model.initial_displacement)
+    return StaticSystem(model, solver, tolerance, progress).solve()
 
 
-def recover(
-    model: Model, active: NDArray[np.int64], displacement: Array, K: Any, f: Array
-) -> tuple[Array, Array]:
-    """Return displacements and reactions (n, 3) of all nodes from those of the active ones."""
-    u = np.where(model.supports.fixed, model.supports.values, 0.0)
-    u[active] = displacement.reshape(-1, 3)
-    residual = np.zeros_like(u)
-    residual[active] = (K @ displacement - f).reshape(-1, 3)
-    return u, np.where(constrained(model), residual, 0.0)
+@dataclass(eq=False)
+class LoadSet:
+    """Loads, their nodal forces (n, 3) in N alone and with initial stress, and the parts that they move."""
+
+    loads: list[Load]
+    external: Array
+    forces: Array
+    moving: Mask
+    phase: Phases
+
+
+class StaticSystem:
+    """A model made ready to be solved for many load sets; made by `Model.system`.
+
+    It follows its model: new prescribed values are taken over, and anything else that changed what K is
+    (points, elements, materials, rules, which degrees of freedom are prescribed, constraints, initial
+    stress) has it checked and made anew at the next solution.
+
+    Attributes
+    ----------
+    equations : the `System` that is solved, or None as long as nothing has moved.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        solver: str = "auto",
+        tolerance: float = 1e-10,
+        progress: Progress | None = None,
+    ) -> None:
+        if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
+            raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
+        solvers.choose(solver, 0)
+        self.model, self.solver, self.tolerance, self.progress = model, solver, tolerance, progress
+        self._phase = Phases()
+        self._prepare()
+
+    def solve(self, loads: Sequence[Load] | None = None) -> Result:
+        """Solve for some loads in place of those of the model, or for those of the model.
+
+        Errors as of `Model.solve`.
+        """
+        self._follow()
+        case = self._load(self.model.loads if loads is None else loads)
+        return self._solve(case, case.moving)
+
+    def solve_cases(self, cases: Mapping[str, Sequence[Load]]) -> dict[str, Result]:
+        """Return the result of each load case by its name; see `Model.solve_cases`."""
+        if not isinstance(cases, Mapping):
+            raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
+        self._follow()
+        loaded = {name: self._load(loads) for name, loads in cases.items()}
+        moving = np.any([case.moving for case in loaded.values()], axis=0)
+        return {name: self._solve(case, moving) for name, case in loaded.items()}
+
+    # ---- what is kept from one solution to the next ------------------------------------------------
+
+    def _prepare(self) -> None:
+        """Check the model and take note of its state."""
+        model = self.model
+        with self._phase("check"):
+            self.batches, self.part, self.warnings = model.checked()
+            self._state = model.state()
+            self._used = self.part >= 0
+            self._prescribe()
+            self.initial = initial_loads(model, self.batches)
+        self.equations: System | None = None
+        self._solved, self._still = np.zeros(0, dtype=bool), 0  # parts in the equations; elements left out
+
+    def _prescribe(self) -> None:
+        """Take note of the values that supports prescribe, and of what they hold at rest."""
+        supports = self.model.supports
+        self._values = supports.values.copy()
+        self.links = resolve(supports, self._used) if supports.links else {}
+        moved = supports.fixed & (supports.values != 0)
+        pushed = [slave for slave, (_, constant) in self.links.items() if constant]
+        moved.flat[np.array(pushed, dtype=np.int64)] = True
+        self._moved = _any_axis(moved)
+        self._held = ~_any_axis(~supports.fixed) & ~self._moved
+        self._fixed = int((supports.fixed if self._used.all() else supports.fixed[self._used]).sum())
+
+    def _follow(self) -> None:
+        """Take over what has changed in the model."""
+        if not _same(self._state, self.model.state()):
+            self._prepare()
+        elif not np.array_equal(self._values, self.model.supports.values):
+            held = self._held
+            self._prescribe()
+            if self.equations and not np.array_equal(held, self._held):
+                self.equations = None  # elements that were left out may be needed now
+            elif self.equations:
+                self.equations.prescribe(self.links)
+
+    def _load(self, loads: Sequence[Load]) -> LoadSet:
+        """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
+        phase, self._phase = self._phase, Phases()
+        for load in loads:
+            if not isinstance(load, Load):
+                raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+        with phase("load"):
+            mesh, fixed = self.model.mesh, self.model.supports.fixed
+            external = external_loads(mesh, self.batches, loads)
+            forces = external if self.initial is None else external - self.initial
+            acts = forces != 0
+            lost = np.flatnonzero(~self._used)
+            lost = lost[_any_axis(acts[lost])]
+            if len(lost):
+                raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")
+            moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
+            moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
+        return LoadSet(list(loads), external, forces, moving, phase)
+
+    def _equations_of(self, moving: Mask) -> System:
+        """Return the equations of the elements in moving parts, made anew only for a part that is new."""
+        if self.equations is None or (moving & ~self._solved).any():
+            model = self.model
+            self._solved = moving if self.equations is None else moving | self._solved
+            parts = self._solved[self.part] & self._used
+            every, batches = among(self.batches, parts), among(self.batches, parts & ~self._held)
+            self._still = sum(map(len, every)) - sum(map(len, batches))
+            self.equations = System(
+                model.mesh.points,
+                batches,
+                model.supports,
+                self.links,
+                solver=self.solver,
+                tolerance=self.tolerance,
+                patterns=model.patterns,
+                progress=self.progress,
+            )
+        return self.equations
+
+    # ---- one solution ------------------------------------------------------------------------------
+
+    def _solve(self, case: LoadSet, moving: Mask) -> Result:
+        """Solve for a load set with the equations of all parts in `moving`."""
+        model, phase = self.model, case.phase
+        warnings = self.warnings + check_loads(case.loads, self.batches, case.forces, model.supports)
+        u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
+        solution = solvers.Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
+        if case.moving.any():
+            with phase("assemble"):
+                system = self._equations_of(moving)
+                noise = float(np.finfo(float).eps * system.norm)
+            with phase("solve"):
+                u, solution = system.solve(case.forces)
+                u = self._complete(u, system, case.moving)
+                noise *= float(np.abs(u).max(initial=0.0))
+        with phase("verify"):
+            if case.moving.any():
+                reactions = system.residual(u, case.forces)
+            reactions = self._constrained(reactions)
+            balance = checks.equilibrium(
+                model.mesh.points, case.external, reactions, noise * (3 * int(self._used.sum())) ** 0.5
+            )
+            judge(solution, u, balance)
+            initial = case.external - case.forces
+            warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
+        report = Report(
+            unknowns=3 * int(self._used.sum()) - self._fixed - len(self.links),
+            total_load=case.external.sum(axis=0),
+            total_reaction=reactions.sum(axis=0),
+            solver=solution.method,
+            reason=solution.reason,
+            iterations=solution.iterations,
+            backward_error=solution.backward_error,
+            force_error=balance[0],
+            moment_error=balance[1],
+            seconds=phase.seconds,
+            peak_memory=peak_memory(),
+            warnings=warnings,
+            notes=list(model.notes),
+            skipped=self._skipped(case.moving),
+        )
+        u0 = model.initial_displacement
+        return Result(model.mesh, self.batches, u, reactions, case.external, report, u0)
+
+    def _at_rest(self) -> Array:
+        """Return displacements (n, 3) that are 0 but for what is prescribed."""
+        return np.where(self.model.supports.fixed, self._values, 0.0)
+
+    def _complete(self, u: Array, system: System, moving: Mask) -> Array:
+        """Fill in what is prescribed on nodes without equations; parts that nothing moves stay at rest."""
+        if len(system.nodes) < len(u):
+            rest = self._at_rest()
+            rest[system.nodes] = u[system.nodes]
+            u = rest
+        if not moving.all():
+            u[self._used & ~moving[self.part]] = 0.0
+        return u
+
+    def _constrained(self, residual: Array) -> Array:
+        """Return the residual (n, 3) where supports or constraints act, and 0 elsewhere."""
+        supports = self.model.supports
+        at = np.flatnonzero(supports.fixed)
+        for link in supports.links:
+            at = np.append(at, [link.slave, *link.masters])
+        reactions = np.zeros_like(residual)
+        reactions.flat[at] = residual.flat[at]
+        return reactions
+
+    def _skipped(self, moving: Mask) -> list[str]:
+        """Say what this solution did without."""
+        said = []
+        if not moving.any():
+            said.append("assembly and solution, as nothing moves")
+        elif not moving.all():
+            count = int((~moving[self.part] & self._used).sum())
+            said.append(
+                f"{int((~moving).sum())} of {len(moving)} parts ({count} nodes), as nothing moves them"
+            )
+        if moving.any() and self.equations and self._still:
+            said.append(f"{self._still} elements, as all their nodes are held")
+        if self._fixed:
+            said.append(f"{self._fixed} prescribed degrees of freedom")
+        if not self._used.all():
+            said.append(f"{int((~self._used).sum())} nodes without elements")
+        if moving.any() and self.equations:
+            said += self.equations.skipped
+        return [*said, "iterations, as the law is linear", "mass", "strains and stresses until asked for"]
 
 
 def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:
@@ -126,40 +292,31 @@ def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) ->
         )
 
 
-def external_loads(model: Model, batches: Sequence[Batch]) -> Array:
+def external_loads(mesh: Mesh, batches: Sequence[Batch], loads: Sequence[Load]) -> Array:
     """Return the nodal forces (n, 3) in N of all loads."""
-    total = np.zeros_like(model.mesh.points)
-    for load in model.loads:
-        total += load.forces(model.mesh, batches)
+    total = np.zeros_like(mesh.points)
+    for load in loads:
+        total += load.forces(mesh, batches)
     return total
 
 
-def initial_loads(model: Model, batches: Sequence[Batch]) -> Array:
+def initial_loads(model: Model, batches: Sequence[Batch]) -> Array | None:
     """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
     u0 = model.initial_displacement
     if u0 is None and model.prestress is None:
-        return np.zeros_like(model.mesh.points)
+        return None
     start = np.zeros_like(model.mesh.points) if u0 is None else -u0
     return internal_load(model.mesh.points, batches, start)
 
 
-def renumber(model: Model, batches: list[Batch], forces: Array) -> tuple[NDArray[np.int64], list[Batch]]:
-    """Return the rows of the nodes that elements use, and the batches numbered by them."""
-    mesh = model.mesh
-    used = mesh.used_nodes()
-    lost = np.flatnonzero(~used & (forces != 0).any(axis=1))
-    if len(lost):
-        raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")
-    active = np.flatnonzero(used)
-    if used.all():
-        return active, batches
-    local = (np.cumsum(used) - 1).astype(np.int32)
-    return active, [replace(batch, nodes=local[batch.nodes]) for batch in batches]
+def _any_axis(mask: Mask) -> Mask:
+    """Return mask.any(axis=1) of a mask (n, 3), faster."""
+    return mask[:, 0] | mask[:, 1] | mask[:, 2]
 
 
-def constrained(model: Model) -> NDArray[np.bool_]:
-    """Return a mask (n, 3) of the degrees of freedom that carry reactions or constraint forces."""
-    mask = model.supports.fixed.copy()
-    for link in model.supports.links:
-        mask.flat[[link.slave, *link.masters]] = True
-    return mask
+def _same(state: list[Any], other: list[Any]) -> bool:
+    """Return whether two states of a model are equal."""
+    return len(state) == len(other) and all(
+        np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
+        for a, b in zip(state, other, strict=True)
+    )

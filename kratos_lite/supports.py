@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,10 @@ class Link:
     masters: tuple[int, ...]
     weights: tuple[float, ...]
     constant: float = 0.0
+
+
+Links: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
+"""Constraints that are resolved: for each slave the weights of free degrees of freedom, and a constant."""
 
 
 class Supports:
@@ -132,25 +136,30 @@ class Reduction:
         return np.asarray(self.T.T @ r) if self.T is not None else r[self.free]
 
 
-def reduction(supports: Supports, active: Ints) -> Reduction:
-    """Return the reduction for the degrees of freedom of the `active` node rows, renumbered in order."""
-    fixed = supports.fixed[active].ravel()
-    c = np.where(fixed, supports.values[active].ravel(), 0.0)
+def reduction(supports: Supports, active: Ints, links: Links | None = None) -> Reduction:
+    """Return the reduction for the degrees of freedom of the `active` node rows, renumbered in order.
+
+    Constraints of slaves on other nodes are left out.  `links` are the resolved ones, if they are known.
+    """
+    fixed, c = supports.fixed, supports.values
+    if len(active) < len(fixed):
+        fixed, c = fixed[active], c[active]
+    fixed, c = fixed.ravel(), c.ravel() * fixed.ravel()
     if not supports.links:
         return Reduction(np.flatnonzero(~fixed), c)
     local = np.full(supports.mesh.n_nodes, -1)
     local[active] = np.arange(len(active))
-    links = resolve(supports, local)
-    slaves = np.array(sorted(links), dtype=np.int64)
+    links = resolve(supports, local >= 0) if links is None else links
+    mine = {_renumbered(slave, local): link for slave, link in links.items() if local[slave // 3] >= 0}
     is_free = ~fixed
-    is_free[slaves] = False
+    is_free[list(mine)] = False
     free = np.flatnonzero(is_free)
     column = np.full(len(fixed), -1)
     column[free] = np.arange(len(free))
     rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
-    for slave, (terms, constant) in links.items():
+    for slave, (terms, constant) in sorted(mine.items()):
         c[slave] = constant
-        dofs = np.array(list(terms), dtype=np.int64)
+        dofs = _renumbered(np.array(list(terms), dtype=np.int64), local)
         rows.append(np.full(len(dofs), slave))
         columns.append(column[dofs])
         weights.append(np.array(list(terms.values()), dtype=float))
@@ -160,15 +169,16 @@ def reduction(supports: Supports, active: Ints) -> Reduction:
     return Reduction(free, c, csr_array(entries, shape=(len(fixed), len(free))))
 
 
-def resolve(supports: Supports, local: Ints) -> dict[int, tuple[dict[int, float], float]]:
-    """Express every slave by free degrees of freedom alone, in the numbering `local` of the nodes."""
+def _renumbered(dof: Any, local: Ints) -> Any:
+    """Return degrees of freedom by the new rows of their nodes."""
+    return 3 * local[dof // 3] + dof % 3
 
-    def renumber(dof: int) -> int:
-        node = int(local[dof // 3])
-        if node < 0:
-            raise ModelError(f"a constraint uses {supports.name(dof)}, which belongs to no element")
-        return 3 * node + dof % 3
 
+def resolve(supports: Supports, used: NDArray[np.bool_]) -> Links:
+    """Express every slave by free degrees of freedom alone.
+
+    Raises ModelError for constraints that contradict, or that use nodes which no element uses.
+    """
     by_slave: dict[int, Link] = {}
     for link in supports.links:
         if link.slave in by_slave:
@@ -176,19 +186,19 @@ def resolve(supports: Supports, local: Ints) -> dict[int, tuple[dict[int, float]
         if supports.fixed.flat[link.slave]:
             raise ModelError(f"{supports.name(link.slave)} is both fixed and the slave of a constraint")
         by_slave[link.slave] = link
-    done: dict[int, tuple[dict[int, float], float]] = {}
+    done: Links = {}
     for start in by_slave:
         _resolve_one(start, by_slave, done, supports)
-    return {
-        renumber(slave): ({renumber(dof): w for dof, w in terms.items()}, constant)
-        for slave, (terms, constant) in done.items()
-    }
+    lost = [dof for slave, (terms, _) in done.items() for dof in (slave, *terms) if not used[dof // 3]]
+    if lost:
+        raise ModelError(f"a constraint uses {supports.name(lost[0])}, which belongs to no element")
+    return done
 
 
 def _resolve_one(
     start: int,
     by_slave: dict[int, Link],
-    done: dict[int, tuple[dict[int, float], float]],
+    done: Links,
     supports: Supports,
 ) -> None:
     """Fill `done[start]`, first resolving the masters that are slaves themselves (a stack, no recursion)."""
@@ -208,9 +218,7 @@ def _resolve_one(
             stack += waiting
 
 
-def _substitute(
-    link: Link, done: dict[int, tuple[dict[int, float], float]], supports: Supports
-) -> tuple[dict[int, float], float]:
+def _substitute(link: Link, done: Links, supports: Supports) -> tuple[dict[int, float], float]:
     """Return the terms of free masters and the constant of one link."""
     terms: dict[int, float] = {}
     constant = link.constant

@@ -15,6 +15,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.cli import commands, main
+from kratos_lite.native import threads
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 GRAVITY_CUBE = EXAMPLES / "gravity_cube.mdpa"
@@ -140,6 +141,54 @@ def test_picture_is_a_png(run, folder):
     assert done.code == 0
     assert "written               cube.png" in done.out
     assert Path("cube.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("mode", ["binary", "compressed", "ascii"])
+def test_numbers_of_a_vtu_file_are_stored_as_asked(run, folder, mode):
+    run("solve", GRAVITY_CUBE, "-q", "-o", "plain.vtu", "--json", "cube.json")
+    assert run("solve", GRAVITY_CUBE, "-q", "-o", "cube.vtu", "--vtu", mode).code == 0
+    content = Path("cube.vtu").read_bytes()
+    assert (b"compressor=" in content, b'format="ascii"' in content) == (
+        mode == "compressed",
+        mode == "ascii",
+    )
+    assert (content == Path("plain.vtu").read_bytes()) == (mode == "binary")
+    meshio = pytest.importorskip("meshio")
+    np.testing.assert_array_equal(
+        meshio.read("cube.vtu").point_data["DISPLACEMENT"], displacement("cube.json")
+    )
+
+
+def test_a_mode_of_vtu_files_needs_such_a_file(run, folder):
+    assert run("solve", GRAVITY_CUBE, "--vtu", "ascii").refuses(
+        "--vtu ascii: there is no output", "-o OUT.vtu"
+    )
+    assert run("solve", GRAVITY_CUBE, "--vtu", "ascii", "-o", "a.json").refuses("a.json: only .vtu files are")
+    assert list(folder.iterdir()) == []
+
+
+def test_threads_are_told_to_the_kernels(run, folder, monkeypatch):
+    monkeypatch.setenv("KRATOS_LITE_THREADS", "1")
+    assert run("solve", GRAVITY_CUBE, "-q", "--threads", "3").code == 0
+    assert threads() == 3
+    assert run("solve", GRAVITY_CUBE, "--threads", "0").refuses("--threads 0", "1 or more")
+
+
+def test_bench_runs_the_benchmarks_of_the_checkout_with_all_words(run, folder, monkeypatch):
+    monkeypatch.setattr(commands, "ROOT", folder)
+    assert run("bench").refuses(f"there are no benchmarks in {folder}", "pip install -e .")
+    Path("benchmarks").mkdir()
+    Path("benchmarks/__main__.py").write_text(
+        "import sys\nopen('said', 'w').write(repr(sys.argv[1:]))\nsys.exit(5)"
+    )
+    assert run("bench", "run", "--cells", "3", "--help", "-q").code == 5
+    assert Path("said").read_text() == "['run', '--cells', '3', '--help', '-q']"
+
+
+def test_unknown_options_of_other_commands_are_refused(run, folder):
+    done = run("info", GRAVITY_CUBE, "--cells")
+    assert done.code == 2
+    assert "unrecognized arguments: --cells" in done.err
 
 
 def test_quiet_prints_nothing(run, folder):
@@ -368,7 +417,7 @@ def test_help_tells_the_exit_codes(run):
 
 def test_a_terminal_that_knows_ascii_only_shows_codes(box):
     ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
-    done = process("solve", "box.vtu", *HELD, env=ascii_only)
+    done = process("solve", "box.vtu", *HELD, "--gravity", "0,0,-9.81", env=ascii_only)
     assert (done.code, done.err) == (0, "")
     assert "54 unknowns \\u2264 600" in done.out
     done = process("solve", "--help", env=ascii_only)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable
@@ -14,6 +15,8 @@ from kratos_lite.cli.targets import check_targets, files_read
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 EXIT_CHECK_FAILED = 3
+ROOT = Path(__file__).resolve().parents[2]
+"""The source checkout, if the package is used from one."""
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
@@ -47,6 +50,7 @@ class TerminalProgress:
 
 def solve(options: Namespace) -> int:
     """Solve a file, print the summary, write what was asked for."""
+    _use_threads(options.threads)
     clock = perf_counter()
     import numpy as np
 
@@ -60,6 +64,14 @@ def solve(options: Namespace) -> int:
         ) from None
 
 
+def _use_threads(count: int | None) -> None:
+    """Tell the kernels, which are loaded later, how many threads to use."""
+    if count is not None:
+        if count < 1:
+            raise InputError(f"--threads {count}: a number of threads, 1 or more, is needed")
+        os.environ["KRATOS_LITE_THREADS"] = str(count)
+
+
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.io.files import load
 
@@ -70,6 +82,8 @@ def _solve(options: Namespace, clock: float) -> int:
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
     targets = _targets(options, scene.output, read)
+    if options.vtu and "output" not in targets:
+        raise InputError(f"--vtu {options.vtu}: there is no output to write so; add -o OUT.vtu")
     apply(scene.model, options)
     seconds["read"] = perf_counter() - clock
     solver, tolerance = options.solver or scene.solver, scene.tolerance
@@ -89,7 +103,7 @@ def _solve(options: Namespace, clock: float) -> int:
             if sys.stdout:
                 sys.stdout.flush()
     finally:
-        _write(result, targets, options.quiet)
+        _write(result, targets, options)
         for line in lines:
             print(line)
     return EXIT_CHECK_FAILED if any(" failed " in line for line in lines) else 0
@@ -107,7 +121,7 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
     found = {key: path for key, path in targets.items() if path is not None}
     check_targets(read, found.values())
     if "output" in found:
-        check_result_ending(found["output"])
+        check_result_ending(found["output"], options.vtu)
     if "json" in found and Path(found["json"]).suffix.lower() != ".json":
         raise InputError(f"{found['json']}: the ending must be .json; other results go to --output")
     if "picture" in found:
@@ -115,11 +129,14 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
     return found
 
 
-def _write(result: Result, targets: dict[str, str], quiet: bool) -> None:
+def _write(result: Result, targets: dict[str, str], options: Namespace) -> None:
     """Write the files and say so."""
     for key, path in targets.items():
-        (result.plot if key == "picture" else result.save)(path)
-        if not quiet:
+        if key == "picture":
+            result.plot(path)
+        else:
+            result.save(path, options.vtu if key == "output" else None)
+        if not options.quiet:
             print(f"{'written':<22}{path}")
 
 
@@ -142,7 +159,7 @@ def _document(options: Namespace) -> Document:
     from kratos_lite.io.documents import read_document
 
     if Path(options.input).suffix.lower() == ".json":
-        from kratos_lite.io.kratos import document_from
+        from kratos_lite.io.kratos.to_document import document_from
         from kratos_lite.io.project import read_project
 
         model = read_project(options.input).model
@@ -227,3 +244,17 @@ def _counts(path: str, mesh: Mesh) -> str:
     elements = sum(len(block) for block in mesh.blocks if whole or block.shape is not None)
     parts = f", {len(mesh.parts)} parts" if kind == ".mdpa" else ""
     return f"{mesh.n_nodes} nodes, {elements} elements{parts}"
+
+
+def bench(options: Namespace) -> int:
+    """Run the benchmarks of a source checkout, in its folder, with all further words."""
+    import subprocess
+
+    if not (ROOT / "benchmarks" / "__main__.py").is_file():
+        raise InputError(
+            f"there are no benchmarks in {ROOT}; they come with the source only: "
+            "clone the repository and install it with 'pip install -e .'"
+        )
+    return subprocess.run(
+        [sys.executable, "-m", "benchmarks", *options.rest], cwd=ROOT, check=False
+    ).returncode

@@ -37,6 +37,10 @@ SAME_ELEMENT = (
 """Prefixes of element names in files that are solved as KinematicLinear."""
 
 
+STIFFNESS_STEPS = ("stiffness_by_axis", "stiffness", "B", "dNdX", "J", "_jacobian", "_gauss")
+"""What an element class may redefine so that its stiffness is not that of its tables."""
+
+
 @remembered
 def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
@@ -45,6 +49,15 @@ def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     N.setflags(write=False)
     dN.setflags(write=False)
     return N, dN
+
+
+@remembered
+def reference_products(shape: type[Shape], rule: Rule) -> Array:
+    """Return R = Σ γ dN_a/dxi_k dN_b/dxi_l as (9, n n), rows k l and columns a b.  Read-only, made once."""
+    dN = tabulate(shape, rule)[1]
+    R: Array = np.einsum("g,gak,gbl->klab", rule.weights, dN, dN, optimize=True).reshape(9, -1)
+    R.setflags(write=False)
+    return R
 
 
 @remembered
@@ -239,9 +252,11 @@ class KinematicLinear:
         K_iajb = λ P_iajb + μ P_jaib + μ δ_ij P_kakb with P_iajb = Σ dN_a/dX_i dN_b/dX_j dV.
         """
         C = np.asarray(C, dtype=float)
+        if C.ndim == 2 and self.stiffness_from_tables() and self.constant_jacobian:
+            return self._affine_stiffness(C)
         dV, D = self._gauss
         g, n = D.shape[-3], D.shape[-1]
-        if C.ndim == 2 and (lame := _isotropic(C)):
+        if C.ndim == 2 and (lame := lame_constants(C)):
             A = D.reshape(*D.shape[:-3], g, 3 * n)
             P = (np.swapaxes(A, -1, -2) * dV[..., None, :]) @ A
             P = P.reshape(*P.shape[:-2], 3, n, 3, n)
@@ -260,6 +275,33 @@ class KinematicLinear:
             *B.shape[:-3], 6 * g, 3 * n
         )
         return np.asarray(K.reshape(*K.shape[:-2], 3, n, 3, n))
+
+    def _affine_stiffness(self, C: Array) -> Array:
+        """Return K (..., 3, n, 3, n) of elements with one J each, by the products of the reference cell.
+
+        K_iajb = Σ_kl G_ijkl R_kalb with G_ijkl = det J Σ_pq C_ipjq J^-1_kp J^-1_lq.
+        """
+        J = self._jacobian(tabulate(self.shape, self.rule)[1][:1])[..., 0, :, :]
+        inverse, det = cofactors(J), determinant(J)[..., None, None]
+        pairs = (inverse / det)[..., :, None, :, None] * inverse[..., None, :, None, :]
+        tensor = voigt.tensor(np.moveaxis(voigt.tensor(C), 0, -1))  # j q i p
+        G = pairs.reshape(*J.shape[:-2], 9, 9) @ tensor.transpose(3, 1, 2, 0).reshape(9, 9)
+        K = np.swapaxes(G, -1, -2).reshape(-1, 9) @ reference_products(self.shape, self.rule)
+        n = len(self.nodes)
+        return np.swapaxes(K.reshape(*J.shape[:-2], 3, 3, n, n), -3, -2)
+
+    @cached_property
+    def constant_jacobian(self) -> bool:
+        """Whether J is the same at all Gauss points of each element, but for the rounding of its sums."""
+        J = self._jacobian(tabulate(self.shape, self.rule)[1])
+        change = np.abs(J - J[..., :1, :, :]).max(axis=(-3, -2, -1))
+        size = np.abs(self.X).max(axis=(-2, -1))
+        return bool((change <= 4 * np.finfo(float).eps * size).all())
+
+    @classmethod
+    def stiffness_from_tables(cls) -> bool:
+        """Return whether tables of shape and rule give the stiffness: its steps are not redefined."""
+        return all(getattr(cls, name) is getattr(KinematicLinear, name) for name in STIFFNESS_STEPS)
 
     # ---- mass ----------------------------------------------------------------------------------
 
@@ -290,7 +332,7 @@ class KinematicLinear:
         return np.asarray(np.where((sums > 0).all(axis=-1)[..., None], sums, scaled))
 
 
-def _isotropic(C: Array) -> tuple[float, float] | None:
+def lame_constants(C: Array) -> tuple[float, float] | None:
     """Return (λ, μ) if C is an isotropic elasticity matrix to the last bits, else None."""
     lam, mu = float(C[0, 1]), float(C[3, 3])
     ideal = np.diag([2 * mu] * 3 + [mu] * 3)

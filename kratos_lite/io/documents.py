@@ -32,7 +32,7 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
     if kind == ".mdpa":
-        from kratos_lite.io.mdpa import read_mdpa
+        from kratos_lite.io.mdpa.reader import read_mdpa
 
         return read_mdpa(path, strict=strict)
     stem = "" if path.is_file() else path.name  # "." has no name to put an ending to

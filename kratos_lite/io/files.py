@@ -62,7 +62,7 @@ def write(path: str | Path, thing: Any) -> list[str]:
         thing.save(path)
         return []
     if isinstance(thing, Model):
-        from kratos_lite.io.kratos import document_from
+        from kratos_lite.io.kratos.to_document import document_from
 
         document = document_from(thing)
         return [str(note) for note in document.notes] + write_document(path, document)
@@ -75,7 +75,7 @@ def write_document(path: str | Path, document: Document) -> list[str]:
     """Write a document by the ending of `path`; return notes on what the format cannot hold."""
     kind = ending(path)
     if kind == ".mdpa":
-        from kratos_lite.io.mdpa import write_mdpa
+        from kratos_lite.io.mdpa.writer import write_mdpa
 
         return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
     if kind in ELEM_SET:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
-from uuid import uuid4
 
 from kratos_lite.errors import InputError
 
@@ -69,11 +68,11 @@ def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
         if target.exists() and not target.is_file():
             # Replacing a device such as /dev/null would harm the whole machine.
             raise OSError(errno.EINVAL, "it is a folder or a device, not a file")
-        temporary = target.with_name(f".{uuid4().hex}{''.join(target.suffixes)[-40:]}")
+        temporary = target.with_name(f".{os.urandom(16).hex()}{''.join(target.suffixes)[-40:]}")
         temporary.open("xb").close()
         try:
             if target.exists():
-                shutil.copymode(target, temporary)
+                temporary.chmod(stat.S_IMODE(target.stat().st_mode))
             yield temporary
             with open(temporary, "r+b") as file:
                 os.fsync(file.fileno())
@@ -94,6 +93,8 @@ def _text(path: Path, error: OSError, needed: int) -> str:
         return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
     cure = "choose a file name in a folder where you may write"
     with suppress(OSError):
+        import shutil
+
         free = shutil.disk_usage(folder).free
         if error.errno == errno.ENOSPC:
             cure = f"{free} bytes are free; free some space"

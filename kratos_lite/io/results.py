@@ -44,9 +44,9 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
     return points, {"CAUCHY_STRESS_VECTOR": mean, "VON_MISES_STRESS": voigt.von_mises(mean), **cells}
 
 
-def write_result(path: str | Path, result: Result) -> None:
-    """Write a result by the ending of `path`: .vtu, .vtk or .json."""
-    check_result_ending(path)
+def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
+    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk or .json."""
+    check_result_ending(path, mode)
     ending = Path(path).suffix.lower()
     if ending == ".json":
         write_json(path, result)
@@ -55,15 +55,15 @@ def write_result(path: str | Path, result: Result) -> None:
     if ending == ".vtu":
         from kratos_lite.io.vtu import write_vtu
 
-        write_vtu(path, result.mesh, points, cells)
+        write_vtu(path, result.mesh, points, cells, mode or "binary")
     else:
         from kratos_lite.io.bridge import write_meshio
 
         write_meshio(path, result.mesh, points, cells)
 
 
-def check_result_ending(path: str | Path) -> None:
-    """Raise InputError, before any work is done, for an ending of a format that cannot hold a result."""
+def check_result_ending(path: str | Path, mode: str | None = None) -> None:
+    """Raise InputError, before any work, for a format that cannot hold a result or has no such mode."""
     ending = Path(path).suffix.lower()
     if not ending:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
@@ -71,6 +71,14 @@ def check_result_ending(path: str | Path) -> None:
         raise InputError(
             f"{path}: results cannot be written as {ending!r}; {' '.join(RESULT_ENDINGS)} hold all fields"
         )
+    if mode is not None:
+        from kratos_lite.io.vtu import check_mode
+
+        check_mode(mode)
+        if ending != ".vtu":
+            raise InputError(
+                f"{path}: only .vtu files are written as {mode}; leave the mode out, or write .vtu"
+            )
 
 
 def check_picture(path: str | Path) -> None:
@@ -114,14 +122,14 @@ def write_json(path: str | Path, result: Result) -> None:
 
     from kratos_lite import __version__
 
-    ids = [str(i) for i in result.mesh.node_ids]
+    ids = list(map(str, result.mesh.node_ids.tolist()))
     held = np.flatnonzero((result.reactions != 0).any(axis=1))
     content = {
         "kratos_lite": __version__,
         "units": "SI",
         **summary(result),
         "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
-        "reaction": {ids[row]: result.reactions[row].tolist() for row in held},
+        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
     }
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)

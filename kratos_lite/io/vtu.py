@@ -5,11 +5,10 @@ Source of the format and of the node orders: VTK User's Guide, "VTK File Formats
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from html import escape
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from kratos_lite import voigt
 from kratos_lite.errors import InputError
 from kratos_lite.io.output import write_whole
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.native import threads
 
 _HEAD = """<?xml version="1.0"?>
 <VTKFile type="{}" version="1.0" byte_order="LittleEndian" header_type="UInt64">
@@ -25,7 +25,13 @@ _HEAD = """<?xml version="1.0"?>
 _TYPES = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "|u1": "UInt8"}
 _COMPONENTS = {3: tuple("XYZ"), 6: voigt.NAMES}
 
+MODES = ("binary", "compressed", "ascii")
+"""How the numbers of a file are stored."""
+BLOCK = 1 << 20
+"""Bytes that are compressed together."""
+
 Array = NDArray[Any]
+Buffer: TypeAlias = "bytes | memoryview"
 Named = list[tuple[str, Array]]
 
 
@@ -34,10 +40,11 @@ def write_vtu(
     mesh: Mesh,
     point_data: Mapping[str, Array] | None = None,
     cell_data: Mapping[str, Array] | None = None,
+    mode: str = "binary",
 ) -> None:
     """Write a mesh and its results for ParaView, VTK or meshio, as a whole or not at all.
 
-    The numbers are stored in binary, uncompressed and unrounded.  Blocks of a kind without a shape are
+    The numbers are stored unrounded in every mode.  Blocks of a kind without a shape are
     left out, together with their rows of `cell_data`.
 
     Parameters
@@ -47,11 +54,13 @@ def write_vtu(
     point_data : (n,) or (n, k) numbers on the nodes by name; k = 3 is a vector, k = 6 a stress or strain
         xx, yy, zz, xy, yz, xz, and (n, 3, 3) a tensor.
     cell_data : the same on the elements, with one row per element through all blocks in order.
+    mode : ``binary`` is quickest, ``compressed`` takes the least room, ``ascii`` can be read by eye.
 
     Raises
     ------
     InputError
-        An array has the wrong number of rows or holds no real numbers, or the file cannot be written.
+        The mode is unknown, an array has the wrong number of rows or holds no real numbers, or the
+        file cannot be written.
 
     Examples
     --------
@@ -63,25 +72,66 @@ def write_vtu(
     """
     if Path(path).suffix.lower() == ".gz":
         raise InputError(f"{path}: ParaView reads no gzipped file; write it as .vtu")
+    check_mode(mode)
     blocks = [block for block in mesh.blocks if block.shape is not None]
-    keep = np.repeat([block.shape is not None for block in mesh.blocks], [len(b) for b in mesh.blocks])
+    cells = _checked(cell_data or {}, mesh.n_elements, "element")
+    if len(blocks) < len(mesh.blocks):
+        keep = np.repeat([block.shape is not None for block in mesh.blocks], [len(b) for b in mesh.blocks])
+        cells = [(name, array[keep]) for name, array in cells]
     groups = {
         "PointData": _checked(point_data or {}, mesh.n_nodes, "node"),
-        "CellData": [(n, a[keep]) for n, a in _checked(cell_data or {}, mesh.n_elements, "element")],
-        "Points": [("Points", mesh.points.astype("<f8"))],
-        "Cells": _cells(blocks),
+        "CellData": cells,
+        "Points": [("Points", mesh.points.astype("<f8", copy=False))],
+        "Cells": _cells(blocks, mesh.n_nodes),
     }
-    head = _header(groups, mesh.n_nodes, sum(map(len, blocks)))
-    arrays = [array for group in groups.values() for _, array in group]
+    arrays = [np.ascontiguousarray(array) for group in groups.values() for _, array in group]
+    stored = [[] if mode == "ascii" else _compressed(a) if mode == "compressed" else _raw(a) for a in arrays]
+    offsets = accumulate((sum(map(len, pieces)) for pieces in stored), initial=0)
+    said = (_text(a) if mode == "ascii" else f' format="appended" offset="{next(offsets)}"/>' for a in arrays)
+    head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, said)
+    tail = "</VTKFile>\n" if mode == "ascii" else "\n</AppendedData>\n</VTKFile>\n"
 
     def write(file: BinaryIO) -> None:
         file.write(head.encode())
-        for array in arrays:
-            file.write(array.nbytes.to_bytes(8, "little"))
-            file.write(np.ascontiguousarray(array).data.cast("B") if array.size else b"")
-        file.write(b"\n</AppendedData>\n</VTKFile>\n")
+        for pieces in stored:
+            file.writelines(pieces)
+        file.write(tail.encode())
 
     write_whole(path, write)
+
+
+def check_mode(mode: str) -> None:
+    """Raise InputError for a way to store numbers that is none of `MODES`."""
+    if mode not in MODES:
+        raise InputError(f"a .vtu file is written as {', '.join(MODES)}; got {mode!r}")
+
+
+def _raw(array: Array) -> list[Buffer]:
+    """Return the size in bytes and the numbers."""
+    return [array.nbytes.to_bytes(8, "little"), _bytes(array)]
+
+
+def _bytes(array: Array) -> Buffer:
+    return array.data.cast("B") if array.size else b""
+
+
+def _compressed(array: Array) -> list[Buffer]:
+    """Return the numbers in blocks that zlib has compressed, behind the sizes by which they are found."""
+    import zlib
+    from concurrent.futures import ThreadPoolExecutor
+
+    data = _bytes(array)
+    blocks = [data[at : at + BLOCK] for at in range(0, len(data), BLOCK)]
+    with ThreadPoolExecutor(threads()) as pool:  # zlib lets other threads run meanwhile
+        packed = list(pool.map(lambda block: zlib.compress(block, 1), blocks))
+    sizes = [len(blocks), BLOCK, len(data) % BLOCK, *map(len, packed)]
+    return [np.array(sizes, dtype="<u8").tobytes(), *packed]
+
+
+def _text(array: Array) -> str:
+    """Return the numbers as text that gives the same numbers when it is read, one row a line."""
+    rows = array.reshape(len(array), -1).tolist() if array.size else []
+    return ' format="ascii">\n' + "\n".join(" ".join(map(repr, row)) for row in rows) + "\n</DataArray>"
 
 
 def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
@@ -101,7 +151,9 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
     --------
     >>> write_pvd(getfixture("tmp_path") / "swing.pvd", [(0.0, "swing_0.vtu"), (0.1, "swing_1.vtu")])
     """
-    sets = [f'<DataSet timestep="{float(time)!r}" part="0" file="{escape(name)}"/>\n' for time, name in steps]
+    sets = [
+        f'<DataSet timestep="{float(time)!r}" part="0" file="{_escaped(name)}"/>\n' for time, name in steps
+    ]
     text = _HEAD.format("Collection") + f"<Collection>\n{''.join(sets)}</Collection>\n</VTKFile>\n"
     write_whole(path, text.encode())
 
@@ -116,48 +168,61 @@ def _checked(data: Mapping[str, Array], rows: int, place: str) -> Named:
         if array.dtype.kind not in "biuf":
             raise InputError(f"{name}: expected real or whole numbers; got {array.dtype}")
         small = array.dtype.kind == "b" or array.dtype == np.int32
-        checked.append((name, array.astype("<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8")))
+        kind = "<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8"
+        checked.append((name, array.astype(kind, copy=False)))
     return checked
 
 
-def _cells(blocks: list[Block]) -> Named:
+def _cells(blocks: list[Block], n_nodes: int) -> Named:
     """Return the three arrays that describe the cells, in the node order of VTK."""
-    none = np.zeros(0, dtype="<i8")
-    nodes, sizes, types = [none], [none], [none]
+    size = sum(block.nodes.size for block in blocks)
+    index = "<i4" if max(size, n_nodes) < 2**31 else "<i8"
+    nodes = np.empty(size, dtype=index)
+    at = 0
     for block in blocks:
         assert block.shape is not None
         if not block.shape.vtk:
             raise InputError(f"{block.name}: {block.shape.__name__} has no VTK number; set its `vtk`")
-        nodes.append(block.nodes[:, list(block.shape.to_vtk)].astype("<i8").ravel())
-        sizes.append(np.full(len(block), block.nodes.shape[1]))
-        types.append(np.full(len(block), block.shape.vtk))
+        nodes[at : at + block.nodes.size] = block.nodes[:, list(block.shape.to_vtk)].ravel()
+        at += block.nodes.size
+    counts = [len(block) for block in blocks]
+    sizes = np.repeat([block.nodes.shape[1] for block in blocks], counts)
+    types = np.repeat([block.shape.vtk for block in blocks if block.shape is not None], counts)
     return [
-        ("connectivity", np.concatenate(nodes)),
-        ("offsets", np.cumsum(np.concatenate(sizes)).astype("<i8")),
-        ("types", np.concatenate(types).astype("|u1")),
+        ("connectivity", nodes),
+        ("offsets", np.cumsum(sizes, dtype=index)),
+        ("types", types.astype("|u1")),
     ]
 
 
-def _header(groups: dict[str, Named], n_points: int, n_cells: int) -> str:
-    """Return the XML in front of the binary data; each array is preceded by its size in 8 bytes."""
-    arrays = [array for group in groups.values() for _, array in group]
-    offsets = accumulate((8 + array.nbytes for array in arrays), initial=0)
-    text = _HEAD.format("UnstructuredGrid") + "<UnstructuredGrid>\n"
-    text += f'<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n'
+def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, said: Iterator[str]) -> str:
+    """Return the XML up to the binary data; `said` tells of each array in turn where its numbers are."""
+    text = _HEAD.format("UnstructuredGrid")
+    if mode == "compressed":
+        text = text.replace("header_type", 'compressor="vtkZLibDataCompressor" header_type')
+    text += f'<UnstructuredGrid>\n<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n'
     for group, members in groups.items():
         text += f"<{group}>\n"
-        for name, array in members:
-            text += f'<DataArray {_describe(name, array)} format="appended" offset="{next(offsets)}"/>\n'
+        for (name, array), place in zip(members, said, strict=False):
+            text += f"<DataArray {_describe(name, array)}{place}\n"
         text += f"</{group}>\n"
-    return text + '</Piece>\n</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
+    text += "</Piece>\n</UnstructuredGrid>\n"
+    return text if mode == "ascii" else text + '<AppendedData encoding="raw">\n_'
 
 
 def _describe(name: str, array: Array) -> str:
     """Return type, name and, for more than one number per row, the components as XML attributes."""
-    text = f'type="{_TYPES[array.dtype.str]}" Name="{escape(name)}"'
+    text = f'type="{_TYPES[array.dtype.str]}" Name="{_escaped(name)}"'
     if array.ndim > 1:
         count = int(np.prod(array.shape[1:]))
         text += f' NumberOfComponents="{count}"'
         names = _COMPONENTS.get(count, ()) if name != "Points" else ()
         text += "".join(f' ComponentName{i}="{part}"' for i, part in enumerate(names))
     return text
+
+
+def _escaped(name: str) -> str:
+    """Return a name as the value of an XML attribute."""
+    for sign, word in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
+        name = name.replace(sign, word)
+    return name

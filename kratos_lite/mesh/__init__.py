@@ -1,20 +1,37 @@
 """Mesh: points, blocks of cells of one kind, and named parts.  It knows no physics."""
 
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select, with_rows
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Floats,
+    Ints,
+    Part,
+    distinct,
+    rows_of_ids,
+    select,
+    with_rows,
+    without_repeats,
+)
+from kratos_lite.mesh.connections import Faces, components, equal_sets
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
 from kratos_lite.mesh.topology import outward_signs
 
 __all__ = [
     "NO_ROWS",
     "Block",
+    "Faces",
     "Floats",
     "Ints",
     "Mesh",
     "Part",
     "Where",
     "WhereElements",
+    "components",
+    "distinct",
+    "equal_sets",
     "outward_signs",
     "rows_of_ids",
     "select",
     "with_rows",
+    "without_repeats",
 ]

@@ -85,6 +85,35 @@ def select(blocks: Sequence[Block], rows: Ints) -> list[Block]:
     return [block.take(keep) for block, keep in mine if len(keep)]
 
 
+def distinct(values: Ints) -> Ints:
+    """Return the different values in increasing order.
+
+    Unlike ``np.unique`` it does not import masked arrays, and it is quick where all are equal.
+
+    >>> distinct(np.array([3, 1, 3])).tolist()
+    [1, 3]
+    """
+    if not len(values) or (values == values[0]).all():
+        return values[:1]
+    ordered: Ints = np.sort(values)
+    different: Ints = ordered[np.append(True, ordered[1:] != ordered[:-1])]
+    return different
+
+
+def without_repeats(rows: Ints) -> Ints:
+    """Return the rows, each once, in the order in which they came first.
+
+    >>> without_repeats(np.array([3, 1, 3])).tolist()
+    [3, 1]
+    """
+    if (rows[1:] > rows[:-1]).all():
+        return rows
+    order = np.argsort(rows, kind="stable")
+    ordered = rows[order]
+    first: Ints = np.sort(order[np.append(True, ordered[1:] != ordered[:-1])])
+    return rows[first]
+
+
 def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints:
     """Return where each wanted id stands in `ids`; -1 where it does not.
 

@@ -12,7 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh import topology
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Floats, Ints, Part, rows_of_ids, select
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Floats,
+    Ints,
+    Part,
+    distinct,
+    rows_of_ids,
+    select,
+    without_repeats,
+)
+from kratos_lite.mesh.connections import Faces
 
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
@@ -61,7 +72,7 @@ class Mesh:
         self.conditions = list(conditions)
         self.parts = dict(parts or {})
         self.source = source
-        self._boundary: tuple[list[NDArray[np.int32]], list[Block]] = ([], [])
+        self._faces: tuple[list[NDArray[np.int32]], Faces | None] = ([], None)
         self._check()
 
     def _check(self) -> None:
@@ -174,8 +185,7 @@ class Mesh:
         rows = chosen.astype(np.int64).ravel()
         if len(rows) and (rows.min() < 0 or rows.max() >= self.n_nodes):
             raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows.min()} … {rows.max()}")
-        _, first = np.unique(rows, return_index=True)
-        return rows[np.sort(first)]
+        return without_repeats(rows)
 
     def used_nodes(self) -> NDArray[np.bool_]:
         """Return a mask (n,) of the nodes that belong to an element."""
@@ -196,7 +206,7 @@ class Mesh:
             rows = np.flatnonzero(ids == where)
             if not len(rows):
                 raise MeshError(
-                    f"no element has property {where}; the properties are {np.unique(ids).tolist()}"
+                    f"no element has property {where}; the properties are {distinct(ids).tolist()}"
                 )
             return rows
         if isinstance(where, str):
@@ -229,11 +239,19 @@ class Mesh:
 
         ``ids`` holds the row of the parent element.  Made anew when the blocks have changed.
         """
+        return self.all_faces().boundary
+
+    def all_faces(self, *, anew: bool = False) -> Faces:
+        """Return all faces of the elements and which of them coincide.
+
+        They are kept until a block is exchanged; `anew` finds them in any case.
+        """
         nodes = [block.nodes for block in self.blocks]
-        known, faces = self._boundary
-        if len(known) != len(nodes) or any(a is not b for a, b in zip(known, nodes, strict=True)):
-            faces = topology.boundary(self.blocks, self.n_nodes)
-            self._boundary = (nodes, faces)
+        known, faces = self._faces
+        same = len(known) == len(nodes) and all(a is b for a, b in zip(known, nodes, strict=True))
+        if faces is None or anew or not same:
+            faces = Faces(self.blocks)
+            self._faces = (nodes, faces)
         return faces
 
     def reoriented(self) -> Mesh:

@@ -1,4 +1,4 @@
-"""Topology: the faces on the boundary of a mesh, and cells that are turned inside out."""
+"""Topology: how faces lie on the boundary of a mesh, and cells that are turned inside out."""
 
 from __future__ import annotations
 
@@ -7,53 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.mesh.blocks import Block, Ints, with_rows
-from kratos_lite.shapes import FACE_SHAPES, Shape
-
-
-def boundary(blocks: Sequence[Block], n_nodes: int) -> list[Block]:
-    """Return the faces that belong to one element only, outward, one block per face shape.
-
-    ``ids`` holds the row of the parent element.
-    """
-    by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
-    for block, at in with_rows(blocks):
-        parents = np.arange(at.start, at.stop)
-        for face in block.shape.faces if block.shape is not None else ():
-            by_size.setdefault(len(face), []).append((block.nodes[:, list(face)], parents))
-    faces = []
-    for size, groups in by_size.items():
-        parents = np.concatenate([p for _, p in groups])
-        nodes = np.vstack([f for f, _ in groups])
-        shape = FACE_SHAPES[size]
-        faces.append(Block(shape.__name__, nodes, parents, 0 * parents, shape))
-    single = _occurs_once([_key(block, n_nodes) for block in faces])
-    kept = [block.take(mask) for block, mask in zip(faces, single, strict=True)]
-    return [block for block in kept if len(block)]
-
-
-def _key(block: Block, n_nodes: int) -> NDArray[np.int64]:
-    """Return two numbers (2, m) that name the corners of each face, whatever their order."""
-    assert block.shape is not None
-    corners = np.sort(block.nodes[:, : block.shape.corners].astype(np.int64), axis=1)
-    if corners.shape[1] == 3:
-        corners = np.column_stack([corners, np.full(len(corners), n_nodes)])
-    a, b, c, d = corners.T
-    return np.stack([a * (n_nodes + 1) + b, c * (n_nodes + 1) + d])
-
-
-def _occurs_once(keys: list[NDArray[np.int64]]) -> list[NDArray[np.bool_]]:
-    """Return for each group of keys (2, m) which of them occur once in all groups together."""
-    if not keys:
-        return []
-    every = np.hstack(keys)
-    order = np.lexsort(every)
-    ordered = every[:, order]
-    same = (ordered[:, 1:] == ordered[:, :-1]).all(axis=0)
-    once = np.ones(every.shape[1], dtype=bool)
-    once[order[1:][same]] = False
-    once[order[:-1][same]] = False
-    return np.split(once, np.cumsum([k.shape[1] for k in keys])[:-1])
+from kratos_lite.mesh.blocks import Block, Ints
+from kratos_lite.shapes import Shape
 
 
 def outward_signs(boundary: Sequence[Block], block: Block) -> NDArray[np.float64]:

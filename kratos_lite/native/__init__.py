@@ -13,13 +13,10 @@ KRATOS_LITE_ISA : ``base``, ``avx2`` or ``avx512`` in place of the best this mac
 
 from __future__ import annotations
 
-import logging
 import os
 from functools import cache
 from importlib import import_module
 from typing import Any
-
-logger = logging.getLogger("kratos_lite")
 
 
 @cache
@@ -38,7 +35,10 @@ def kernels(name: str) -> Any:
 
 @cache
 def _say_once(why: str) -> None:
-    logger.warning("compiled kernels are not available (%s); computing with NumPy", why)
+    import logging
+
+    log = logging.getLogger("kratos_lite")
+    log.warning("compiled kernels are not available (%s); computing with NumPy", why)
 
 
 def threads() -> int:

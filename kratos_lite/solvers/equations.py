@@ -33,7 +33,7 @@ class Equations:
     points : (n, 3) m, from which multigrid knows the rigid modes.
     method, reason : as `choose` gives them.
 
-    What a method prepares (the reduced matrix, the multigrid hierarchy) is made once and kept.
+    What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
     """
 
     K: Any
@@ -58,7 +58,7 @@ class Equations:
 
     def _solve(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
         if self.method == "dense":
-            q = direct.solve_dense(self._full, b)
+            q = self._factors.solve(b)
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
@@ -71,7 +71,7 @@ class Equations:
                     f"{why}; {len(b)} unknowns are too many to factorise instead; look for thin elements or "
                     "ν near 0.5, use quadratic elements, or ask for solver='direct'"
                 )
-        q = direct.solve_direct(self._sparse, b)
+        q = self._factors.solve(b)
         return Solution(q, "direct", why, 0, backward_error(self._sparse, q, b))
 
     @cached_property
@@ -89,6 +89,13 @@ class Equations:
         if T is not None:
             return (T.T @ A @ T).tocsr()
         return A if len(free) == A.shape[0] else A[free][:, free]
+
+    @cached_property
+    def _factors(self) -> direct.Factorisation:
+        """The reduced matrix factorised."""
+        return (
+            direct.factorise_dense(self._full) if self.method == "dense" else direct.factorise(self._sparse)
+        )
 
     @cached_property
     def _hierarchy(self) -> tuple[Any, Callable[[Array], Array], float]:

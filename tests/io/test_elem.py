@@ -10,7 +10,7 @@ import pytest
 from kratos_lite.errors import MAX_PROBLEMS, InputError
 from kratos_lite.io.document import Constraint, Data, Document, Properties
 from kratos_lite.io.elem import read_elem, write_elem
-from kratos_lite.io.mdpa import read_mdpa
+from kratos_lite.io.mdpa.reader import read_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.shapes import Quadrilateral4, Tetrahedron4, Triangle3
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.mdpa import read_mdpa
+from kratos_lite.io.mdpa.reader import read_mdpa
 from kratos_lite.io.mdpa.rows import Layout, _exact, _fast
 from kratos_lite.io.mdpa.scan import Source
 from kratos_lite.io.names import condition_shape, element_shape

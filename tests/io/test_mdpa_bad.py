@@ -7,7 +7,7 @@ import pytest
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Document
-from kratos_lite.io.mdpa import read_mdpa
+from kratos_lite.io.mdpa.reader import read_mdpa
 
 REFUSED = {
     "01_truncated_in_nodes": r":15:7: the file ends inside 'Begin Nodes' of line 10; 'End Nodes' is missing",

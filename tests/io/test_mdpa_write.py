@@ -11,8 +11,9 @@ import pytest
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Properties
-from kratos_lite.io.mdpa import read_mdpa, write_mdpa
+from kratos_lite.io.mdpa.reader import read_mdpa
 from kratos_lite.io.mdpa.values import Table
+from kratos_lite.io.mdpa.writer import write_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.shapes import Hexahedron8, Quadrilateral4
 

@@ -10,7 +10,8 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.io.document import Constraint, Document
 from kratos_lite.io.elem import read_elem, write_elem
-from kratos_lite.io.mdpa import read_mdpa, write_mdpa
+from kratos_lite.io.mdpa.reader import read_mdpa
+from kratos_lite.io.mdpa.writer import write_mdpa
 from kratos_lite.io.text import blank_comments, read_bytes
 from kratos_lite.mesh import Block, Mesh
 

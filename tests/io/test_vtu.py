@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.vtu import write_pvd, write_vtu
+from kratos_lite.io.vtu import BLOCK, MODES, write_pvd, write_vtu
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import SHAPES, Shape
 
@@ -74,8 +74,9 @@ def arrays(data):
     return {data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)) for i in range(data.GetNumberOfArrays())}
 
 
-def test_vtk_finds_every_cell_and_point(mesh, tmp_path):
-    write_vtu(tmp_path / "all.vtu", mesh)
+@pytest.mark.parametrize("mode", MODES)
+def test_vtk_finds_every_cell_and_point(mesh, tmp_path, mode):
+    write_vtu(tmp_path / "all.vtu", mesh, mode=mode)
     grid = read(tmp_path / "all.vtu")
     assert len(SOLIDS) == 9
     assert [grid.GetCellType(e) for e in range(grid.GetNumberOfCells())] == [SHAPES[s].vtk for s in SOLIDS]
@@ -120,18 +121,19 @@ def test_vtk_knows_the_quadratic_pyramid_with_straight_edges_and_nearly_the_curv
         assert total == pytest.approx(volume(shape, X), rel=off)
 
 
-def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path):
+@pytest.mark.parametrize("mode", MODES)
+def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path, mode):
     n, m = mesh.n_nodes, mesh.n_elements
     numbers = np.random.default_rng(1)
     nodal = {
         "DISPLACEMENT": numbers.normal(size=(n, 3)),
         "NODE_ID": np.arange(n) + 2**40,
-        "T<1>&\"'": np.full(n, np.nan),
+        "T<1>&\"'": np.full(n, 0.1 if mode == "ascii" else np.nan),
         "FLAG": np.arange(n) % 2 == 0,
         "TENSOR": numbers.normal(size=(n, 3, 3)),
     }
     cells = {"STRESS": numbers.normal(size=(m, 6)).astype(np.float32), "PART": np.arange(m, dtype=np.int32)}
-    write_vtu(tmp_path / "all.vtu", mesh, nodal, cells)
+    write_vtu(tmp_path / "all.vtu", mesh, nodal, cells, mode)
     grid = read(tmp_path / "all.vtu")
     found = arrays(grid.GetPointData())
     assert list(found) == list(nodal)
@@ -146,11 +148,12 @@ def test_vtk_reads_every_array_with_its_type_and_component_names(mesh, tmp_path)
     assert [shift.GetComponentName(i) for i in range(3)] == ["X", "Y", "Z"]
 
 
-def test_meshio_reads_the_same_file(tmp_path):
+@pytest.mark.parametrize("mode", MODES)
+def test_meshio_reads_the_same_file(tmp_path, mode):
     meshio = pytest.importorskip("meshio")
     names = [name for name in SOLIDS if name not in {"Wedge15", "Pyramid13"}]  # meshio 5.3.5 fails on these
     mesh = row_of_cells(names)
-    write_vtu(tmp_path / "all.vtu", mesh, {"U": mesh.points**2}, {"E": np.arange(8.0)})
+    write_vtu(tmp_path / "all.vtu", mesh, {"U": mesh.points**2}, {"E": np.arange(8.0)}, mode)
     found = meshio.read(tmp_path / "all.vtu")
     np.testing.assert_array_equal(found.points, mesh.points)
     np.testing.assert_array_equal(found.point_data["U"], mesh.points**2)
@@ -162,11 +165,27 @@ def test_meshio_reads_the_same_file(tmp_path):
         np.testing.assert_array_equal(cells.data, block.nodes[:, order])
 
 
-def test_a_mesh_without_elements_is_written(tmp_path):
-    write_vtu(tmp_path / "points.vtu", Mesh(np.eye(3)), {"T": np.arange(3.0)})
+@pytest.mark.parametrize("mode", MODES)
+def test_a_mesh_without_elements_is_written(tmp_path, mode):
+    write_vtu(tmp_path / "points.vtu", Mesh(np.eye(3)), {"T": np.arange(3.0)}, mode=mode)
     grid = read(tmp_path / "points.vtu")
     assert (grid.GetNumberOfPoints(), grid.GetNumberOfCells()) == (3, 0)
     np.testing.assert_array_equal(arrays(grid.GetPointData())["T"], [0, 1, 2])
+
+
+@pytest.mark.parametrize("n", [BLOCK // 8, BLOCK // 8 + 1, BLOCK // 2])
+def test_compressed_numbers_come_back_whether_or_not_they_fill_their_blocks(tmp_path, n):
+    points, values = np.zeros((n, 3)), np.arange(n) / 3
+    write_vtu(tmp_path / "plain.vtu", Mesh(points), {"T": values})
+    write_vtu(tmp_path / "points.vtu", Mesh(points), {"T": values}, mode="compressed")
+    np.testing.assert_array_equal(arrays(read(tmp_path / "points.vtu").GetPointData())["T"], values)
+    assert (tmp_path / "points.vtu").stat().st_size < (tmp_path / "plain.vtu").stat().st_size / 2
+
+
+def test_an_unknown_mode_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"a \.vtu file is written as binary, compressed, ascii; got 'text'"):
+        write_vtu(tmp_path / "a.vtu", Mesh(np.eye(3)), mode="text")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

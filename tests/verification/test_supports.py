@@ -353,3 +353,16 @@ def test_reaction_moments_balance_the_load():
     np.testing.assert_allclose(result.reaction("x-").sum(axis=0), (-10, -20, 30), rtol=1e-10)
     moment = np.cross(mesh.points, result.reactions).sum(axis=0)
     np.testing.assert_allclose(moment, -np.cross((3, 0.5, 0.5), (10, 20, -30)), rtol=1e-10)
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_one_equation_among_very_many_decides(held):
+    model = kl.Model(kl.box((6, 6, 1), (14, 14, 1)), STEEL)
+    model.fix("z-", "z")  # 225 equations that all hold the same three motions
+    model.fix([0], "xy")
+    if held:
+        model.fix(model.mesh.nodes("x+")[-1:], "y")
+        assert model.check() == []
+    else:
+        with pytest.raises(kl.ModelError, match=r"can still move: rotation about z\. Fix more"):
+            model.check()

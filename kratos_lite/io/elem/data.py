@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.io.document import Data, Properties
 from kratos_lite.io.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
 from kratos_lite.io.elem.grammar import Form, Run, Source
 from kratos_lite.io.elem.mesh import twice
-from kratos_lite.mesh import Floats, Mesh
+from kratos_lite.mesh import Floats, Ints, Mesh, without_repeats
 
 VECTORS = frozenset((b"DISPLACEMENT", b"VELOCITY", b"ACCELERATION", b"ROTATION", b"REACTION"))
+MAX_NAMES = 100
+"""More variables than this are taken statement by statement, in linear time."""
 Values: TypeAlias = "dict[int, tuple[float, int]]"
 """Value and line by node id."""
 
@@ -71,23 +75,46 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
         for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
             source.add(run.starts[i], files.no_node(ids[i]))
         values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
-        lines, repeated = source.lines(run.starts).tolist(), []
-        for node, name, value, line, start in zip(
-            ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
-        ):
-            nodes = found.setdefault(name.decode("ascii"), {})
-            earlier, at = nodes.setdefault(node, (value, line))
-            if earlier != value:
-                source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
-            elif at != line:
-                repeated.append(start)
-        if repeated:
-            source.note(repeated[0], f"{len(repeated)} statements repeat earlier ones, from here on")
+        if not _add_all(found, run.columns[1], ids, values, source.lines(run.starts)):
+            _add_singly(found, source, run, ids, values)
         for name in sorted(set(run.columns[1]) & VECTORS):
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")
             source.add(start, f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z")
     return found
+
+
+def _add_all(
+    found: dict[str, Values], names: Sequence[bytes], ids: Ints, values: Floats, lines: NDArray[np.int32]
+) -> bool:
+    """Add all statements at once if each names a degree of freedom of its own; return whether they do."""
+    place = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    if len(place) > MAX_NAMES or any(name.decode("ascii") in found for name in place):
+        return False
+    codes = np.fromiter(map(place.__getitem__, names), np.int64, len(names))
+    rows = [np.flatnonzero(codes == i) for i in range(len(place))]
+    if any(len(without_repeats(ids[mine])) < len(mine) for mine in rows):
+        return False
+    for name, mine in zip(place, rows, strict=True):
+        pairs = zip(values[mine].tolist(), lines[mine].tolist(), strict=True)
+        found[name.decode("ascii")] = dict(zip(ids[mine].tolist(), pairs, strict=True))
+    return True
+
+
+def _add_singly(found: dict[str, Values], source: Source, run: Run, ids: Ints, values: Floats) -> None:
+    """Add statements one by one; note which repeat an earlier one, and which contradict it."""
+    lines, repeated = source.lines(run.starts).tolist(), []
+    for node, name, value, line, start in zip(
+        ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
+    ):
+        nodes = found.setdefault(name.decode("ascii"), {})
+        earlier, at = nodes.setdefault(node, (value, line))
+        if earlier != value:
+            source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
+        elif at != line:
+            repeated.append(start)
+    if repeated:
+        source.note(repeated[0], f"{len(repeated)} statements repeat earlier ones, from here on")
 
 
 def _initial(source: Source, run: Run) -> Floats:
@@ -98,8 +125,10 @@ def _initial(source: Source, run: Run) -> Floats:
     return source.reals(run.columns[3], run.starts)
 
 
-def _value(source: Source, form: Form, text: bytes, start: int) -> Any:
+def _value(source: Source, form: Form, text: bytes | float, start: int) -> Any:
     """Return the value of a property: a float, or a vector or matrix as an array."""
+    if not isinstance(text, bytes):
+        return float(text)
     if form is not MATRIX:
         values = source.reals([text], [start] * (text.count(b",") + 1))
         return values if form is VECTOR else float(values[0])

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Note
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
 from kratos_lite.mesh import Floats, Ints
+from kratos_lite.native import kernels
 
 INT = rb"\d+(?![\w.+-])"
 REAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?(?![\w.+-])"
@@ -35,6 +37,8 @@ WORDS = {
     "<rows>": (rb"(%b(?:\s*,\s*%b)*)\s*(?:,\s*)?" % (ROW, ROW), "a row [number, …]"),
     "<next>": (rb"(?:,\s*|(?=\]))", "',' or ']'"),
 }
+SMALL = 200_000
+"""Bytes below which the compiled kernels are not worth loading."""
 KEYWORDS = ("NODES", "ELEMENTS", "CONDITIONS", "PROPERTIES", "ElementsGroup")
 HOME = {"NODES": ".node, .cond or .init", "ELEMENTS": ".elem", "CONDITIONS": ".cond", "PROPERTIES": ".prop"}
 
@@ -63,10 +67,15 @@ class Form:
         """The pattern of each word, and what to call it when it is missing."""
         return [(re.compile(pattern), name) for pattern, name in map(_word, self.text.split())]
 
+    @property
+    def ends(self) -> bool:
+        """Whether this is a whole statement, which may end with semicolons."""
+        return not (self.text.startswith(("[", "]")) or self.row)
+
     @cached_property
     def match(self) -> Callable[[bytes, int], re.Match[bytes] | None]:
         """Match one statement, with the ``;`` after it."""
-        ending = rb"" if self.text.startswith(("[", "]")) or self.row else rb"[\s;]*"
+        ending = rb"[\s;]*" if self.ends else rb""
         return re.compile(b"".join(_word(word)[0] for word in self.text.split()) + ending).match
 
     @cached_property
@@ -89,13 +98,24 @@ def _word(word: str) -> tuple[bytes, str]:
     return re.escape(word.encode()) + (rb"\b\s*" if word.isalpha() else rb"\s*"), repr(word)
 
 
+class Lists(NamedTuple):
+    """Lists of ids that are read already: how many each holds, and all one after the other."""
+
+    counts: Ints
+    ids: Ints
+
+
 @dataclass
 class Run:
-    """Statements or rows of one form that follow each other: the values by column, and where they start."""
+    """Statements or rows of one form that follow each other: the values by column, and where they start.
+
+    A column holds the words of the file, or the compiled reader has put numbers in their place:
+    an array, or `Lists`; names are always words.
+    """
 
     form: Form
     head: tuple[bytes, ...] = ()
-    columns: list[tuple[bytes, ...]] = field(default_factory=list)
+    columns: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
 
 
@@ -135,18 +155,22 @@ class Source:
         """Note something odd at an offset."""
         self.notes.append(Note(int(self.lines([start])[0]), text, Path(self.name).name))
 
-    def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
+    def integers(self, tokens: Iterable[bytes] | Ints, starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.
 
-        `starts` are the offsets of the statements that hold the integers.
+        `starts` are the offsets of the statements that hold the integers.  Arrays are right already.
         """
+        if isinstance(tokens, np.ndarray):
+            return tokens
         text = b" ".join(tokens).replace(b",", b" ")
         values = np.fromstring(text, dtype=np.int64, sep=" ")
         self._check(text, starts, (values < least) | (values == np.iinfo(np.int64).max), integer)
         return values
 
-    def reals(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints) -> Floats:
+    def reals(self, tokens: Iterable[bytes] | Floats, starts: Sequence[int] | Ints) -> Floats:
         """Convert tokens, or commas between them; a number too large for a float is a problem."""
+        if isinstance(tokens, np.ndarray):
+            return tokens
         text = b" ".join(tokens).replace(b",", b" ").translate(_EXPONENTS)
         values = np.fromstring(text, sep=" ")
         self._check(text, starts, ~np.isfinite(values), real)
@@ -199,6 +223,22 @@ class Source:
 
     def _take(self, form: Form, position: int) -> tuple[Run, int]:
         """Take as many statements of one form as follow each other here."""
+        return self._take_compiled(form, position) or self._take_words(form, position)
+
+    def _take_compiled(self, form: Form, position: int) -> tuple[Run, int] | None:
+        """Take the statements in compiled code; None where it knows less of them than the patterns do."""
+        words = form.text.split()
+        is_plain = not {"<reals>", "<rows>"} & set(words)
+        text = kernels("text") if is_plain and len(self.data) > SMALL else None
+        if text is None:
+            return None
+        starts, columns, end = text.statements(self.data, position, words, form.ends)
+        if form.match(self.data, end):
+            return None
+        columns = [Lists(*column) if isinstance(column, tuple) else column for column in columns]
+        return Run(form, (), columns, starts.tolist()), end
+
+    def _take_words(self, form: Form, position: int) -> tuple[Run, int]:
         data, match = self.data, form.match
         rows: list[tuple[bytes, ...]] = []
         starts: list[int] = []

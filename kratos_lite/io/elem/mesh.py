@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from kratos_lite.io.document import Note
 from kratos_lite.io.elem.files import ElemFiles
-from kratos_lite.io.elem.grammar import Run
+from kratos_lite.io.elem.grammar import Lists, Run
 from kratos_lite.io.names import condition_shape, element_shape
-from kratos_lite.mesh import Block, Ints, Mesh
+from kratos_lite.mesh import Block, Floats, Ints, Mesh
 from kratos_lite.shapes import Shape
 
+Numbers = TypeVar("Numbers", Ints, Floats)
 NO_NODES = np.zeros((0, 0), dtype=np.int32)
 
 
@@ -40,15 +42,16 @@ def read_mesh(files: ElemFiles) -> Mesh:
 def _nodes(files: ElemFiles) -> Mesh:
     name = files.sources[".elem"].name if ".elem" in files.sources else files.stem
     source = files.sources.get(".node")
-    columns, starts = _joined(files.runs[".node"], 4)
+    runs = files.runs[".node"]
+    starts = _starts(runs)
     before = files.problems.count
     if source is None or not starts:
         if source is not None and not before:
             source.add(0, "there are no nodes; expected NODES = NodesList([[id, x, y, z], …])")
         files.nodes_known = False
         return Mesh(np.zeros((0, 3)), source=name)
-    ids = source.integers(columns[0], starts)
-    points = np.column_stack([source.reals(column, starts) for column in columns[1:]])
+    ids = _joined(runs, 0, source.integers)
+    points = np.column_stack([_joined(runs, column, source.reals) for column in (1, 2, 3)])
     keep = np.ones(len(ids), dtype=bool)
     for first, again in _duplicates(ids):
         keep[again] = False
@@ -70,9 +73,10 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
         if run.head:
             run.columns.insert(1, run.head * len(run.starts))
     source = files.sources[kind.ending]
-    (tokens, names, bodies, numbers), starts = _joined(runs, 4)
-    ids = source.integers(tokens, starts)
-    properties = source.integers(numbers, starts, least=0)
+    starts, names = _starts(runs), [name for run in runs for name in run.columns[1]]
+    ids = _joined(runs, 0, source.integers)
+    properties = _joined(runs, 3, lambda tokens, at: source.integers(tokens, at, least=0))
+    counts, listed = _lists(runs)
     lines = source.lines(starts)
     for first, again in _duplicates(ids):
         source.add(starts[again], twice(f"{kind.word} {ids[again]}", lines[first]))
@@ -81,22 +85,21 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
         rows = slice(end, end := end + len(list(group)))
         text = name.decode("ascii")
         block = Block(text, NO_NODES, ids[rows], properties[rows], kind.shape_of(text), lines[rows])
-        _connect(block, bodies[rows], starts[rows], (files, mesh, kind))
+        _connect(block, counts[rows], listed(rows), starts[rows], (files, mesh, kind))
         blocks.append(block)
     return blocks
 
 
 def _connect(
-    block: Block, bodies: Sequence[bytes], starts: Sequence[int], at: tuple[ElemFiles, Mesh, Kind]
+    block: Block, widths: Ints, bodies: Any, starts: Sequence[int], at: tuple[ElemFiles, Mesh, Kind]
 ) -> None:
-    """Fill ``block.nodes`` with the node rows that the texts `bodies` name."""
+    """Fill ``block.nodes`` with the node rows of the `widths` ids that each of the texts `bodies` names."""
     files, mesh, kind = at
     source = files.sources[kind.ending]
 
     def add(cell: int, message: str) -> None:
         source.add(starts[cell], f"{kind.word} {block.ids[cell]} ({block.name}){message}")
 
-    widths = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
     for i in np.flatnonzero(widths != width).tolist():
         add(i, f" has {widths[i]} nodes; expected {width}")
@@ -127,15 +130,33 @@ def _note_unused(files: ElemFiles, mesh: Mesh) -> None:
         )
 
 
-def _joined(runs: Sequence[Run], count: int) -> tuple[list[list[bytes]], list[int]]:
-    """Return the columns of several runs, and the starts of their statements, one after the other."""
-    columns: list[list[bytes]] = [[] for _ in range(count)]
-    starts: list[int] = []
-    for run in runs:
-        starts += run.starts
-        for column, part in zip(columns, run.columns, strict=True):
-            column.extend(part)
-    return columns, starts
+def _joined(runs: Sequence[Run], column: int, read: Callable[[Any, list[int]], Numbers]) -> Numbers:
+    """Return the numbers of a column of several runs, one after the other."""
+    return np.concatenate([read(run.columns[column], run.starts) for run in runs])
+
+
+def _starts(runs: Sequence[Run]) -> list[int]:
+    return [start for run in runs for start in run.starts]
+
+
+def _lists(runs: Sequence[Run]) -> tuple[Ints, Callable[[slice], Any]]:
+    """Return how many ids each cell lists, and a function that gives the ids, or texts, of some cells."""
+    columns = [run.columns[2] for run in runs]
+    if all(isinstance(column, Lists) for column in columns):
+        counts = np.concatenate([column.counts for column in columns])
+        ids = np.concatenate([column.ids for column in columns])
+        ends = np.append(0, np.cumsum(counts))
+        return counts, lambda rows: ids[ends[rows.start] : ends[rows.stop]]
+    texts = [_bodies(column) if isinstance(column, Lists) else column for column in columns]
+    bodies = [body for column in texts for body in column]
+    return np.array([body.count(b",") + 1 if body else 0 for body in bodies]), lambda rows: bodies[rows]
+
+
+def _bodies(lists: Lists) -> list[bytes]:
+    """Return the ids of each list as text."""
+    return [
+        ",".join(map(str, ids.tolist())).encode() for ids in np.split(lists.ids, np.cumsum(lists.counts)[:-1])
+    ]
 
 
 def _duplicates(ids: Ints) -> Iterator[tuple[int, int]]:

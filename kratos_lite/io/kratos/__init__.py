@@ -1,7 +1,6 @@
-"""What Kratos data mean for a model, and the way back."""
+"""What Kratos data mean for a model (`to_model`), and the way back (`to_document`)."""
 
-from kratos_lite.io.kratos.to_document import document_from
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.kratos.variables import Variables
 
-__all__ = ["Variables", "document_from", "model_from"]
+__all__ = ["Variables", "model_from"]

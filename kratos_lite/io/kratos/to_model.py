@@ -12,7 +12,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, VECTORS, Variables, components
-from kratos_lite.mesh import Block, rows_of_ids
+from kratos_lite.mesh import Block, distinct, rows_of_ids
 from kratos_lite.model import Model
 
 
@@ -39,7 +39,7 @@ def model_from(
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh.blocks)
-    used = {int(p) for block in document.mesh.blocks for p in np.unique(block.properties)}
+    used = {int(p) for block in document.mesh.blocks for p in distinct(block.properties)}
     sources = [properties.source for properties in document.properties.values() if properties.source]
     problems = Problems(sources[0] if sources else document.mesh.source)
     for number in sorted(used & document.properties.keys()):

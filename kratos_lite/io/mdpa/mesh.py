@@ -13,7 +13,7 @@ from kratos_lite.io.document import Note
 from kratos_lite.io.mdpa.rows import Layout, Rows, read_rows, width_of_first_line
 from kratos_lite.io.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Block, Mesh, distinct
 from kratos_lite.shapes import FACE_SHAPES
 
 Ints = NDArray[np.int64]
@@ -72,10 +72,14 @@ def repeated(ids: Ints) -> list[tuple[int, int]]:
     >>> repeated(np.array([4, 7, 4]))
     [(2, 0)]
     """
-    if len(ids) < 2 or (np.diff(ids) > 0).all():
+    if len(ids) < 2 or (ids[1:] > ids[:-1]).all():
         return []
-    _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-    first = first[inverse.ravel()]
+    order = np.argsort(ids, kind="stable")
+    starts = np.append(True, ids[order][1:] != ids[order][:-1])
+    if starts.all():
+        return []
+    first = np.empty_like(order)
+    first[order] = order[starts][np.cumsum(starts) - 1]
     again = np.flatnonzero(first != np.arange(len(ids)))
     return [(int(row), int(first[row])) for row in again]
 
@@ -148,8 +152,9 @@ def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
 
 def _check_properties(source: Source, blocks: list[Block], word: str, declared: Sequence[int]) -> None:
     for block in blocks:
-        missing = np.setdiff1d(block.properties, np.asarray(declared, dtype=np.int64))
-        for number in missing:
+        for number in distinct(block.properties):
+            if number in declared:
+                continue
             rows = np.flatnonzero(block.properties == number)
             more = f" (and {len(rows) - 1} more {word}s)" if len(rows) > 1 else ""
             source.problems.add(

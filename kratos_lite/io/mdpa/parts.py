@@ -11,7 +11,7 @@ from kratos_lite.io.document import Note
 from kratos_lite.io.mdpa.rows import Layout, read_rows
 from kratos_lite.io.mdpa.scan import LISTS, Frame, Source
 from kratos_lite.io.mdpa.values import read_values
-from kratos_lite.mesh import Part, rows_of_ids
+from kratos_lite.mesh import Part, rows_of_ids, without_repeats
 
 Ints = NDArray[np.int64]
 PART_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
@@ -34,7 +34,7 @@ class PartReader:
         for frame in frames:
             self._read(frame, "")
         for (name, kind), rows in self._rows.items():
-            setattr(self.parts[name], kind, _unique(np.concatenate(rows)))
+            setattr(self.parts[name], kind, without_repeats(np.concatenate(rows)))
         return self.parts
 
     def _read(self, frame: Frame, parent: str) -> None:
@@ -98,9 +98,3 @@ def _chain(full: str) -> list[str]:
 
 def _singular(kind: str) -> str:
     return "geometry" if kind == "geometries" else kind[:-1]
-
-
-def _unique(rows: Ints) -> Ints:
-    """Return the rows without repetition, in the order in which they came first."""
-    _, first = np.unique(rows, return_index=True)
-    return rows[np.sort(first)].astype(np.int64)

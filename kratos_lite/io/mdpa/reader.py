@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.document import Document, Properties
-from kratos_lite.io.mdpa.data import read_constraints, read_data
+from kratos_lite.io.mdpa.data import read_data
 from kratos_lite.io.mdpa.mesh import read_blocks, read_mesh, repeated
 from kratos_lite.io.mdpa.parts import PartReader
 from kratos_lite.io.mdpa.scan import TOP, Frame, Source, scan
@@ -65,8 +65,11 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     document = Document(mesh, properties, tables=tables)
     document.geometries = read_blocks(source, frames["Geometries"], mesh)
     document.model_data, _ = read_values(source, [span for f in frames["ModelPartData"] for span in f.spans])
-    for frame in frames["Constraints"]:
-        document.constraints += read_constraints(source, frame, mesh.node_ids)
+    if frames["Constraints"]:
+        from kratos_lite.io.mdpa.constraints import read_constraints
+
+        for frame in frames["Constraints"]:
+            document.constraints += read_constraints(source, frame, mesh.node_ids)
     _refuse_repeated_constraints(source, document)
     ids = {
         "nodes": mesh.node_ids,

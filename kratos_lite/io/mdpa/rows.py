@@ -1,6 +1,7 @@
 """Rows of numbers in an `.mdpa` block: a vectorised reader, and an exact one that finds what is wrong.
 
-The fast reader gives up on anything unusual; only the exact reader decides what is an error.
+The fast readers, compiled and with NumPy, give up on anything unusual; only the exact reader decides
+what is an error.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.io.mdpa.scan import Source, Span
+from kratos_lite.io.mdpa.scan import SMALL, Source, Span
 from kratos_lite.io.text import MAX_ID, integer, real, shown
+from kratos_lite.native import kernels
 
 BLANKS = b" \t\n\v\f"
 DIGITS = b"0123456789"
@@ -58,7 +60,9 @@ class Rows:
 
 def read_rows(source: Source, span: Span, layout: Layout) -> Rows:
     """Return the rows in a piece of the text; what is wrong goes to the problems of the source."""
-    return _fast(source, span, layout) or _exact(source, span, layout)
+    is_small = span[1] - span[0] < SMALL
+    rows = None if is_small else _compiled(source, span, layout)
+    return rows or _fast(source, span, layout) or _exact(source, span, layout)
 
 
 def width_of_first_line(source: Source, span: Span) -> int:
@@ -68,6 +72,13 @@ def width_of_first_line(source: Source, span: Span) -> int:
         return 0
     end = source.data.find(b"\n", first.start(), span[1])
     return len(source.data[first.start() : end if end >= 0 else span[1]].split())
+
+
+def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:
+    """Return the rows if each stands plain on a line of its own, else None."""
+    text = kernels("text")
+    found = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
+    return Rows(*found) if found else None
 
 
 def _fast(source: Source, span: Span, layout: Layout) -> Rows | None:

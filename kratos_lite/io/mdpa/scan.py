@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.document import Note
 from kratos_lite.io.text import shown
+from kratos_lite.native import kernels
 
 Span = tuple[int, int]
+SMALL = 200_000
+"""Bytes below which the compiled kernels are not worth loading."""
 MAX_DEPTH = 64
 """Deepest nesting of blocks."""
 WORD = re.compile(rb"[^ \t\n\v\f]+")
@@ -136,8 +139,12 @@ def scan(source: Source) -> Frame:
 
 def _statements(data: bytes) -> list[int]:
     """Return the offsets of the words Begin and End."""
-    found = []
+    text = kernels("text") if len(data) > SMALL else None
+    found: list[int] = []
     for word in (b"Begin", b"End"):
+        if text:
+            found += text.find_word(data, word)
+            continue
         at = data.find(word)
         while at >= 0:
             after = at + len(word)

@@ -1,0 +1,192 @@
+"""Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
+
+Sets: ``kratos error growth assembly parse skips cube1``.
+
+``report`` makes docs/benchmarks.md and its picture from the results kept; ``references`` makes the energies
+of the scenes without an exact field.  See benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from benchmarks import cases, curves, report, scenes, sets
+from benchmarks.driver import ROOT, Driver, Run, results, scratch
+from benchmarks.programs import HELPERS, PROGRAMS
+
+RESULTS = Path(__file__).with_name("results")
+PAGE, PICTURE = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "benchmark.png"
+QUICK_SIZES = {"4N": (4, 8), "8N": (4, 8), "10N": (2, 4), "20N": (2, 4), "27N": (2, 4)}
+QUICK_PROGRAMS = ("kratos_lite", "kratos_lite NumPy", "Kratos", "scikit-fem")
+
+
+def quick(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return a set that ends within two minutes."""
+    names = options.programs
+    some = [name for name in names if name in QUICK_PROGRAMS]
+    runs = sets.goal_runs(names, (("block", "8N", 10), ("cube", "8N", 10), ("block", "27N", 4)))
+    runs += sets.error_runs(some, ("manufactured", "cantilever"), QUICK_SIZES)
+    runs += sets.assembly_runs(some, {"8N": 10, "10N": 4, "27N": 4})
+    return runs + sets.parse_runs(names, (10,)) + sets.cube1_runs(names) + sets.skip_runs(names, 8)
+
+
+def kratos(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return the goal rows and the real scenes."""
+    goals = sets.GOALS
+    if options.cells:
+        goals = tuple((*kind, n) for kind in dict.fromkeys(goal[:2] for goal in goals) for n in options.cells)
+    given = options.cases
+    files = cases.prepared(given, folder) if given.is_dir() else []
+    return sets.goal_runs(options.programs, goals) + sets.case_runs(options.programs, files)
+
+
+def error(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return run time against error."""
+    sizes = {kind: tuple(options.cells) for kind in scenes.KINDS} if options.cells else None
+    return sets.error_runs(options.programs, options.scenes or sets.ERROR_SCENES, sizes)
+
+
+def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return the clamped block from small to large."""
+    return sets.growth_runs(options.programs, options.cells or sets.GROWTH, options.elements or ("8N",))
+
+
+def assembly(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return the assembly alone."""
+    sizes = {kind: options.cells[0] for kind in scenes.KINDS} if options.cells else None
+    return sets.assembly_runs(options.programs, sizes)
+
+
+def full(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return everything."""
+    return [
+        run for name in COMMANDS if name not in ("quick", "full") for run in COMMANDS[name](options, folder)
+    ]
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
+    "quick": quick,
+    "full": full,
+    "kratos": kratos,
+    "error": error,
+    "growth": growth,
+    "assembly": assembly,
+    "parse": lambda options, folder: sets.parse_runs(options.programs, options.cells or (20, 50)),
+    "skips": lambda options, folder: sets.skip_runs(options.programs, (options.cells or (20,))[0]),
+    "cube1": lambda options, folder: sets.cube1_runs(options.programs),
+}
+REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1}
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run a command; return 0, or 1 where nothing could be measured."""
+    options = arguments(words)
+    if options.command == "report":
+        return write_report()
+    if options.command == "references":
+        return references(options.cells or (4, 8, 16))
+    with scratch() as name:
+        repeats = options.repeats or REPEATS.get(options.command, 5)
+        driver = Driver(Path(name), repeats, options.pythons, options.limit, options.memory * 1e9)
+        runs = COMMANDS[options.command](options, Path(name))
+        rows = driver.measure([r for r in runs if not options.elements or r.kind in (*options.elements, "")])
+    print("\n" + report.text(rows))
+    if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(json.dumps(results(driver, options.command, rows), indent=1) + "\n")
+        print(f"wrote {options.out}")
+    return 0 if any("failed" not in row for row in rows) else 1
+
+
+def arguments(words: Sequence[str] | None) -> argparse.Namespace:
+    """Return the arguments of the command line."""
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("command", choices=[*COMMANDS, "report", "references"])
+    add("--programs", nargs="+", choices=[*PROGRAMS, *HELPERS], default=[*PROGRAMS, *HELPERS], metavar="NAME",
+        help="some of: " + ", ".join([*PROGRAMS, *HELPERS]))  # fmt: skip
+    add(
+        "--scenes",
+        nargs="+",
+        choices=list(scenes.SCENES),
+        metavar="NAME",
+        help="for error: some of its scenes",
+    )
+    add(
+        "--elements",
+        nargs="+",
+        choices=scenes.KINDS,
+        metavar="KIND",
+        help="some of " + " ".join(scenes.KINDS),
+    )
+    add("--cells", nargs="+", type=int, metavar="N", help="cells along an edge, in place of those of the set")
+    add("--repeats", type=int, metavar="N", help="runs of each measurement; their median counts")
+    add("--python", action="append", default=[], metavar="[PROGRAM=]PATH",
+        help="interpreter of the other programs, or of one; or KRATOS_LITE_BENCH_PYTHON")  # fmt: skip
+    add("--cases", type=Path, default=ROOT.parent / "shared" / "cases", metavar="FOLDER",
+        help="real scenes, each a folder with case.json")  # fmt: skip
+    add("--limit", type=float, default=1800.0, metavar="SECONDS", help="after which one run is stopped")
+    add("--memory", type=float, default=20.0, metavar="GB", help="that one run may take")
+    add(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="write the results as JSON, e.g. benchmarks/results/kratos.json",
+    )
+    options = parser.parse_args(words)
+    options.pythons = pythons([*os.environ.get("KRATOS_LITE_BENCH_PYTHON", "").split(","), *options.python])
+    return options
+
+
+def pythons(words: Sequence[str]) -> dict[str, str]:
+    """Return interpreters by program; "" stands for all but kratos_lite.
+
+    >>> pythons(["/opt/peers/bin/python", "GetFEM=/usr/bin/python3"])
+    {'': '/opt/peers/bin/python', 'GetFEM': '/usr/bin/python3'}
+    """
+    found = {}
+    for word in filter(None, words):
+        program, sign, path = word.partition("=")
+        found[program if sign else ""] = path if sign else word
+    if unknown := set(found) - {"", *PROGRAMS, *HELPERS}:
+        raise SystemExit(
+            f"--python: {', '.join(sorted(unknown))} is no program; known are {', '.join(PROGRAMS)}"
+        )
+    return found
+
+
+def write_report() -> int:
+    """Make the page and its picture from the results kept."""
+    kept = [json.loads(path.read_text()) for path in sorted(RESULTS.glob("*.json"))]
+    if not kept:
+        print(f"there are no results in {RESULTS}; make some with --out", file=sys.stderr)
+        return 1
+    PAGE.write_text(report.page(kept))
+    curves.picture(report.of([row for found in kept for row in found["rows"]], "error"), PICTURE)
+    print(f"wrote {PAGE}")
+    return 0
+
+
+def references(sizes: Sequence[int]) -> int:
+    """Print the energies of the scenes without exact field: 27N, each size twice the last, extrapolated."""
+    for name in scenes.ENERGIES:
+        found = []
+        for n in sizes:
+            scene = scenes.make(name, "27N", sets.scaled(n, name))
+            u = scene.model.solve(tolerance=1e-11).displacement()
+            found.append(float((scene.forces() * u).sum()) / 2)
+        a, b, c = found[-3:]
+        limit = c - (c - b) ** 2 / (c - 2 * b + a)
+        print(f"{name}: {' '.join(f'{energy:.10g}' for energy in found)} -> {limit:.10g}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

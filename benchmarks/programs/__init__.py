@@ -1,0 +1,52 @@
+"""The programs compared: one small module each, run as ``python -m benchmarks.programs.NAME job.json``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+ALL = ("4N", "8N", "10N", "20N", "27N")
+
+
+@dataclass(frozen=True)
+class Program:
+    """How a program is run and what it takes.
+
+    Attributes
+    ----------
+    module : of this package.
+    kinds : element kinds that it has.
+    curved : those of them that follow curved edges as ours do.
+    environment : variables of its process.
+    digits : of its displacements, where it prints fewer than it computes.
+    code : run as ``python -c`` in place of a module.
+    """
+
+    module: str
+    kinds: tuple[str, ...] = ALL
+    curved: tuple[str, ...] = ()
+    environment: dict[str, str] = field(default_factory=dict)
+    digits: int = 15
+    code: str = ""
+
+
+ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+QUADRATIC = ("10N", "20N", "27N")
+PROGRAMS = {
+    "kratos_lite": Program("lite", curved=QUADRATIC),
+    "kratos_lite NumPy": Program("lite", curved=QUADRATIC, environment={"KRATOS_LITE_KERNELS": "numpy"}),
+    "Kratos": Program("kratos", curved=QUADRATIC),
+    "scikit-fem": Program("scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),
+    "FElupe": Program("felupe_", curved=QUADRATIC, environment=ONE_BLAS_THREAD),
+    "fedoo": Program("fedoo_", ("4N", "8N", "10N", "20N"), ("10N", "20N"), ONE_BLAS_THREAD),
+    "SfePy": Program("sfepy_", ("4N", "8N", "10N", "27N"), environment=ONE_BLAS_THREAD),
+    "NGSolve": Program("ngsolve_", ("4N", "8N"), environment=ONE_BLAS_THREAD),
+    "CalculiX": Program("calculix", ("4N", "8N", "10N", "20N"), ("10N", "20N"), digits=6),
+    "GetFEM": Program("getfem_"),
+}
+"""Every program that solves, by the name shown."""
+HELPERS = {
+    "pyamg": Program("pyamg_"),
+    "meshio": Program("meshio_"),
+    "import numpy": Program("", code="import numpy"),
+}
+"""What else is timed: pyamg as it comes on our matrix, a reader, and the least that NumPy takes to start."""

@@ -1,0 +1,133 @@
+"""Kratos: read the `.mdpa` file, build, solve by its AMGCL at the same residual, write VTK."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+
+from benchmarks.programs.common import Array, Job, run
+
+AXES = "XYZ"
+KEEP: list[Any] = []  # Kratos frees a model as soon as Python forgets it
+
+
+def work(job: Job) -> Array | None:
+    """Do the job."""
+    with job.phase("import"):
+        import KratosMultiphysics as KM
+        import KratosMultiphysics.LinearSolversApplication
+        import KratosMultiphysics.StructuralMechanicsApplication as SMA
+    KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
+    job.answer["version"] = ".".join(re.findall(r"\d+", KM.KratosGlobals.Kernel.Version())[:3])
+    with job.phase("read"):
+        part = read(job, KM, SMA)
+    if job.task == "parse":
+        return None
+    with job.phase("check"):
+        prepare(part, KM, SMA)
+    solve(job, KM, part)
+    if job.task == "assembly":
+        return None
+    if job.given.get("write"):
+        with job.phase("write"):
+            write(job, KM, part)
+    u = KM.VariableUtils().GetSolutionStepValuesVector(part.Nodes, KM.DISPLACEMENT, 0, 3)
+    return np.array(u).reshape(-1, 3)
+
+
+def read(job: Job, KM: Any, SMA: Any) -> Any:
+    """Return the model part of the file."""
+    model = KM.Model()
+    KEEP.append(model)
+    part = model.CreateModelPart("Structure")
+    part.ProcessInfo[KM.DOMAIN_SIZE] = 3
+    for variable in (KM.DISPLACEMENT, KM.REACTION, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD, SMA.SURFACE_LOAD):
+        part.AddNodalSolutionStepVariable(variable)
+    for variable in (KM.POSITIVE_FACE_PRESSURE, KM.NEGATIVE_FACE_PRESSURE):
+        part.AddNodalSolutionStepVariable(variable)
+    KM.ModelPartIO(job.stem, KM.IO.READ | KM.IO.SKIP_TIMER).ReadModelPart(part)
+    return part
+
+
+def prepare(part: Any, KM: Any, SMA: Any) -> None:
+    """Add degrees of freedom and the constitutive law."""
+    for axis in AXES:
+        displacement, reaction = (getattr(KM, f"{name}_{axis}") for name in ("DISPLACEMENT", "REACTION"))
+        KM.VariableUtils().AddDof(displacement, reaction, part)
+    for properties in part.Properties:
+        if not properties.Has(KM.CONSTITUTIVE_LAW):
+            properties.SetValue(KM.CONSTITUTIVE_LAW, SMA.LinearElastic3DLaw())
+
+
+def linear_solver(job: Job, KM: Any) -> Any:
+    """Return Kratos's AMGCL with 3 × 3 blocks, or the solver that the job names."""
+    from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
+
+    settings = {
+        "solver_type": "amgcl",
+        "tolerance": job.tolerance,
+        "max_iteration": 1000,
+        "block_size": 3,
+        "use_block_matrices_if_possible": True,
+        "verbosity": 0,
+    }
+    return ConstructSolver(KM.Parameters(json.dumps(job.given.get("kratos_solver", settings))))
+
+
+def solve(job: Job, KM: Any, part: Any) -> None:
+    """Take the steps of ResidualBasedLinearStrategy one by one, each timed."""
+    solver = linear_solver(job, KM)
+    scheme = KM.ResidualBasedIncrementalUpdateStaticScheme()
+    builder = KM.ResidualBasedBlockBuilderAndSolver(solver)
+    strategy = KM.ResidualBasedLinearStrategy(part, scheme, builder, True, False, False, False)
+    strategy.SetEchoLevel(0)
+    space = KM.UblasSparseSpace()
+    with job.phase("pattern"):
+        strategy.Initialize()
+        strategy.InitializeSolutionStep()
+        A, b = strategy.GetSystemMatrix(), strategy.GetSystemVector()
+    if job.task == "assembly":
+        job.fastest("matrix", lambda: build(space, builder, scheme, part, A, b))
+        return
+    with job.phase("matrix"):
+        builder.Build(scheme, part, A, b)
+    x = KM.Vector(b.Size())
+    space.SetToZeroVector(x)
+    with job.phase("constrain"):
+        builder.ApplyDirichletConditions(scheme, part, A, x, b)
+    with job.phase("solve"):
+        solver.Initialize(A, x, b)
+        solver.Solve(A, x, b)
+    with job.phase("verify"):
+        scheme.Update(part, builder.GetDofSet(), A, x, b)
+        builder.CalculateReactions(scheme, part, A, x, b)
+    job.answer["unknowns"] = b.Size()
+    if iterations := solver.GetIterationsNumber():
+        job.answer["iterations"] = iterations
+
+
+def build(space: Any, builder: Any, scheme: Any, part: Any, A: Any, b: Any) -> None:
+    """Build the matrix anew."""
+    space.SetToZeroMatrix(A)
+    space.SetToZeroVector(b)
+    builder.Build(scheme, part, A, b)
+
+
+def write(job: Job, KM: Any, part: Any) -> None:
+    """Write displacements, reactions and nodal stresses as binary VTK."""
+    settings = {
+        "model_part_name": "Structure",
+        "file_format": "binary",
+        "output_path": job.given["folder"],
+        "output_sub_model_parts": False,
+        "nodal_solution_step_data_variables": ["DISPLACEMENT", "REACTION"],
+        "gauss_point_variables_extrapolated_to_nodes": ["CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS"],
+    }
+    KM.VtkOutput(part, KM.Parameters(json.dumps(settings))).PrintOutput()
+
+
+if __name__ == "__main__":
+    run(work)

@@ -1,0 +1,65 @@
+"""kratos_lite: read the `.mdpa` file, solve, write a `.vtu` file; its phases are those of its report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.programs.common import Array, Job, run
+
+WORDS = {"tolerance", "solver"}
+
+
+def work(job: Job) -> Array | None:
+    """Do the job."""
+    with job.phase("import"):
+        import kratos_lite as kl
+
+        if job.given.get("preload"):  # as the other programs load it, too: not part of their work
+            import pyamg  # noqa: F401
+            import scipy.sparse.linalg  # noqa: F401
+    job.answer["version"] = kl.__version__
+    with job.phase("read"):
+        model = kl.read(f"{job.stem}.mdpa")
+    if job.task == "parse":
+        return None
+    if job.task == "assembly":
+        return assembly(job, model)
+    result = model.solve(**{word: job.given[word] for word in WORDS if word in job.given})
+    report = result.report
+    job.answer["phases"] |= report.seconds
+    job.answer |= {
+        "iterations": report.iterations,
+        "residual": report.backward_error,
+        "unknowns": report.unknowns,
+        "solver": report.solver,
+    }
+    if job.given.get("stress"):
+        with job.phase("stress"):
+            result.stress(job.given["stress"])
+    if job.given.get("write"):
+        with job.phase("write"):
+            ending = ".vtu" if job.given["write"] is True else job.given["write"]
+            result.save(f"{job.given['folder']}/result{ending}")
+    return np.asarray(result.displacement())
+
+
+def assembly(job: Job, model: Any) -> None:
+    """Time the pattern and the matrix alone."""
+    from kratos_lite.assembly import assemble_stiffness
+
+    batches = model.batches()
+    points, connectivity = model.mesh.points, [batch.nodes for batch in batches]
+
+    def pattern() -> Any:
+        from kratos_lite.assembly import PatternCache
+
+        return PatternCache().get(len(points), connectivity)
+
+    made = job.fastest("pattern", pattern)
+    job.fastest("matrix", lambda: assemble_stiffness(points, batches, made))
+
+
+if __name__ == "__main__":
+    run(work)

@@ -1,0 +1,255 @@
+"""From rows to tables, ratios and docs/benchmarks.md."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.curves import cheapest, starts, time_to_error
+from benchmarks.tables import OURS, THEIRS, Row, ratio, seconds, table
+
+SOLVER_PHASES = ("setup", "set-up", "solve")
+"""Phases of a report that belong to the linear solver."""
+
+
+def linear_solver(row: Row) -> float | None:
+    """Return the seconds of the linear solver of a row."""
+    found = [s for name, s in row.get("phases", {}).items() if name in SOLVER_PHASES]
+    return sum(found) if found else None
+
+
+def of(rows: Iterable[Row], group: str) -> list[Row]:
+    """Return the rows of a group that hold measurements."""
+    return [row for row in rows if row["group"] == group and "failed" not in row]
+
+
+def by_place(rows: Iterable[Row]) -> dict[tuple[str, str, int], dict[str, Row]]:
+    """Return the rows of each scene, kind and size by program."""
+    found: dict[tuple[str, str, int], dict[str, Row]] = defaultdict(dict)
+    for row in rows:
+        found[row["scene"], row["kind"], row["n"]][row["program"]] = row
+    return dict(found)
+
+
+def label(place: tuple[str, str, int]) -> str:
+    """Return the name of a scene, kind and size."""
+    scene, kind, n = place
+    return " ".join(word for word in (scene, kind, f"n = {n}" if n else "") if word)
+
+
+# ---- goal rows -------------------------------------------------------------------------------------
+
+
+def goals(rows: Sequence[Row]) -> str:
+    """Return whole processes beside Kratos: seconds, memory, and their ratios."""
+    body = []
+    for place, found in by_place(rows).items():
+        ours, theirs = found.get(OURS), found.get(THEIRS)
+        if ours is None:
+            continue
+        other = theirs or {}
+        numpy = found.get("kratos_lite NumPy", {})
+        difference = other.get("errors", {}).get("difference")
+        body.append(
+            [
+                label(place),
+                str(ours.get("unknowns", "")),
+                seconds(ours["process"]),
+                seconds(numpy.get("process")),
+                seconds(other.get("process")),
+                ratio(ours["process"], other.get("process")),
+                f"{ours['peak'] / 1e6:.0f}",
+                f"{other['peak'] / 1e6:.0f}" if other else "",
+                ratio(ours["peak"], other.get("peak")),
+                ratio(linear_solver(ours), linear_solver(other)),
+                ratio(linear_solver(ours), linear_solver(found.get("pyamg", {}))),
+                "" if difference is None else f"{difference:.0e}",
+            ]
+        )
+    head = [
+        "scene",
+        "unknowns",
+        "kratos_lite s",
+        "NumPy s",
+        "Kratos s",
+        "time",
+        "kratos_lite MB",
+        "Kratos MB",
+    ]
+    return table([*head, "memory", "solver", "solver / pyamg", "difference"], body)
+
+
+def phases(rows: Sequence[Row], scale: float = 1.0) -> str:
+    """Return the phases of every row, in seconds."""
+    names = list(dict.fromkeys(name for row in rows for name in row.get("phases", {}) if name != "answer"))
+    body = [
+        [
+            label((row["scene"], row["kind"], row["n"])),
+            row["program"],
+            *(seconds(row["phases"].get(name)) for name in names),
+            seconds(row["process"]),
+        ]
+        for row in rows
+    ]
+    return table(["scene", "program", *names, "process"], body)
+
+
+# ---- growth and the rest -----------------------------------------------------------------------------
+
+
+def exponent(unknowns: Sequence[float], values: Sequence[float]) -> float:
+    """Return p of the fit values ~ unknowns^p.
+
+    >>> round(exponent([1, 10, 100], [2, 20, 200]), 6)
+    1.0
+    """
+    return float(np.polyfit(np.log(unknowns), np.log(values), 1)[0])
+
+
+def growth(rows: Sequence[Row]) -> str:
+    """Return iterations, seconds and bytes per degree of freedom by size, with the fitted exponent."""
+    body = [
+        [
+            row["program"],
+            row["kind"],
+            str(row["n"]),
+            str(row.get("unknowns", "")),
+            str(row.get("iterations", "")),
+            seconds(row["work"]),
+            f"{1e6 * row['work'] / row['unknowns']:.3g}",
+            f"{row['peak'] / row['unknowns']:.0f}",
+        ]
+        for row in rows
+        if row.get("unknowns")
+    ]
+    text = table(
+        ["program", "element", "n", "unknowns", "iterations", "s", "µs per unknown", "B per unknown"], body
+    )
+    for program, kind in dict.fromkeys((row["program"], row["kind"]) for row in rows):
+        mine = [
+            r for r in rows if (r["program"], r["kind"]) == (program, kind) and r.get("unknowns", 0) > 20_000
+        ]
+        if len(mine) > 1:
+            p = exponent([r["unknowns"] for r in mine], [r["work"] for r in mine])
+            text += f"\n{program}, {kind}: seconds grow as unknowns^{p:.2f} (fit above 20 000 unknowns).\n"
+    return text
+
+
+def compared(rows: Sequence[Row], names: Sequence[str], process: bool = False) -> str:
+    """Return phases of all programs on each scene, with the ratio of kratos_lite to each of them."""
+    body = []
+    for place, found in by_place(rows).items():
+        ours = found.get(OURS)
+        for program, row in found.items():
+            times = {name: row["phases"].get(name) for name in names}
+            times |= {"process": row["process"]} if process else {}
+            mine = {name: ours["phases"].get(name) for name in names} if ours else {}
+            mine |= {"process": ours["process"]} if ours and process else {}
+            cells = [
+                seconds(t)
+                + (f" ({ratio(mine.get(name), t)})" if t and mine.get(name) and row is not ours else "")
+                for name, t in times.items()
+            ]
+            body.append([label(place), program, *cells])
+    return table(["scene", "program", *names, *(["process"] if process else [])], body)
+
+
+def skips(rows: Sequence[Row]) -> str:
+    """Return what each skip is worth: seconds and memory beside the row it is compared with."""
+    pairs = {"half_unloaded": "two_bodies", "unreferenced": "block", "unloaded": "block", "block": "block"}
+    plain = {row["scene"]: row for row in rows if row["variant"] in ("plain", "two bodies, both loaded")}
+    body = []
+    for row in rows:
+        base = plain.get(pairs.get(row["scene"], row["scene"]))
+        time = ratio(row["process"], base["process"]) if base else ""
+        memory = ratio(row["peak"], base["peak"]) if base else ""
+        name = label((row["scene"], row["kind"], row["n"]))
+        body.append([row["variant"], name, seconds(row["process"]), time, f"{row['peak'] / 1e6:.0f}", memory])
+    return table(["what", "scene", "process s", "of plain", "MB", "of plain"], body)
+
+
+def failures(rows: Iterable[Row]) -> str:
+    """Return what did not end well."""
+    return table(
+        ["scene", "program", "what happened"],
+        [[label((r["scene"], r["kind"], r["n"])), r["program"], r["failed"]] for r in rows if "failed" in r],
+    )
+
+
+SECTIONS = {
+    "goal": ("From `.mdpa` to a result file, whole processes", goals),
+    "case": ("Real scenes, whole processes", goals),
+    "error": ("Run time against error", time_to_error),
+    "growth": ("Growth: the clamped block up to the memory", growth),
+    "assembly": ("Assembly alone", lambda rows: compared(rows, ("pattern", "matrix", "matrix, again"))),
+    "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read",), process=True)),
+    "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
+    "skips": ("What need not be computed", skips),
+}
+"""Title and table of each group of rows."""
+NOTES = {
+    "goal": "Ratios are kratos_lite / Kratos. Goals: time ≤ 0.5, memory ≤ 0.6, solver (set-up and solve) "
+    "≤ 0.6 of Kratos's AMGCL and ≤ 0.15 of pyamg as it comes.",
+    "case": "Ratios are kratos_lite / Kratos; the files are small, so this is starting, reading and writing.",
+    "error": "Seconds from reading to the solution (without start and output) to relative errors of "
+    "displacement; ≤ where the smallest size measured is already better, — where the largest is not good "
+    "enough.",
+    "growth": "Goal: at most 2000 B per unknown for 8N.",
+    "assembly": "Seconds, in brackets kratos_lite / program. Programs without a pattern of their own make it "
+    "within the matrix; `again` is the shortest of further times.",
+    "parse": "Seconds, in brackets kratos_lite / program.",
+    "cube1": "Seconds, in brackets kratos_lite / program; `import numpy` is a process that does that alone.",
+    "skips": "Whole processes; the ratio is to the plain row of the same scene.",
+}
+
+
+def text(rows: Sequence[Row]) -> str:
+    """Return all tables of the rows as Markdown."""
+    parts = []
+    for group, (title, make) in SECTIONS.items():
+        mine = of(rows, group)
+        body = make(mine) if mine else ""
+        if not body:
+            continue
+        parts += [f"## {title}\n", NOTES[group] + "\n", body]
+        if group == "goal":
+            parts += ["Phases in seconds:\n", phases(mine)]
+        if group == "error":
+            sentences = cheapest(mine)
+            parts += ["Start of each program, not part of these seconds:\n", starts(mine)]
+            parts += ["### Which element\n", *(f"- {sentence}" for sentence in sentences), ""]
+    if lost := failures(rows):
+        parts += ["## What did not end well\n", lost]
+    return "\n".join(parts)
+
+
+def page(kept: Sequence[dict[str, Any]], image: str = "images/benchmark.png") -> str:
+    """Return docs/benchmarks.md of the results kept."""
+    rows = [row for found in kept for row in found["rows"]]
+    lines = [
+        "# Benchmarks\n",
+        "This page is made by `python -m benchmarks report` from `benchmarks/results/`; what is measured "
+        "and how is stated in [the charter](../benchmarks/README.md). Compare ratios, not seconds: each "
+        "table is from one run, in which the programs took turns.\n",
+        table(
+            ["run", "date", "machine", "versions"],
+            [
+                [
+                    f"`{found['command']}`",
+                    found["date"],
+                    f"{found['machine']['processor']}, {found['machine']['cores']} cores",
+                    ", ".join(f"{name} {version}" for name, version in found["versions"].items()),
+                ]
+                for found in kept
+            ],
+        ),
+    ]
+    body = text(rows)
+    if of(rows, "error"):
+        picture_line = f"![Error over seconds, one curve per program and element]({image})\n"
+        title = f"## {SECTIONS['error'][0]}\n"
+        body = body.replace(title, f"{title}\n{picture_line}", 1)
+    return "\n".join([*lines, body])

@@ -1,0 +1,148 @@
+"""The sets of runs: which scenes, element kinds, sizes and programs each command measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.driver import Run
+from benchmarks.programs import PROGRAMS
+from benchmarks.scenes import KINDS
+
+ERROR_SCENES = ("manufactured", "sphere", "bending", "cook", "l_domain", "cavity", "cantilever", "block")
+CURVED = ("sphere", "cavity")
+"""Scenes where quadratic elements have curved edges."""
+SIZES = {
+    "4N": (4, 8, 16, 24, 32),
+    "8N": (4, 8, 16, 24, 32, 48),
+    "10N": (2, 4, 8, 12, 16),
+    "20N": (2, 4, 8, 12, 16, 20),
+    "27N": (2, 4, 8, 12, 16, 20),
+}
+"""Cells along an edge of the error scenes, by element kind."""
+SHARE = {"sphere": 0.75, "bending": 0.625, "cavity": 0.75, "cantilever": 0.5, "l_domain": 2.0, "cook": 2.0}
+"""Of these sizes that a scene takes: some have more cells for the same n, plane ones fewer."""
+GOALS = (
+    *(("block", "8N", n) for n in (20, 32, 50)),
+    *(("block", "27N", n) for n in (10, 20)),
+    ("block", "10N", 20),
+    ("block", "4N", 32),
+    *(("cube", "8N", n) for n in (20, 32, 50)),
+)
+GROWTH = (10, 14, 20, 28, 40, 50, 64, 80, 100, 124)
+ASSEMBLY = {"4N": 20, "8N": 20, "10N": 12, "20N": 12, "27N": 10}
+SKIPS: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...] = (
+    ("two_bodies", "two bodies, both loaded", ()),
+    ("half_unloaded", "two bodies, one loaded", ()),
+    ("block", "plain", ()),
+    ("unreferenced", "as many nodes again without elements", ()),
+    ("unloaded", "no load", ()),
+    ("block", "stress at nodes asked for", (("stress", "node"),)),
+    ("block", "stress at Gauss points asked for", (("stress", "gauss"),)),
+    ("block", "written as .vtu", (("write", True),)),
+    ("block", "written as .vtk", (("write", ".vtk"),)),
+    ("block", "written as .json", (("write", ".json"),)),
+)
+"""Scene, what it is, and options: each row is compared with the plain one of the same size."""
+FROM_FILES = ("kratos_lite", "kratos_lite NumPy", "Kratos")
+"""Programs that read `.mdpa` files with everything they say."""
+
+
+def takes(program: str, scene: str, kind: str) -> bool:
+    """Return whether a program has this element for this scene.
+
+    >>> takes("SfePy", "sphere", "27N"), takes("SfePy", "block", "27N")
+    (False, True)
+    """
+    given = PROGRAMS[program]
+    curved = scene in CURVED and kind not in ("4N", "8N")
+    return kind in (given.curved if curved else given.kinds)
+
+
+def goal_runs(programs: Sequence[str], goals: Iterable[tuple[str, str, int]] = GOALS) -> list[Run]:
+    """Return whole processes from `.mdpa` to VTK files, and pyamg as it comes for its solver alone."""
+    chosen = [program for program in (*FROM_FILES, "pyamg") if program in programs]
+    options = (("write", True),)
+    return [Run("goal", program, *goal, options=options) for goal in goals for program in chosen]
+
+
+def case_runs(programs: Sequence[str], files: Iterable[Path]) -> list[Run]:
+    """Return the same for real scenes, whole in `.mdpa` files."""
+    chosen = [program for program in FROM_FILES if program in programs]
+    options = (("write", True),)
+    return [Run("case", program, str(file), "", 0, options=options) for file in files for program in chosen]
+
+
+def error_runs(
+    programs: Sequence[str],
+    scenes: Sequence[str] = ERROR_SCENES,
+    sizes: dict[str, tuple[int, ...]] | None = None,
+) -> list[Run]:
+    """Return run time against error: every scene, kind, size and program."""
+    options = (("errors", True), ("preload", True))
+    runs = []
+    for scene in scenes:
+        for kind in KINDS:
+            for n in dict.fromkeys(scaled(n, scene) for n in (sizes or SIZES)[kind]):
+                runs += [
+                    Run("error", program, scene, kind, n, options=options)
+                    for program in programs
+                    if program in PROGRAMS and takes(program, scene, kind)
+                ]
+    return runs
+
+
+def scaled(n: int, scene: str) -> int:
+    """Return the size of a scene that costs about as much as n cells along the edge of a cube.
+
+    >>> scaled(16, "cantilever"), scaled(16, "block")
+    (8, 16)
+    """
+    return max(1, round(n * SHARE.get(scene, 1.0)))
+
+
+def growth_runs(
+    programs: Sequence[str], sizes: Sequence[int] = GROWTH, kinds: Sequence[str] = ("8N",)
+) -> list[Run]:
+    """Return the clamped block from small to as large as memory takes."""
+    return [
+        Run("growth", program, "block", kind, n)
+        for kind in kinds
+        for n in sizes
+        for program in FROM_FILES[:1] + FROM_FILES[2:]
+        if program in programs
+    ]
+
+
+def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None, repeat: int = 4) -> list[Run]:
+    """Return pattern and matrix alone, on the clamped block."""
+    wanted = [p for p in programs if p in PROGRAMS and p != "CalculiX"]
+    return [
+        Run("assembly", program, "block", kind, n, "assembly", (("repeat", repeat),))
+        for kind, n in (sizes or ASSEMBLY).items()
+        for program in wanted
+        if takes(program, "block", kind)
+    ]
+
+
+def parse_runs(programs: Sequence[str], sizes: Sequence[int] = (20, 50)) -> list[Run]:
+    """Return reading a `.mdpa` file: kratos_lite, Kratos and meshio."""
+    chosen = [p for p in ("kratos_lite", "kratos_lite NumPy", "Kratos", "meshio") if p in programs]
+    return [Run("parse", program, "block", "8N", n, "parse") for n in sizes for program in chosen]
+
+
+def cube1_runs(programs: Sequence[str]) -> list[Run]:
+    """Return the whole process for one element, beside a process that imports NumPy alone."""
+    chosen = [p for p in ("import numpy", *FROM_FILES) if p in programs]
+    return [Run("cube1", program, "cube", "8N", 1) for program in chosen]
+
+
+def skip_runs(programs: Sequence[str], n: int = 20) -> list[Run]:
+    """Return pairs with and without work that can be skipped."""
+    if "kratos_lite" not in programs:
+        return []
+    return [
+        Run("skips", "kratos_lite", scene, "8N", n, options=options, variant=variant)
+        for scene, variant, options in SKIPS
+    ]

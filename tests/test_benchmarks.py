@@ -1,0 +1,247 @@
+"""The benchmarks: exact fields, the error routine, the programs on one discrete problem, and the report.
+
+Nothing here asserts a time.
+"""
+
+import doctest
+import json
+import platform
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks import __main__ as command  # noqa: E402
+from benchmarks import cases, curves, driver, errors, fields, meshes, report, scenes, sets, tables  # noqa: E402
+from benchmarks.programs import PROGRAMS  # noqa: E402
+
+E, NU = 1.0, 0.3
+RNG = np.random.default_rng(5)
+
+
+# ---- exact fields ------------------------------------------------------------------------------------
+
+
+def stress(field, X):
+    lam, mu = fields.lame(E, NU)
+    G = fields.gradient(field, X)
+    strain = (G + np.swapaxes(G, -1, -2)) / 2
+    return lam * np.trace(strain, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) + 2 * mu * strain
+
+
+def divergence(field, X, h=1e-3):
+    steps = [(stress(field, X + h * axis) - stress(field, X - h * axis)) / (2 * h) for axis in np.eye(3)]
+    return sum(step[..., j] for j, step in enumerate(steps))
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        fields.hollow_sphere(E, NU, 1.0, 2.0, 1.0),
+        fields.bending(0.1, NU),
+        fields.l_domain(E, NU),
+        fields.cavity(E, NU, 1.0, 1.0),
+    ],
+    ids=["sphere", "bending", "l_domain", "cavity"],
+)
+def test_exact_fields_are_in_equilibrium(field):
+    X = RNG.uniform(1.2, 1.8, (6, 3))
+    assert np.abs(divergence(field, X)).max() < 2e-6 * np.abs(stress(field, X)).max()
+
+
+def test_manufactured_force_is_what_the_field_needs():
+    X = RNG.uniform(0.1, 0.9, (6, 3))
+    force = fields.manufactured_force(X, E, NU)
+    assert np.abs(divergence(fields.manufactured, X) + force).max() < 1e-4 * np.abs(force).max()
+
+
+def test_surfaces_carry_the_stress_that_they_should():
+    normal = RNG.uniform(0.2, 1, (6, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+
+    def traction(field, X, n):
+        return np.einsum("pij,pj->pi", stress(field, X), n)
+
+    sphere = fields.hollow_sphere(E, NU, 1.0, 2.0, 1.0)
+    np.testing.assert_allclose(traction(sphere, normal, normal), -normal, atol=1e-8)
+    np.testing.assert_allclose(traction(sphere, 2 * normal, normal), 0, atol=1e-8)
+    assert np.linalg.norm(sphere(normal), axis=1) == pytest.approx(np.full(6, 0.8))
+    cavity = fields.cavity(E, NU, 1.0, 1.0)
+    np.testing.assert_allclose(traction(cavity, normal, normal), 0, atol=1e-8)
+    equator = stress(cavity, np.array([[1.0, 1e-9, 0.0]]))[0, 2, 2]
+    assert equator == pytest.approx((27 - 15 * NU) / (2 * (7 - 5 * NU)), abs=1e-7)
+    # inside the L, next to its two free sides
+    corner, near = fields.l_domain(E, NU), 2e-5
+    sides = np.array([[-0.5, near, 0.1], [near, -0.3, 0.1]])
+    np.testing.assert_allclose(traction(corner, sides, np.eye(3)[[1, 0]]), 0, atol=3e-4)
+
+
+# ---- errors ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["10N", "20N", "27N"])
+def test_quadratic_elements_hold_the_bent_bar_exactly_and_a_factor_is_the_error(kind):
+    scene = scenes.make("bending", kind, 1)
+    exact = scene.exact(scene.model.mesh.points)
+    found = errors.errors(scene, exact)
+    assert found["displacement"] < 1e-14
+    assert found["nodal"] == 0
+    assert found["energy"] < 1e-9
+    for factor in (0.0, 1.25):
+        found = errors.errors(scene, factor * exact)
+        assert found == pytest.approx(dict.fromkeys(found, abs(factor - 1)), rel=1e-8)
+    assert errors.errors(scene, scene.model.solve().displacement())["displacement"] < 1e-9
+
+
+def test_error_without_a_field_is_that_of_the_work():
+    scene = scenes.make("cook", "8N", 2)
+    u = scene.model.solve().displacement()
+    scene.energy = float((scene.forces() * u).sum()) / 2
+    assert errors.errors(scene, u)["displacement"] == 0
+    assert errors.errors(scene, 1.01 * u) == pytest.approx({"displacement": 0.01, "energy": 0.1})
+    scene.energy = None
+    assert errors.errors(scene, u) == {}
+
+
+@pytest.mark.parametrize("name", sets.ERROR_SCENES)
+@pytest.mark.parametrize("kind", ["8N", "10N"])
+def test_finer_meshes_of_every_scene_are_better(name, kind):
+    found = []
+    for n in (1, 3):
+        scene = scenes.make(name, kind, n)
+        found.append(errors.errors(scene, scene.model.solve().displacement())["displacement"])
+    assert found[1] < 0.9 * found[0] or found[1] < 1e-9
+
+
+# ---- one discrete problem in all programs --------------------------------------------------------------
+
+
+def agreed(folder, name, scene, kind, tell):
+    runs = [
+        driver.Run("test", program, scene, kind, 2, options=(("tolerance", 1e-12),))
+        for program in ("kratos_lite", name)
+    ]
+    measured = driver.Driver(folder, 1, command.arguments(["quick"]).pythons, tell=tell)
+    rows = measured.measure(runs)
+    if name in measured.absent:
+        pytest.skip(f"{name} is absent: {measured.absent[name]}")
+    assert [row.get("failed") for row in rows] == [None, None]
+    assert rows[1]["program"] == name
+    assert rows[0]["peak"] > 1e7
+    assert set(rows[1]["phases"]) >= {"import", "read", "solve"}
+    return rows[1]["errors"]["difference"]
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "kratos_lite"])
+@pytest.mark.parametrize("scene", ["block", "cavity"])
+def test_programs_agree_on_one_discrete_problem(name, scene, tmp_path):
+    kinds = [kind for kind in scenes.KINDS if sets.takes(name, scene, kind)]
+    chosen = ["8N", "10N"] if scene == "block" and name == "Kratos" else kinds[-1:]
+    if not chosen:
+        pytest.skip(f"{name} has no element with curved edges")
+    for kind in chosen:
+        bound = 10.0 ** -min(8, PROGRAMS[name].digits - 1)
+        assert agreed(tmp_path, name, scene, kind, lambda line: None) < bound
+
+
+def test_a_program_that_fails_is_a_row_that_says_so(tmp_path, monkeypatch):
+    monkeypatch.setitem(PROGRAMS, "broken", driver.Program("no_such_module"))
+    rows = driver.Driver(tmp_path, 2, tell=lambda line: None).measure(
+        [driver.Run("growth", "broken", "block", "8N", n) for n in (1, 2)]
+    )
+    assert [row["n"] for row in rows] == [1]  # and no larger size is tried
+    assert rows[0]["failed"].startswith("failed: ")
+    assert "no_such_module" in rows[0]["failed"]
+    assert str(ROOT) not in rows[0]["failed"]
+
+
+def test_a_run_is_stopped_at_its_limit(tmp_path):
+    short = driver.Driver(tmp_path, 1, limit=0.01, tell=lambda line: None)
+    (row,) = short.measure([driver.Run("goal", "kratos_lite", "block", "8N", 1)])
+    assert row["failed"] == "stopped at the time limit"
+
+
+def test_real_scenes_are_written_whole(shared, tmp_path):
+    files = cases.prepared(shared / "cases", tmp_path)
+    assert len(files) >= 8
+    model = kl.read(tmp_path / "eigen_cube_8N.mdpa")
+    assert model.supports.fixed.any()
+    assert model.loads
+
+
+# ---- sets, results and report --------------------------------------------------------------------------
+
+
+def test_every_set_names_scenes_and_programs_that_exist(tmp_path):
+    for name, make in command.COMMANDS.items():
+        runs = make(command.arguments([name, "--cases", str(tmp_path)]), tmp_path)
+        assert runs, name
+        assert {run.scene for run in runs} <= set(scenes.SCENES)
+        assert {run.program for run in runs} <= {*PROGRAMS, *command.HELPERS}
+        assert len(set(runs)) == len(runs)
+
+
+def test_command_writes_results_and_the_page(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "results" / "error.json"
+    monkeypatch.setattr(sets, "KINDS", ("8N", "27N"))
+    words = ["error", "--programs", "kratos_lite", "--scenes", "manufactured", "--cells", "1", "2"]
+    assert command.main([*words, "--repeats", "1", "--out", str(out)]) == 0
+    kept = json.loads(out.read_text())
+    assert [(row["kind"], row["n"]) for row in kept["rows"]] == [("8N", 1), ("8N", 2), ("27N", 1), ("27N", 2)]
+    assert kept["machine"]["cores"] >= 1
+    assert kept["versions"]["kratos_lite"] == kl.__version__
+    assert platform.node() not in json.dumps(kept) or len(platform.node()) < 3
+    for name, path in (("RESULTS", out.parent), ("PAGE", tmp_path / "p.md"), ("PICTURE", tmp_path / "p.png")):
+        monkeypatch.setattr(command, name, path)
+    assert command.main(["report"]) == 0
+    page = (tmp_path / "p.md").read_text()
+    assert "| manufactured | kratos_lite | 27N |" in page
+    assert "- manufactured: " in page
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    assert "seconds" in capsys.readouterr().out.lower()
+
+
+def rows_of(times):
+    return [
+        {"group": "error", "scene": "s", "program": "kratos_lite", "kind": kind, "n": n, "work": t,
+         "errors": {"displacement": e}, "phases": {"solve": t}, "process": t + 1}
+        for kind, points in times.items()
+        for n, (t, e) in enumerate(points)
+    ]  # fmt: skip
+
+
+def test_sentence_names_the_cheapest_element():
+    bricks = {"8N": [(1.0, 0.1), (100.0, 0.001)], "27N": [(1.0, 0.01), (2.0, 0.001)]}
+    rows = rows_of(bricks | {"4N": [(1.0, 0.9)]})
+    (sentence,) = curves.cheapest(rows)
+    assert sentence.startswith("s: for an error of 0.10% take 27N (2 s); 8N takes 50 times as long;")
+    assert sentence.endswith("; 4N do not reach it.")
+    assert "| s | kratos_lite | 8N | 10 | 100 | — | 1.0e-03 |" in curves.time_to_error(rows)
+    assert curves.time_to(1e-4, np.array([1.0]), np.array([1e-3])) is None
+    assert curves.time_to(1e-2, np.array([1.0]), np.array([1e-3])) == (1.0, True)
+
+
+def test_goal_table_gives_ratios():
+    common = {"group": "goal", "scene": "block", "kind": "8N", "n": 20, "unknowns": 25200}
+    ours = {"process": 1.0, "peak": 6e7, "phases": {"setup": 0.1, "solve": 0.2}}
+    theirs = {"process": 4.0, "peak": 1e8, "phases": {"solve": 0.5}, "errors": {"difference": 1e-9}}
+    rows = [common | {"program": "kratos_lite"} | ours, common | {"program": "Kratos"} | theirs]
+    line = "| block 8N n = 20 | 25200 | 1 |  | 4 | 0.25 | 60 | 100 | 0.6 | 0.6 |  | 1e-09 |"
+    assert line in report.goals(rows)
+
+
+@pytest.mark.parametrize("module", [curves, tables, meshes, sets, command])
+def test_examples_of_the_modules_hold(module):
+    assert doctest.testmod(module).failed == 0
+
+
+def test_interpreters_are_given_by_program():
+    assert command.pythons(["a/python", "GetFEM=b"]) == {"": "a/python", "GetFEM": "b"}
+    with pytest.raises(SystemExit, match="Getfem is no program"):
+        command.pythons(["Getfem=b"])
