@@ -116,12 +116,15 @@ class StaticSystem:
         model = self.model
         with self._phase("check"):
             self.batches, self.part, self.warnings = model.checked()
-            self._state = model.state()
             self._used = self.part >= 0
             self._prescribe()
             self.initial = initial_loads(model, self.batches)
-        self.equations: System | None = None
-        self._solved, self._still = np.zeros(0, dtype=bool), 0  # parts in the equations; elements left out
+            self.equations: System | None = None
+            self._solved, self._still = (
+                np.zeros(0, dtype=bool),
+                0,
+            )  # parts in the equations; elements left out
+            self._state = model.state()  # last, so that what failed is tried again
 
     def _prescribe(self) -> None:
         """Take note of the values that supports prescribe, and of what they hold at rest."""
@@ -170,8 +173,8 @@ class StaticSystem:
         """Return the equations of the elements in moving parts, made anew only for a part that is new."""
         if self.equations is None or (moving & ~self._solved).any():
             model = self.model
-            self._solved = moving if self.equations is None else moving | self._solved
-            parts = self._solved[self.part] & self._used
+            solved = moving if self.equations is None else moving | self._solved
+            parts = solved[self.part] & self._used
             every, batches = among(self.batches, parts), among(self.batches, parts & ~self._held)
             self._still = sum(map(len, every)) - sum(map(len, batches))
             self.equations = System(
@@ -184,6 +187,7 @@ class StaticSystem:
                 patterns=model.patterns,
                 progress=self.progress,
             )
+            self._solved = solved
         return self.equations
 
     # ---- one solution ------------------------------------------------------------------------------
@@ -212,7 +216,19 @@ class StaticSystem:
             judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
-        report = Report(
+        report = self._report(case, solution, reactions, balance, warnings)
+        u0 = model.initial_displacement
+        return Result(model.mesh, self.batches, u, reactions, case.external, report, u0)
+
+    def _report(
+        self,
+        case: LoadSet,
+        solution: solvers.Solution,
+        reactions: Array,
+        balance: tuple[float, float],
+        warnings: list[str],
+    ) -> Report:
+        return Report(
             unknowns=3 * int(self._used.sum()) - self._fixed - len(self.links),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
@@ -222,14 +238,12 @@ class StaticSystem:
             backward_error=solution.backward_error,
             force_error=balance[0],
             moment_error=balance[1],
-            seconds=phase.seconds,
+            seconds=case.phase.seconds,
             peak_memory=peak_memory(),
             warnings=warnings,
-            notes=list(model.notes),
+            notes=list(self.model.notes),
             skipped=self._skipped(case.moving),
         )
-        u0 = model.initial_displacement
-        return Result(model.mesh, self.batches, u, reactions, case.external, report, u0)
 
     def _at_rest(self) -> Array:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""
@@ -248,9 +262,8 @@ class StaticSystem:
     def _constrained(self, residual: Array) -> Array:
         """Return the residual (n, 3) where supports or constraints act, and 0 elsewhere."""
         supports = self.model.supports
-        at = np.flatnonzero(supports.fixed)
-        for link in supports.links:
-            at = np.append(at, [link.slave, *link.masters])
+        tied = [dof for link in supports.links for dof in (link.slave, *link.masters)]
+        at = np.concatenate([np.flatnonzero(supports.fixed), np.array(tied, dtype=np.int64)])
         reactions = np.zeros_like(residual)
         reactions.flat[at] = residual.flat[at]
         return reactions
