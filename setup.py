@@ -25,5 +25,5 @@ setup(
             optional=True,
         )
         for source in sorted(NATIVE.glob("*.cpp"))
-    ]
+    ],
 )

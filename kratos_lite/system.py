@@ -21,6 +21,7 @@ from kratos_lite.assembly import (
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError
 from kratos_lite.fields import internal_load
+from kratos_lite.linear_level import linear_level
 from kratos_lite.solvers.common import DENSE_MAX
 from kratos_lite.supports import Links, Supports, reduction
 
@@ -102,7 +103,10 @@ class System:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
         if self.method == "dense":
             return assemble_dense(self.points, self.batches)
-        return assemble_stiffness(self.points, self.batches, self.pattern, self.progress)
+        skipped: set[str] = set()
+        K = assemble_stiffness(self.points, self.batches, self.pattern, self.progress, skipped)
+        self.skipped += sorted(skipped)
+        return K
 
     @cached_property
     def norm(self) -> float:
@@ -111,7 +115,14 @@ class System:
 
     @cached_property
     def _equations(self) -> solvers.Equations:
-        return solvers.Equations(self.K, self.reduced, self.points, self.method, self.reason)
+        return solvers.Equations(
+            self.K,
+            self.reduced,
+            self.points,
+            self.method,
+            self.reason,
+            lambda: linear_level(self.points, self.batches),
+        )
 
     def prescribe(self, links: Links | None = None) -> None:
         """Take over new values of the prescribed displacements and of the constants of constraints."""

@@ -58,7 +58,7 @@ public:
         py::gil_scoped_release release;
         hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed);
         hierarchy.coarsen(below.data.data(), apart, std::move(B));
-        below.data = Array<double>();
+
     }
 
     Array<double> cycle(Array<double> r) {

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.errors import InputError
+from kratos_lite.native import kernels
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -47,6 +48,11 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
         return method, "asked for"
     if unknowns <= DENSE_LIMIT and dofs <= 4 * DENSE_LIMIT:
         return "dense", f"{unknowns} unknowns ≤ {DENSE_LIMIT}: a full matrix is fastest"
+    if symmetric and kernels("multigrid"):
+        return (
+            "amg",
+            f"{unknowns} unknowns > {DENSE_LIMIT}: compiled multigrid is fastest and takes least memory",
+        )
     if unknowns <= DIRECT_LIMIT:
         return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorisation is fastest"
     if not symmetric:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.blockmatrix import BlockMatrix, LinearLevel
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers import direct, iteration, multigrid
-from kratos_lite.solvers.common import Progress, Solution, backward_error, matrix_norm
-from kratos_lite.supports import Reduction, rigid_modes
+from kratos_lite.solvers import direct, multigrid
+from kratos_lite.solvers.common import Progress, Solution, backward_error
+from kratos_lite.supports import Reduction
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,7 @@ class Equations:
     reduced : the supports.
     points : (n, 3) m, from which multigrid knows the rigid modes.
     method, reason : as `choose` gives them.
+    linear_level : makes the linear elements within quadratic ones, for multigrid.
 
     What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
     """
@@ -41,6 +42,7 @@ class Equations:
     points: Array
     method: str
     reason: str
+    linear_level: Callable[[], LinearLevel | None] | None = None
 
     def solve(self, f: Array, tolerance: float, progress: Progress | None = None) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
@@ -98,15 +100,10 @@ class Equations:
         )
 
     @cached_property
-    def _hierarchy(self) -> tuple[Any, Callable[[Array], Array], float]:
-        """Matrix, multigrid cycle and norm; without links fixed components stay in, uncoupled."""
-        modes = rigid_modes(self.points)
-        if self.reduced.T is None:
-            free = self._free
-            A, modes = uncoupled(self.K, free), modes * free[:, None]
-            return A, multigrid.multigrid(A.scipy(), modes), A.norm()
-        B = self._sparse
-        return B, multigrid.multigrid(B, modes[self.reduced.free]), matrix_norm(B)
+    def _blocks(self) -> BlockMatrix:
+        """The matrix on all components in 3x3 blocks, links worked in; only its free components count."""
+        T = self.reduced.T
+        return self.K if T is None else linked(self.K, T, self.reduced.free)
 
     @cached_property
     def _free(self) -> NDArray[np.bool_]:
@@ -114,33 +111,33 @@ class Equations:
         free[self.reduced.free] = True
         return free
 
+    @cached_property
+    def _multigrid(self) -> multigrid.Solver:
+        linear = self.linear_level() if self.linear_level else None
+        return multigrid.multigrid(self._blocks, self._free, self.points, linear)
+
+    @cached_property
+    def _norm(self) -> float:
+        return self._blocks.norm()
+
     def _iterate(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
         """Solve by multigrid; a solution with a reason is one that did not converge, and why."""
-        A, precondition, norm = self._hierarchy
-        rhs = b
-        if self.reduced.T is None:
-            rhs = np.zeros(len(self._free))
-            rhs[self.reduced.free] = b
-        x, iterations, converged = iteration.conjugate_gradients(
-            A, rhs, precondition, tolerance, norm, progress=progress
-        )
-        error = backward_error(A, x, rhs, norm)
-        q = x[self.reduced.free] if self.reduced.T is None else x
-        reason = (
-            "" if converged else f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
-        )
-        return Solution(q, "amg", reason, iterations, error)
+        free, rhs = self.reduced.free, np.zeros(len(self._free))
+        rhs[free] = b
+        x, iterations, converged = self._multigrid.solve(rhs, tolerance, self._norm, progress)
+        q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
+        error = float(np.abs(b - (self._blocks @ x)[free]).max() / scale) if scale > 0 else 0.0
+        stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
+        return Solution(q, "amg", "" if converged else stopped, iterations, error)
 
 
-def uncoupled(K: BlockMatrix, free: NDArray[np.bool_]) -> BlockMatrix:
-    """Return a copy of K with the rows and columns of fixed degrees of freedom cleared.
+def linked(K: BlockMatrix, T: Any, free: NDArray[np.int64]) -> BlockMatrix:
+    """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
+    from scipy.sparse import csr_array
 
-    Their diagonal entries stay, so that the matrix keeps its scale.
-    """
-    mask = free.reshape(-1, 3)
-    data = K.data * mask[K.rows()][:, :, None] * mask[K.indices][:, None, :]
-    diagonal = K.diagonal_blocks()
-    for axis in range(3):
-        fixed = diagonal[~mask[:, axis]]
-        data[fixed, axis, axis] = K.data[fixed, axis, axis]
-    return BlockMatrix(data, K.indices, K.indptr)
+    n = K.shape[0]
+    spread = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), n))
+    whole = T @ spread
+    A = (whole.T @ K.scipy().tocsr() @ whole).tobsr((3, 3))
+    A.sort_indices()
+    return BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))

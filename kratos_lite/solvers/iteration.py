@@ -1,4 +1,4 @@
-"""Conjugate gradients."""
+"""Conjugate gradients, and when to give them up."""
 
 from __future__ import annotations
 
@@ -10,6 +10,20 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+MAX_ITERATIONS = 1000
+"""A multigrid that needs more than these does not converge."""
+
+
+class Share:
+    """Turns residuals, as shares of the first, into the share of the work that is done."""
+
+    def __init__(self, tolerance: float, progress: Progress) -> None:
+        self.tolerance, self.progress = tolerance, progress
+
+    def __call__(self, residual: float) -> None:
+        """Report after an iteration."""
+        done = np.log(max(residual, 1e-300)) / np.log(self.tolerance)
+        self.progress("solve", float(np.clip(done, 0.0, 1.0)))
 
 
 def conjugate_gradients(
@@ -18,7 +32,7 @@ def conjugate_gradients(
     precondition: Callable[[Array], Array],
     tolerance: float,
     norm_A: float,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     progress: Progress | None = None,
 ) -> tuple[Array, int, bool]:
     """Solve A x = b with symmetric positive definite A; return x, iterations and success.
@@ -31,7 +45,8 @@ def conjugate_gradients(
     norm_b = float(np.linalg.norm(b))
     if norm_b == 0:
         return x, 0, True
-    best, best_at, start = norm_b, 0, norm_b
+    each = Share(tolerance, progress) if progress else None
+    best, best_at = norm_b, 0
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)
     for iteration in range(1, max_iterations + 1):
@@ -43,8 +58,8 @@ def conjugate_gradients(
         x += alpha * p
         r -= alpha * Ap
         norm = float(np.linalg.norm(r))
-        if progress:
-            progress("solve", min(1.0, np.log(max(norm, 1e-300) / start) / np.log(tolerance)))
+        if each:
+            each(norm / norm_b)
         limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
         if norm <= limit:
             return x, iteration, True
