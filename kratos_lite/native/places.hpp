@@ -6,6 +6,7 @@
 // elements in ascending order, whatever the number of shares and of threads.
 
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <vector>
@@ -40,9 +41,11 @@ private:
         owner.assign(rows, 0);
         shares.assign(count, {});
         const int64_t each = (groups + count - 1) / count;
-        if (count > 1)
-            for (int64_t i = mesh.count * mesh.k - 1; i >= 0; --i)  // the first element comes last
-                owner[mesh.nodes[i]] = static_cast<int32_t>(i / mesh.k / width / each);
+        const int64_t nodes = each * width * mesh.k;  // of one share
+        for (int64_t s = count - 1; s > 0; --s)       // backwards, so that the first share stays
+            for (int64_t i = s * nodes; i < std::min(mesh.count * mesh.k, (s + 1) * nodes); ++i)
+                owner[mesh.nodes[i]] = static_cast<int32_t>(s);
+        for (int64_t i = 0; i < std::min(mesh.count * mesh.k, nodes); ++i) owner[mesh.nodes[i]] = 0;
         for (int64_t s = 0; s < count; ++s)
             for (int64_t g = s * each; g < std::min(groups, (s + 1) * each); ++g)
                 shares[s].push_back(static_cast<int32_t>(g));

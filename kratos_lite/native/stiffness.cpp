@@ -4,6 +4,8 @@
 
 #include <pybind11/stl.h>
 
+#include <memory>
+
 #include "arrays.hpp"
 #include "pattern.hpp"
 

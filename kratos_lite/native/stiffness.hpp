@@ -9,9 +9,10 @@
 // points, P_ab = cof^T R_ab cof / det J with the products R_ab = sum_g w dN_a dN_b^T of the reference cell.
 
 #pragma once
+#include <algorithm>
+#include <atomic>
 #include <cfloat>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "isa.hpp"
@@ -55,7 +56,11 @@ inline int64_t work_size(const Tables& t, int V) { return V * (3 * t.k + 10 * t.
 
 template <int V, int... I>
 KL_INLINE void pick(vec<double, V>& to, const vec<double, V>& a, const vec<double, V>& b) {
+#if defined(__clang__) || __GNUC__ >= 12
     to = __builtin_shufflevector(a, b, I...);
+#else
+    to = __builtin_shuffle(a, b, vec<int64_t, V>{I...});
+#endif
 }
 
 // r[l][e] = v[e][l]
@@ -171,7 +176,7 @@ KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double,
             change = x > change ? x : change;
         }
     for (int l = 0; l < V; ++l)
-        if (!(change[l] <= 4 * DBL_EPSILON * size[l])) return false;
+        if (!(change[l] <= 8 * DBL_EPSILON * size[l])) return false;
     return true;
 }
 
@@ -265,7 +270,7 @@ inline int lanes() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 
 
 constexpr int64_t BLOCK_PAIRS = 4096;  // node pairs whose places are looked up together
 
-// Add the stiffness of all elements to data (nnz, 3, 3); return how many of them were affine.
+// Add the stiffness of all elements to data (nnz, 3, 3); return how many groups had constant J.
 inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const Connectivity& mesh,
                              const double* points, const Graph& graph, double* data) {
     const int V = lanes();
