@@ -52,7 +52,9 @@ struct Task {
 };
 
 // Numbers that one task needs: coordinates, J, weights, D and one weighted row of D, V of each.
-inline int64_t work_size(const Tables& t, int V) { return V * (3 * t.k + 10 * t.g + 3 * t.g * t.k + 3 * t.g); }
+inline int64_t work_size(const Tables& t, int V) {
+    return V * (3 * t.k + 9 * t.g + 3 * t.g * t.k + t.g + 3 * t.g);
+}
 
 template <int V, int... I>
 KL_INLINE void pick(vec<double, V>& to, const vec<double, V>& a, const vec<double, V>& b) {
@@ -146,7 +148,8 @@ KL_INLINE void gather(const Task& t, int k, vec<double, V>* X) {
     for (int l = 0; l < V; ++l) {
         const int64_t e = t.elements[l] < t.mesh.count ? t.elements[l] : t.mesh.count - 1;
         for (int a = 0; a < k; ++a)
-            for (int i = 0; i < 3; ++i) X[3 * a + i][l] = t.points[3 * static_cast<int64_t>(t.mesh.nodes[e * k + a]) + i];
+            for (int i = 0; i < 3; ++i)
+                X[3 * a + i][l] = t.points[3 * static_cast<int64_t>(t.mesh.nodes[e * k + a]) + i];
     }
 }
 
@@ -205,7 +208,8 @@ KL_INLINE void by_points(const Task& t, int k, int g, vec<double, V>* J, vec<dou
         weight[q] = t.tables.weights[q] / det;
         for (int a = 0; a < k; ++a) {
             const double* dN = t.tables.dN + 3 * (q * k + a);
-            for (int i = 0; i < 3; ++i) D[3 * (a * g + q) + i] = dN[0] * c[i] + dN[1] * c[3 + i] + dN[2] * c[6 + i];
+            for (int i = 0; i < 3; ++i)
+                D[3 * (a * g + q) + i] = dN[0] * c[i] + dN[1] * c[3 + i] + dN[2] * c[6 + i];
         }
     }
     for (int a = 0; a < k; ++a) {
@@ -239,7 +243,8 @@ KL_INLINE void by_products(const Task& t, int k, vec<double, V>* J) {
             vec<double, V> T[9], P[9];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
-                    T[3 * i + j] = R[3 * i] * scaled[j] + R[3 * i + 1] * scaled[3 + j] + R[3 * i + 2] * scaled[6 + j];
+                    T[3 * i + j] = R[3 * i] * scaled[j] + R[3 * i + 1] * scaled[3 + j] +
+                                   R[3 * i + 2] * scaled[6 + j];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
                     P[3 * i + j] = c[i] * T[j] + c[3 + i] * T[3 + j] + c[6 + i] * T[6 + j];
@@ -305,7 +310,8 @@ inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const C
 template <int R>
 void add_matrices(const Connectivity& mesh, const double* blocks, const Graph& graph, double* data) {
     const Shares one(graph.rows, mesh, 1, 1);
-    const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k, most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
+    const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k;
+    const int64_t most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
     Places places(graph, mesh, one, 0, most);
     std::vector<int64_t> elements(most);
     for (int64_t from = 0; from < mesh.count; from += most) {
