@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,56 +144,46 @@ def assemble_stiffness(
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     points = np.ascontiguousarray(points, dtype=float)
-    module = kernels("stiffness")
     done, total = 0, sum(len(batch) for batch in batches)
     for group, batch in enumerate(batches):
-        if module and batch.element.stiffness_from_tables():
-            parts = _compiled(module, points, batch, pattern, group, data, skipped)
-        else:
-            parts = _computed(points, batch, pattern, group, data, skipped)
-        for count in parts:
+        compiled = kernels("stiffness") and batch.element.stiffness_from_tables()
+        add = _add_compiled if compiled else _add_computed
+        for count, constant in add(data, points, batch, pattern, group):
             done += count
             if progress:
                 progress("assemble", done / total)
+            if constant and skipped is not None:
+                skipped.add(CONSTANT_JACOBIANS)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
-def _compiled(
-    module: Any,
-    points: Array,
-    batch: Batch,
-    pattern: Pattern,
-    group: int,
-    data: Array,
-    skipped: set[str] | None,
-) -> Iterator[int]:
-    """Add the stiffness of a batch in one compiled pass; yield the number of elements."""
+def _add_compiled(
+    data: Array, points: Array, batch: Batch, pattern: Pattern, group: int
+) -> Iterator[tuple[int, bool]]:
+    """Add the stiffness of a batch; yield the number of elements and whether J was constant in some."""
     dN = np.ascontiguousarray(tabulate(batch.element.shape, batch.rule)[1])
     weights = np.ascontiguousarray(batch.rule.weights)
     C = np.ascontiguousarray(lame_constants(batch.material.C) or batch.material.C, dtype=float)
-    affine = module.add_stiffness(
-        points, pattern.connectivity[group], dN, weights, C, pattern.indptr, pattern.indices, data
-    )
-    if affine and skipped is not None:
-        skipped.add(CONSTANT_JACOBIANS)
-    yield len(batch)
+    nodes, indptr, indices = pattern.connectivity[group], pattern.indptr, pattern.indices
+    constant = kernels("stiffness").add_stiffness(points, nodes, dN, weights, C, indptr, indices, data)
+    yield len(batch), constant > 0
 
 
-def _computed(
-    points: Array, batch: Batch, pattern: Pattern, group: int, data: Array, skipped: set[str] | None
-) -> Iterator[int]:
-    """Add the stiffness of a batch computed in NumPy; yield the number of elements of each part."""
-    k = batch.nodes.shape[1]
+def _add_computed(
+    data: Array, points: Array, batch: Batch, pattern: Pattern, group: int
+) -> Iterator[tuple[int, bool]]:
+    """Do the same in NumPy, in parts."""
+    k, standard = batch.nodes.shape[1], batch.element.stiffness_from_tables()
     for window in batch.chunks(SCATTER_BYTES):
-        matrices = np.empty((window.stop - window.start, k, k, 3, 3))
+        blocks = np.empty((window.stop - window.start, k, k, 3, 3))
+        constant = False
         for chunk in batch.chunks(within=window):
             place = slice(chunk.start - window.start, chunk.stop - window.start)
             elements = batch.at(points, chunk)
-            matrices[place] = elements.stiffness_by_axis(batch.material.C).transpose(0, 2, 4, 1, 3)
-            if skipped is not None and elements.stiffness_from_tables() and elements.constant_jacobian:
-                skipped.add(CONSTANT_JACOBIANS)
-        pattern.add(data, group, window, matrices)
-        yield len(matrices)
+            blocks[place] = elements.stiffness_by_axis(batch.material.C).transpose(0, 2, 4, 1, 3)
+            constant |= standard and elements.constant_jacobian
+        pattern.add(data, group, window, blocks)
+        yield len(blocks), constant
 
 
 def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, kernel: Kernel) -> csr_array:

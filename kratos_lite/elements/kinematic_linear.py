@@ -296,7 +296,7 @@ class KinematicLinear:
         J = self._jacobian(tabulate(self.shape, self.rule)[1])
         change = np.abs(J - J[..., :1, :, :]).max(axis=(-3, -2, -1))
         size = np.abs(self.X).max(axis=(-2, -1))
-        return bool((change <= 4 * np.finfo(float).eps * size).all())
+        return bool((change <= 8 * np.finfo(float).eps * size).all())
 
     @classmethod
     def stiffness_from_tables(cls) -> bool:

@@ -33,10 +33,11 @@ public:
                 ++start[group.nodes[i]];
             }
         int64_t sum = 0;
-        for (int64_t i = 0; i <= n; ++i) start[i] = sum += start[i];  // the end of each row, moved down below
+        for (int64_t i = 0; i <= n; ++i) start[i] = sum += start[i];  // the ends of the rows, moved down later
         around.resize(sum);
         for (const auto& group : groups)
-            for (int64_t e = 0; e < group.count; ++e) elements.push_back({group.nodes + e * group.k, group.k});
+            for (int64_t e = 0; e < group.count; ++e)
+                elements.push_back({group.nodes + e * group.k, group.k});
         for (int64_t e = static_cast<int64_t>(elements.size()) - 1; e >= 0; --e)
             for (int a = 0; a < elements[e].k; ++a)
                 around[--start[elements[e].nodes[a]]] = static_cast<int32_t>(e);

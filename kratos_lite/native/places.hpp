@@ -6,6 +6,7 @@
 // elements in ascending order, whatever the number of shares and of threads.
 
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <vector>
@@ -25,7 +26,8 @@ class Shares {
 public:
     Shares(int64_t rows, const Connectivity& mesh, int width, int threads) : mesh(mesh), width(width) {
         const int64_t groups = (mesh.count + width - 1) / width;
-        cut(rows, groups, threads > 1 ? 2 * threads : 1);
+        const int64_t wanted = threads > 1 ? std::min<int64_t>(2 * threads, groups / 8) : 1;
+        cut(rows, groups, std::max<int64_t>(1, wanted));
         int64_t computed = 0;
         for (const auto& share : shares) computed += static_cast<int64_t>(share.size());
         if (computed > threads * groups) cut(rows, groups, 1);  // scattered: sharing costs more than it saves
@@ -40,9 +42,11 @@ private:
         owner.assign(rows, 0);
         shares.assign(count, {});
         const int64_t each = (groups + count - 1) / count;
-        if (count > 1)
-            for (int64_t i = mesh.count * mesh.k - 1; i >= 0; --i)  // the first element comes last
-                owner[mesh.nodes[i]] = static_cast<int32_t>(i / mesh.k / width / each);
+        const int64_t nodes = each * width * mesh.k;  // of one share
+        for (int64_t s = count - 1; s > 0; --s)       // backwards, so that the first share stays
+            for (int64_t i = s * nodes; i < std::min(mesh.count * mesh.k, (s + 1) * nodes); ++i)
+                owner[mesh.nodes[i]] = static_cast<int32_t>(s);
+        for (int64_t i = 0; i < std::min(mesh.count * mesh.k, nodes); ++i) owner[mesh.nodes[i]] = 0;
         for (int64_t s = 0; s < count; ++s)
             for (int64_t g = s * each; g < std::min(groups, (s + 1) * each); ++g)
                 shares[s].push_back(static_cast<int32_t>(g));
@@ -54,7 +58,8 @@ private:
             const int64_t own = g / each, end = std::min(mesh.count, (g + 1) * width) * mesh.k;
             for (int64_t i = g * width * mesh.k; i < end; ++i) {
                 auto& share = shares[owner[mesh.nodes[i]]];
-                if (owner[mesh.nodes[i]] != own && share.back() != g) share.push_back(static_cast<int32_t>(g));
+                if (owner[mesh.nodes[i]] != own && share.back() != g)
+                    share.push_back(static_cast<int32_t>(g));
             }
         }
     }
@@ -72,7 +77,7 @@ public:
         : graph(graph), mesh(mesh), shares(shares), share(share), first(graph.rows, -1), column(graph.rows),
           next(most * mesh.k), place(most * mesh.k * mesh.k) {}
 
-    // place[(e k + a) k + b] for `count` elements; -1 in rows of others.  Elements beyond the last are padding.
+    // place[(e k + a) k + b] for `count` elements; -1 in rows of others and in elements beyond the last.
     const int32_t* find(const int64_t* elements, int64_t count) {
         touched.clear();
         for (int64_t e = 0, at = 0; e < count; ++e)

@@ -4,6 +4,8 @@
 
 #include <pybind11/stl.h>
 
+#include <memory>
+
 #include "arrays.hpp"
 #include "pattern.hpp"
 
@@ -77,7 +79,8 @@ kl::Moduli moduli(const Array<double>& C) {
 }
 
 int64_t add_stiffness(Array<double> points, Array<int32_t> nodes, Array<double> dN, Array<double> weights,
-                      Array<double> C, Array<int32_t> indptr, Array<int32_t> indices, Array<double> data, bool affine) {
+                      Array<double> C, Array<int32_t> indptr, Array<int32_t> indices, Array<double> data,
+                      bool affine) {
     const int64_t rows = indptr.size() - 1;
     const auto mesh = connectivity(nodes);
     const auto t = tables(dN, weights, affine);
@@ -99,7 +102,8 @@ void add_matrices(Array<int32_t> nodes, Array<double> matrices, Array<int32_t> i
     const kl::Graph graph{indptr.size() - 1, indptr.data(), indices.data()};
     const int64_t each = data.ndim() == 3 ? 9 : 1;
     require(data.size() == each * indices.size(), "data must be (nnz, 3, 3) or (nnz,)");
-    require(matrices.size() == each * mesh.count * mesh.k * mesh.k, "matrices must be (m, k, k, 3, 3) or (m, k, k)");
+    require(matrices.size() == each * mesh.count * mesh.k * mesh.k,
+            "matrices must be (m, k, k, 3, 3) or (m, k, k)");
     const double* from = matrices.data();
     double* to = data.mutable_data();
     py::gil_scoped_release release;
@@ -111,13 +115,13 @@ void add_matrices(Array<int32_t> nodes, Array<double> matrices, Array<int32_t> i
 
 PYBIND11_MODULE(_stiffness, m) {
     kl::common(m);
-    m.def("pattern", &pattern, "Rows (indptr, indices) of the nodes that share an element", py::arg("n_nodes"),
-          py::arg("connectivity"));
+    m.def("pattern", &pattern, "Rows (indptr, indices) of the nodes that share an element",
+          py::arg("n_nodes"), py::arg("connectivity"));
     m.def("add_stiffness", &add_stiffness, "Add the stiffness of elements to the blocks of a matrix",
           py::arg("points").noconvert(), py::arg("nodes").noconvert(), py::arg("dN").noconvert(),
           py::arg("weights").noconvert(), py::arg("C").noconvert(), py::arg("indptr").noconvert(),
           py::arg("indices").noconvert(), py::arg("data").noconvert(), py::arg("affine") = true);
-    m.def("add_matrices", &add_matrices, "Add given element matrices to a matrix", py::arg("nodes").noconvert(),
-          py::arg("matrices").noconvert(), py::arg("indptr").noconvert(), py::arg("indices").noconvert(),
-          py::arg("data").noconvert());
+    m.def("add_matrices", &add_matrices, "Add given element matrices to a matrix",
+          py::arg("nodes").noconvert(), py::arg("matrices").noconvert(), py::arg("indptr").noconvert(),
+          py::arg("indices").noconvert(), py::arg("data").noconvert());
 }

@@ -9,9 +9,10 @@
 // points, P_ab = cof^T R_ab cof / det J with the products R_ab = sum_g w dN_a dN_b^T of the reference cell.
 
 #pragma once
+#include <algorithm>
+#include <atomic>
 #include <cfloat>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "isa.hpp"
@@ -51,11 +52,17 @@ struct Task {
 };
 
 // Numbers that one task needs: coordinates, J, weights, D and one weighted row of D, V of each.
-inline int64_t work_size(const Tables& t, int V) { return V * (3 * t.k + 10 * t.g + 3 * t.g * t.k + 3 * t.g); }
+inline int64_t work_size(const Tables& t, int V) {
+    return V * (3 * t.k + 9 * t.g + 3 * t.g * t.k + t.g + 3 * t.g);
+}
 
 template <int V, int... I>
 KL_INLINE void pick(vec<double, V>& to, const vec<double, V>& a, const vec<double, V>& b) {
+#if defined(__clang__) || __GNUC__ >= 12
     to = __builtin_shufflevector(a, b, I...);
+#else
+    to = __builtin_shuffle(a, b, vec<int64_t, V>{I...});
+#endif
 }
 
 // r[l][e] = v[e][l]
@@ -141,7 +148,8 @@ KL_INLINE void gather(const Task& t, int k, vec<double, V>* X) {
     for (int l = 0; l < V; ++l) {
         const int64_t e = t.elements[l] < t.mesh.count ? t.elements[l] : t.mesh.count - 1;
         for (int a = 0; a < k; ++a)
-            for (int i = 0; i < 3; ++i) X[3 * a + i][l] = t.points[3 * static_cast<int64_t>(t.mesh.nodes[e * k + a]) + i];
+            for (int i = 0; i < 3; ++i)
+                X[3 * a + i][l] = t.points[3 * static_cast<int64_t>(t.mesh.nodes[e * k + a]) + i];
     }
 }
 
@@ -171,7 +179,7 @@ KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double,
             change = x > change ? x : change;
         }
     for (int l = 0; l < V; ++l)
-        if (!(change[l] <= 4 * DBL_EPSILON * size[l])) return false;
+        if (!(change[l] <= 8 * DBL_EPSILON * size[l])) return false;
     return true;
 }
 
@@ -200,7 +208,8 @@ KL_INLINE void by_points(const Task& t, int k, int g, vec<double, V>* J, vec<dou
         weight[q] = t.tables.weights[q] / det;
         for (int a = 0; a < k; ++a) {
             const double* dN = t.tables.dN + 3 * (q * k + a);
-            for (int i = 0; i < 3; ++i) D[3 * (a * g + q) + i] = dN[0] * c[i] + dN[1] * c[3 + i] + dN[2] * c[6 + i];
+            for (int i = 0; i < 3; ++i)
+                D[3 * (a * g + q) + i] = dN[0] * c[i] + dN[1] * c[3 + i] + dN[2] * c[6 + i];
         }
     }
     for (int a = 0; a < k; ++a) {
@@ -234,7 +243,8 @@ KL_INLINE void by_products(const Task& t, int k, vec<double, V>* J) {
             vec<double, V> T[9], P[9];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
-                    T[3 * i + j] = R[3 * i] * scaled[j] + R[3 * i + 1] * scaled[3 + j] + R[3 * i + 2] * scaled[6 + j];
+                    T[3 * i + j] = R[3 * i] * scaled[j] + R[3 * i + 1] * scaled[3 + j] +
+                                   R[3 * i + 2] * scaled[6 + j];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
                     P[3 * i + j] = c[i] * T[j] + c[3 + i] * T[3 + j] + c[6 + i] * T[6 + j];
@@ -265,7 +275,7 @@ inline int lanes() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 
 
 constexpr int64_t BLOCK_PAIRS = 4096;  // node pairs whose places are looked up together
 
-// Add the stiffness of all elements to data (nnz, 3, 3); return how many of them were affine.
+// Add the stiffness of all elements to data (nnz, 3, 3); return how many groups had constant J.
 inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const Connectivity& mesh,
                              const double* points, const Graph& graph, double* data) {
     const int V = lanes();
@@ -300,7 +310,8 @@ inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const C
 template <int R>
 void add_matrices(const Connectivity& mesh, const double* blocks, const Graph& graph, double* data) {
     const Shares one(graph.rows, mesh, 1, 1);
-    const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k, most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
+    const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k;
+    const int64_t most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
     Places places(graph, mesh, one, 0, most);
     std::vector<int64_t> elements(most);
     for (int64_t from = 0; from < mesh.count; from += most) {
