@@ -85,8 +85,7 @@ struct Transposed {
 template <int b>
 void orthonormalise(const Ints& of, int32_t count, std::vector<double>& B, std::vector<double>& R) {
     R.assign(static_cast<size_t>(count) * MODES * MODES, 0.0);
-    Ints pointer(of.size() + 1), members;
-    Ints starts(count + 1, 0);
+    Ints members, starts(count + 1, 0);
     for (int32_t a : of)
         if (a >= 0) ++starts[a + 1];
     for (int32_t a = 0; a < count; ++a) starts[a + 1] += starts[a];
@@ -154,6 +153,7 @@ KL_INLINE void smooth_rows(const SmoothRows<b>& s) {
     constexpr int size = b * MODES;
     for (int64_t i = s.first; i < s.last; ++i) {
         const int32_t start = s.P.indptr[i], count = s.P.indptr[i + 1] - start;
+        if (!count) continue;
         const int32_t* columns = &s.P.indices[start];
         double* row = &s.P.data[static_cast<int64_t>(start) * size];
         for (int32_t k = s.g.indptr[i]; k < s.g.indptr[i + 1]; ++k) {

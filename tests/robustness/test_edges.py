@@ -64,7 +64,7 @@ def test_few_free_unknowns_of_a_large_model_take_no_full_matrix():
     model.add(kl.Gravity((0, 0, -9.81)))
     report = model.solve().report
     assert report.unknowns == 2 * 6**3
-    assert report.solver == "direct"
+    assert report.solver in ("amg", "direct")
 
 
 def test_lost_equilibrium_is_an_error(monkeypatch):
