@@ -233,6 +233,13 @@ def test_sentence_names_the_cheapest_element():
     assert curves.time_to(1e-2, np.array([1.0]), np.array([1e-3])) == (1.0, True)
 
 
+def test_solutions_unlike_the_first_are_listed():
+    row = {"scene": "block", "kind": "8N", "n": 4, "program": "Kratos"}
+    listed = report.failures([row | {"errors": {"difference": d}} for d in (1e-9, 0.5)])
+    assert listed.count("Kratos") == 1
+    assert "differ by 5e-01" in listed
+
+
 def test_goal_table_gives_ratios():
     common = {"group": "goal", "scene": "block", "kind": "8N", "n": 20, "unknowns": 25200}
     ours = {"process": 1.0, "peak": 6e7, "phases": {"setup": 0.1, "solve": 0.2}}
