@@ -11,6 +11,8 @@ import numpy as np
 from benchmarks.curves import cheapest, starts, time_to_error
 from benchmarks.tables import OURS, THEIRS, Row, ratio, seconds, table
 
+UNLIKE = 1e-4
+"""Relative difference of displacements above which a solver has not solved the problem."""
 SOLVER_PHASES = ("setup", "set-up", "solve")
 """Phases of a report that belong to the linear solver."""
 
@@ -172,11 +174,16 @@ def skips(rows: Sequence[Row]) -> str:
 
 
 def failures(rows: Iterable[Row]) -> str:
-    """Return what did not end well."""
-    return table(
-        ["scene", "program", "what happened"],
-        [[label((r["scene"], r["kind"], r["n"])), r["program"], r["failed"]] for r in rows if "failed" in r],
-    )
+    """Return what did not end well: runs that failed, and solutions unlike that of the first program."""
+    body = []
+    for row in rows:
+        difference = row.get("errors", {}).get("difference", 0.0)
+        what = row.get("failed", "")
+        if difference > UNLIKE:
+            what = f"its displacements differ by {difference:.0e} from those of the first program"
+        if what:
+            body.append([label((row["scene"], row["kind"], row["n"])), row["program"], what])
+    return table(["scene", "program", "what happened"], body)
 
 
 SECTIONS = {

@@ -104,10 +104,10 @@ def bending(kind: str, n: int) -> Scene:
 
 def cook(kind: str, n: int) -> Scene:
     """S6: Cook's membrane in plane strain, 100 N in shear on its right edge; one layer of thickness 1."""
-    mesh = kl.box(cells=(n, n, 1), element=element(kind))
-    s, t, z = mesh.points.T
+    grid = kl.box(cells=(n, n, 1))
+    s, t, z = grid.points.T
     low, high = 44 * s, 44 + 16 * s
-    mesh.points[:] = np.column_stack([48 * s, low + (high - low) * t, z])
+    mesh = split(np.column_stack([48 * s, low + (high - low) * t, z]), grid.blocks[0].nodes, kind)
     model = kl.Model(mesh, kl.Isotropic3D(E=240.565, nu=0.3))
     model.fix(on_plane(mesh, 0, 0.0), "xy")
     model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 1.0), "z")

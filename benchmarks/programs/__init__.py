@@ -37,7 +37,7 @@ PROGRAMS = {
     "Kratos": Program("kratos", curved=QUADRATIC),
     "scikit-fem": Program("scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),
     "FElupe": Program("felupe_", curved=QUADRATIC, environment=ONE_BLAS_THREAD),
-    "fedoo": Program("fedoo_", ("4N", "8N", "10N", "20N"), ("10N", "20N"), ONE_BLAS_THREAD),
+    "fedoo": Program("fedoo_", ("4N", "8N", "10N", "20N"), ("20N",), ONE_BLAS_THREAD),
     "SfePy": Program("sfepy_", ("4N", "8N", "10N", "27N"), environment=ONE_BLAS_THREAD),
     "NGSolve": Program("ngsolve_", ("4N", "8N"), environment=ONE_BLAS_THREAD),
     "CalculiX": Program("calculix", ("4N", "8N", "10N", "20N"), ("10N", "20N"), digits=6),

@@ -44,7 +44,7 @@ def version(program: str) -> str:
 
 
 def deck(job: Job, path: Path) -> None:
-    """Write the input deck."""
+    """Write the input deck; ccx reads 20 characters of a number, which is 13 digits."""
     E, nu = job.elasticity.tolist()
     numbered = np.arange(1, len(job.points) + 1)
     free = int((~job.fixed).sum())
@@ -52,7 +52,7 @@ def deck(job: Job, path: Path) -> None:
     with path.open("w") as out:
         out.write("*NODE, NSET=ALL\n")
         out.writelines(
-            f"{i},{x!r},{y!r},{z!r}\n"
+            f"{i},{x:.12E},{y:.12E},{z:.12E}\n"
             for i, (x, y, z) in zip(numbered.tolist(), job.points.tolist(), strict=True)
         )
         out.write(f"*ELEMENT, TYPE={ELEMENTS[job.kind]}, ELSET=EALL\n")
@@ -60,12 +60,11 @@ def deck(job: Job, path: Path) -> None:
         out.write(f"*MATERIAL, NAME=M\n*ELASTIC\n{E!r},{nu!r}\n*SOLID SECTION, ELSET=EALL, MATERIAL=M\n")
         out.write(f"*STEP\n*STATIC, SOLVER={solver}\n*BOUNDARY\n")
         out.writelines(
-            f"{i + 1},{a + 1},{a + 1},{float(job.values[i, a])!r}\n"
-            for i, a in np.argwhere(job.fixed).tolist()
+            f"{i + 1},{a + 1},{a + 1},{job.values[i, a]:.12E}\n" for i, a in np.argwhere(job.fixed).tolist()
         )
         out.write("*CLOAD\n")
         loaded = np.argwhere((job.forces != 0) & ~job.fixed).tolist()
-        out.writelines(f"{i + 1},{a + 1},{float(job.forces[i, a])!r}\n" for i, a in loaded)
+        out.writelines(f"{i + 1},{a + 1},{job.forces[i, a]:.12E}\n" for i, a in loaded)
         out.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
 
 

@@ -74,7 +74,9 @@ def linear_solver(job: Job, KM: Any) -> Any:
         "use_block_matrices_if_possible": True,
         "verbosity": 0,
     }
-    return ConstructSolver(KM.Parameters(json.dumps(job.given.get("kratos_solver", settings))))
+    return ConstructSolver(
+        KM.Parameters(json.dumps(settings | json.loads(job.given.get("kratos_solver", "{}"))))
+    )
 
 
 def solve(job: Job, KM: Any, part: Any) -> None:
