@@ -45,7 +45,7 @@ class Scene:
 
     def forces(self) -> Array:
         """Return the nodal forces (n, 3) in N of all loads."""
-        return external_loads(self.model, self.model.batches())
+        return external_loads(self.model.mesh, self.model.batches(), self.model.loads)
 
     def write(self, folder: Path) -> Path:
         """Write the problem as `.mdpa` and as `.npz`; return the path without ending."""

@@ -65,20 +65,11 @@ def factorise_dense(A: Array) -> Factorisation:
     SolveError
         If the matrix is singular.
     """
-    kept: list[Array] = []
-
-    def apply(b: Array) -> Array:
-        """Solve once; whoever comes again gets the inverse."""
-        try:
-            if kept:
-                kept[1:] = kept[1:] or [np.linalg.inv(A)]
-                return np.asarray(kept[1] @ b)
-            kept.append(b)
-            return np.asarray(np.linalg.solve(A, b))
-        except np.linalg.LinAlgError:
-            raise singular() from None
-
-    return Factorisation("dense", A, apply)
+    try:
+        inverse = np.linalg.inv(A)
+    except np.linalg.LinAlgError:
+        raise singular() from None
+    return Factorisation("dense", A, lambda b: np.asarray(inverse @ b))
 
 
 def factorise(A: csr_array, symmetric: bool = True) -> Factorisation:

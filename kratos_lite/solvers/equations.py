@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from kratos_lite.blockmatrix import BlockMatrix, LinearLevel
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct, multigrid
-from kratos_lite.solvers.common import Progress, Solution, backward_error
+from kratos_lite.solvers.common import DIRECT_LIMIT, Progress, Solution, backward_error
 from kratos_lite.supports import Reduction
 
 Array = NDArray[np.float64]
 
 FALLBACK_LIMIT = 150_000
 """Up to this many unknowns a factorisation is tried when the iteration fails."""
+ROUND_OFF = 1e-15
+"""Tolerance that the iteration cannot reach: it stops at what round-off allows."""
 
 
 @dataclass(eq=False)
@@ -124,7 +126,9 @@ class Equations:
         """Solve by multigrid; a solution with a reason is one that did not converge, and why."""
         free, rhs = self.reduced.free, np.zeros(len(self._free))
         rhs[free] = b
-        x, iterations, converged = self._multigrid.solve(rhs, tolerance, self._norm, progress)
+        # On few unknowns some iterations more, to round-off, make it as exact as a factorisation.
+        aim = min(tolerance, ROUND_OFF) if len(b) <= DIRECT_LIMIT else tolerance
+        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
         error = float(np.abs(b - (self._blocks @ x)[free]).max() / scale) if scale > 0 else 0.0
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"

@@ -27,7 +27,7 @@ DEGREE, QUADRATIC_DEGREE = 2, 3
 RATIO = 20.0
 """Largest to smallest eigenvalue that a smoother has to damp."""
 STRENGTH = 0.005
-"""Nodes with |A_ij| below this share of sqrt(|A_ii| |A_jj|) are of unlike materials: they do not aggregate."""
+"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means unlike materials: the nodes do not aggregate."""
 
 
 class Solver(Protocol):
