@@ -1,7 +1,10 @@
 // Matrices of dense blocks in rows of blocks (BSR): products with vectors.
 
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "isa.hpp"
 #include "threads.hpp"
@@ -57,6 +60,21 @@ inline void multiply(const Blocks<double>& A, const double* x, double* y) {
     parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         product_chunk(Product<double>{A, x, y, first, last});
     });
+}
+
+// The largest sum of |A| over a row.
+inline double norm(const Blocks<double>& A) {
+    std::vector<double> largest((A.rows + ROW_GRAIN - 1) / ROW_GRAIN, 0.0);
+    parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
+        double& mine = largest[first / ROW_GRAIN];
+        for (int64_t i = first; i < last; ++i) {
+            double sum[3] = {};
+            for (int64_t k = A.indptr[i]; k < A.indptr[i + 1]; ++k)
+                for (int e = 0; e < 9; ++e) sum[e / 3] += std::fabs(A.data[9 * k + e]);
+            mine = std::max({mine, sum[0], sum[1], sum[2]});
+        }
+    });
+    return largest.empty() ? 0.0 : *std::max_element(largest.begin(), largest.end());
 }
 
 }  // namespace kl
