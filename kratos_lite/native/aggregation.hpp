@@ -128,10 +128,10 @@ void orthonormalise(const Ints& of, int32_t count, std::vector<double>& B, std::
     });
 }
 
-// A prolongator of b x 6 blocks.
+// A prolongator of b x 6 blocks, in single precision: its rounding changes energies by its square only.
 struct Prolongator {
     Ints indptr, indices;
-    std::vector<double> data;
+    std::vector<float> data;
 };
 
 template <int b>
@@ -151,25 +151,27 @@ struct SmoothRows {
 template <int b>
 KL_INLINE void smooth_rows(const SmoothRows<b>& s) {
     constexpr int size = b * MODES;
+    std::vector<double> row;
     for (int64_t i = s.first; i < s.last; ++i) {
         const int32_t start = s.P.indptr[i], count = s.P.indptr[i + 1] - start;
         if (!count) continue;
         const int32_t* columns = &s.P.indices[start];
-        double* row = &s.P.data[static_cast<int64_t>(start) * size];
+        row.assign(count * size, 0.0);
         for (int32_t k = s.g.indptr[i]; k < s.g.indptr[i + 1]; ++k) {
             const int32_t j = s.g.indices[k], aggregate = s.of[j];
             if (aggregate < 0) continue;
             const int32_t at = static_cast<int32_t>(std::lower_bound(columns, columns + count, aggregate) - columns);
-            add_product<b, b>(row + at * size, s.A + static_cast<int64_t>(k) * b * b,
+            add_product<b, b>(&row[at * size], s.A + static_cast<int64_t>(k) * b * b,
                               &s.T[static_cast<int64_t>(j) * size]);
         }
         for (int32_t c = 0; c < count; ++c) {
             double smoothed[size] = {};
-            add_product<b, b>(smoothed, s.Dinv + i * b * b, row + c * size);
+            add_product<b, b>(smoothed, s.Dinv + i * b * b, &row[c * size]);
             const bool own = columns[c] == s.of[i];
+            float* out = &s.P.data[static_cast<int64_t>(start + c) * size];
             for (int e = 0; e < size; ++e) {
                 const double tentative = own ? s.T[i * size + e] : 0.0;
-                row[c * size + e] = s.fixed[i * b + e / MODES] ? 0.0 : tentative - s.omega * smoothed[e];
+                out[e] = s.fixed[i * b + e / MODES] ? 0.0f : static_cast<float>(tentative - s.omega * smoothed[e]);
             }
         }
     }
@@ -206,7 +208,7 @@ Prolongator smoothed_prolongator(const Graph& g, const double* A, const double* 
     });
     for (int64_t i = 0; i < g.rows; ++i) P.indptr[i + 1] += P.indptr[i];
     P.indices.resize(P.indptr[g.rows]);
-    P.data.assign(static_cast<size_t>(P.indptr[g.rows]) * b * MODES, 0.0);
+    P.data.resize(static_cast<size_t>(P.indptr[g.rows]) * b * MODES + 8);  // lanes read beyond the end
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         Ints found;
         for (int64_t i = first; i < last; ++i) {

@@ -18,6 +18,12 @@ struct Six {
     static KL_INLINE Six load(const double* p) {
         return {*reinterpret_cast<const Four*>(p), *reinterpret_cast<const Two*>(p + 4)};
     }
+    static KL_INLINE Six load(const float* p) {
+        typedef vec<float, 4> Four32;
+        typedef vec<float, 2> Two32;
+        return {__builtin_convertvector(*reinterpret_cast<const Four32*>(p), Four),
+                __builtin_convertvector(*reinterpret_cast<const Two32*>(p + 4), Two)};
+    }
     KL_INLINE void store(double* p) const {
         *reinterpret_cast<Four*>(p) = a;
         *reinterpret_cast<Two*>(p + 4) = b;
@@ -29,8 +35,8 @@ struct Six {
 };
 
 // c (R x 6) += a (R x K) b (K x 6)
-template <int R, int K>
-KL_INLINE void add_product(double* c, const double* a, const double* b) {
+template <int R, int K, class T>
+KL_INLINE void add_product(double* c, const double* a, const T* b) {
     Six rows[K];
     for (int k = 0; k < K; ++k) rows[k] = Six::load(b + 6 * k);
     for (int r = 0; r < R; ++r) {
@@ -41,8 +47,8 @@ KL_INLINE void add_product(double* c, const double* a, const double* b) {
 }
 
 // c (R x 6) += a^T b with a (K x R) and b (K x 6)
-template <int R, int K>
-KL_INLINE void add_transposed_product(double* c, const double* a, const double* b) {
+template <int R, int K, class T>
+KL_INLINE void add_transposed_product(double* c, const T* a, const double* b) {
     Six rows[K];
     for (int k = 0; k < K; ++k) rows[k] = Six::load(b + 6 * k);
     for (int r = 0; r < R; ++r) {

@@ -114,8 +114,7 @@ inline void Transfer::prolong(const Level&, const Floats& from, const Level& fin
 
 struct Settings {
     int degree = 2;         // of the Chebyshev smoother
-    int quadratic = 3;      // of the Chebyshev smoother of quadratic elements above their linear level
-    float ratio = 20;       // largest to smallest eigenvalue that it smooths
+    float ratio = 12;       // largest to smallest eigenvalue that it smooths
     double theta = 0;       // links weaker than theta sqrt(|A_ii| |A_jj|) do not aggregate
     int64_t full = 300;     // unknowns of the coarsest level
 };
@@ -182,11 +181,11 @@ public:
             std::fill(z, z + top.size(), 0.0);
             return;
         }
-        over_rows(top.size(), 16384, [&](int64_t first, int64_t last) {
+        over_rows(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) top.c[i] = static_cast<float>(r[i] / norm);
         });
         descend(0);
-        over_rows(top.size(), 16384, [&](int64_t first, int64_t last) {
+        over_rows(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) z[i] = norm * top.x[i];
         });
     }
@@ -215,13 +214,12 @@ private:
             return;
         }
         Level& coarse = levels[l + 1];
-        const int degree = transfers[l].weights ? settings.quadratic : settings.degree;
-        level.smooth(degree, settings.ratio, true);
+        level.smooth(settings.degree, settings.ratio, true);
         level.residual(level.y);
         transfers[l].restrict_to(level, level.y, coarse, coarse.c);
         descend(l + 1);
         transfers[l].prolong(coarse, coarse.x, level, level.x);
-        level.smooth(degree, settings.ratio, false);
+        level.smooth(settings.degree, settings.ratio, false);
     }
 
     void solve_coarsest(Level& level) {
@@ -288,8 +286,7 @@ private:
         next = galerkin<b>(g, data, P, columns, count);
         transfers.emplace_back();
         Transfer& t = transfers.back();
-        t.data.assign(P.data.begin(), P.data.end());
-        t.data.resize(t.data.size() + 8);  // lanes read beyond the last row
+        t.data = std::move(P.data);
         t.indptr = std::move(P.indptr);
         t.indices = std::move(P.indices);
         t.columns = std::move(columns);
@@ -336,14 +333,14 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
     int best_at = 0;
     for (int k = 1; k <= most; ++k) {
         multiply(A, p.data(), Ap.data());
-        over_rows(n, 16384, [&](int64_t first, int64_t last) {
+        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 if (fixed[i]) Ap[i] = 0;
         });
         const double curvature = dot(p.data(), Ap.data(), n);
         if (!(curvature > 0 && rz > 0)) return {k, false};
         const double alpha = rz / curvature;
-        over_rows(n, 16384, [&](int64_t first, int64_t last) {
+        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
                 x[i] += alpha * p[i];
                 r[i] -= alpha * Ap[i];
@@ -363,7 +360,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
         const double old = rz;
         rz = dot(r.data(), z.data(), n);
         const double beta = rz / old;
-        over_rows(n, 16384, [&](int64_t first, int64_t last) {
+        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) p[i] = z[i] + beta * p[i];
         });
     }

@@ -11,6 +11,8 @@ namespace kl {
 
 using Floats = std::vector<float>;
 
+constexpr int64_t VECTOR_GRAIN = 16384;  // numbers of one task on a vector
+
 template <class F>
 void over_rows(int64_t rows, int64_t grain, const F& f) {
     parallel_ranges(rows, grain, f);
@@ -226,14 +228,18 @@ inline float largest_eigenvalue(Level& level, int steps = 15) {
         rz = dot(r.data(), level.x.data(), size);
         if (!(rz > 0)) break;
         beta = k ? rz / old_rz : 0;
-        for (int64_t i = 0; i < size; ++i) z[i] = level.x[i] + static_cast<float>(beta) * z[i];
+        over_rows(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+            for (int64_t i = first; i < last; ++i) z[i] = level.x[i] + static_cast<float>(beta) * z[i];
+        });
         level.step(z.data(), level.y.data(), 0, 0, false);  // y = -A z
         const double curvature = -dot(z.data(), level.y.data(), size);
         if (!(curvature > 0)) break;
         alpha = rz / curvature;
         if (k) beside.push_back(std::sqrt(beta) / old_alpha);
         diagonal.push_back(1 / alpha + (k ? beta / old_alpha : 0));
-        for (int64_t i = 0; i < size; ++i) r[i] += static_cast<float>(alpha) * level.y[i];
+        over_rows(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+            for (int64_t i = first; i < last; ++i) r[i] += static_cast<float>(alpha) * level.y[i];
+        });
     }
     for (Floats* v : {&level.x, &level.y, &level.d}) std::fill(v->begin(), v->end(), 0.0f);
     return diagonal.empty() ? 1.0f : static_cast<float>(1.15 * largest_of(diagonal, beside));

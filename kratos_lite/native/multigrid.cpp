@@ -112,10 +112,9 @@ PYBIND11_MODULE(_multigrid, m) {
              }),
              py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("data").noconvert());
     py::class_<Multigrid>(m, "Multigrid")
-        .def(py::init([](Matrix A, Array<uint8_t> fixed, int degree, int quadratic, float ratio, double theta) {
+        .def(py::init([](Matrix A, Array<uint8_t> fixed, int degree, float ratio, double theta) {
             kl::Settings settings;
             settings.degree = degree;
-            settings.quadratic = quadratic;
             settings.ratio = ratio;
             settings.theta = theta;
             return std::make_unique<Multigrid>(std::move(A), fixed, settings);
