@@ -18,6 +18,8 @@ Progress = Callable[[str, float], None]
 
 DENSE_LIMIT = 600
 """Up to this many unknowns a full matrix needs no sparse library at all."""
+COMPILED_DENSE_LIMIT = 60
+"""Up to this many it is faster than compiled multigrid, which needs none either."""
 DENSE_MAX = 10_000
 """Above this many degrees of freedom a full matrix is refused (it would take 0.8 GB several times)."""
 DIRECT_LIMIT = 10_000
@@ -39,20 +41,19 @@ class Solution:
 def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) -> tuple[str, str]:
     """Return the method to use for `unknowns` free ones of `dofs`, and the reason in words.
 
-    >>> choose("auto", 24)
-    ('dense', '24 unknowns ≤ 600: a full matrix is fastest')
+    >>> choose("auto", 24)[0]
+    'dense'
     """
     if method not in METHODS:
         raise InputError(f"solver must be one of {', '.join(METHODS)}; got {method!r}")
     if method != "auto":
         return method, "asked for"
-    if unknowns <= DENSE_LIMIT and dofs <= 4 * DENSE_LIMIT:
-        return "dense", f"{unknowns} unknowns ≤ {DENSE_LIMIT}: a full matrix is fastest"
-    if symmetric and kernels("multigrid"):
-        return (
-            "amg",
-            f"{unknowns} unknowns > {DENSE_LIMIT}: compiled multigrid is fastest and takes least memory",
-        )
+    compiled = symmetric and kernels("multigrid") is not None
+    limit = COMPILED_DENSE_LIMIT if compiled else DENSE_LIMIT
+    if unknowns <= limit and dofs <= 4 * DENSE_LIMIT:
+        return "dense", f"{unknowns} unknowns ≤ {limit}: a full matrix is fastest"
+    if compiled:
+        return "amg", f"{unknowns} unknowns > {limit}: multigrid is fastest and takes least memory"
     if unknowns <= DIRECT_LIMIT:
         return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorisation is fastest"
     if not symmetric:
