@@ -46,6 +46,7 @@ class Report:
     peak_memory : bytes.
     warnings, notes : what the checks and the reader found.
     skipped : what this solution did without, as it would have changed nothing.
+    kernels : what computed, compiled kernels and their threads or NumPy.
     """
 
     unknowns: int
@@ -62,6 +63,7 @@ class Report:
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
+    kernels: str = ""
 
 
 class Result:
@@ -210,6 +212,7 @@ class Result:
             ("equilibrium", f"forces {report.force_error:.1e}, moments {report.moment_error:.1e}"),
             ("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())),
             ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
+            ("kernels", report.kernels),
         ]
         if report.skipped:
             rows.append(("skipped", "; ".join(report.skipped)))

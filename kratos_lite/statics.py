@@ -18,6 +18,7 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.fields import internal_load
 from kratos_lite.loads import Load, check_loads
 from kratos_lite.mesh import Mesh
+from kratos_lite.native import described
 from kratos_lite.result import Report, Result, peak_memory
 from kratos_lite.supports import resolve
 from kratos_lite.system import System, among
@@ -243,6 +244,7 @@ class StaticSystem:
             warnings=warnings,
             notes=list(self.model.notes),
             skipped=self._skipped(case.moving),
+            kernels=described(),
         )
 
     def _at_rest(self) -> Array:
@@ -286,7 +288,7 @@ class StaticSystem:
             said.append(f"{int((~self._used).sum())} nodes without elements")
         if moving.any() and self.equations:
             said += self.equations.skipped
-        return [*said, "iterations, as the law is linear", "mass", "strains and stresses until asked for"]
+        return [*said, "load steps, as the law is linear", "mass", "strains and stresses until asked for"]
 
 
 def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:

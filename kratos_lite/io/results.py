@@ -111,6 +111,8 @@ def summary(result: Result) -> dict[str, Any]:
         "moment_error": report.moment_error,
         "seconds": report.seconds,
         "peak_memory": report.peak_memory,
+        "kernels": report.kernels,
+        "skipped": report.skipped,
         "warnings": report.warnings,
         "notes": report.notes,
     }

@@ -8,7 +8,7 @@ from kratos_lite import statics, system
 from kratos_lite.system import System
 
 STEEL = kl.Isotropic3D(E=2e9, nu=0.3, density=1000.0)
-ALWAYS = ["iterations, as the law is linear", "mass", "strains and stresses until asked for"]
+ALWAYS = ["load steps, as the law is linear", "mass", "strains and stresses until asked for"]
 
 
 def bodies(n=3, cells=(2, 2, 2)):
