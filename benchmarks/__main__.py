@@ -77,7 +77,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "growth": growth,
     "assembly": assembly,
     "parse": lambda options, folder: sets.parse_runs(options.programs, options.cells or (20, 50)),
-    "skips": lambda options, folder: sets.skip_runs(options.programs, (options.cells or (20,))[0]),
+    "skips": lambda options, folder: sets.skip_runs(options.programs, (options.cells or (32,))[0]),
     "cube1": lambda options, folder: sets.cube1_runs(options.programs),
 }
 REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1}

@@ -161,11 +161,11 @@ def compared(rows: Sequence[Row], names: Sequence[str], process: bool = False) -
 
 def skips(rows: Sequence[Row]) -> str:
     """Return what each skip is worth: seconds and memory beside the row it is compared with."""
-    pairs = {"half_unloaded": "two_bodies", "unreferenced": "block", "unloaded": "block", "block": "block"}
+    pairs = {"half_unloaded": "two_bodies", "two_bodies": "two_bodies"}
     plain = {row["scene"]: row for row in rows if row["variant"] in ("plain", "two bodies, both loaded")}
     body = []
     for row in rows:
-        base = plain.get(pairs.get(row["scene"], row["scene"]))
+        base = plain.get(pairs.get(row["scene"], "block"))
         time = ratio(row["process"], base["process"]) if base else ""
         memory = ratio(row["peak"], base["peak"]) if base else ""
         name = label((row["scene"], row["kind"], row["n"]))

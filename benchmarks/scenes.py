@@ -218,13 +218,31 @@ def unreferenced(kind: str, n: int) -> Scene:
     return Scene("unreferenced", kind, n, model)
 
 
+def warped(kind: str, n: int) -> Scene:
+    """Return the clamped block with its inner nodes moved, so that no Jacobian is constant."""
+    plain = block(kind, n).model
+    X = plain.mesh.points
+    points = X + 0.1 / n * (np.sin(7 * np.pi * X) * np.sin(5 * np.pi * X[:, [1, 2, 0]]))
+    model = kl.Model(kl.Mesh(points, plain.mesh.blocks), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
+    model.fix(on_plane(model.mesh, 2, 0.0))
+    model.add(kl.Gravity((3.0, 2.0, -9.81)))
+    return Scene("warped", kind, n, model)
+
+
+def held(kind: str, n: int) -> Scene:
+    """Return the block with all nodes of its lower half held."""
+    model = block(kind, n).model
+    model.fix(model.mesh.points[:, 2] < 0.5 + 1e-9)
+    return Scene("held", kind, n, model)
+
+
 ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "block": 6.8668}
 """J, of the exact solutions, good to 1e-4: from ``python -m benchmarks references`` (27N, extrapolated)."""
 SCENES: dict[str, Callable[[str, int], Scene]] = {
     made.__name__: made
     for made in (
         manufactured, sphere, bending, cook, l_domain, cavity, cantilever, block, cube,
-        two_bodies, half_unloaded, unloaded, unreferenced,
+        two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
 }  # fmt: skip
 """Every scene by name."""

@@ -26,7 +26,11 @@ def work(job: Job) -> Array | None:
         return None
     if job.task == "assembly":
         return assembly(job, model)
-    result = model.solve(**{word: job.given[word] for word in WORDS if word in job.given})
+    system = model.system(**{word: job.given[word] for word in WORDS if word in job.given})
+    for _ in range(job.given.get("cases", 1)):
+        result = system.solve()
+    for _ in range(1, job.given.get("again", 1)):
+        result = model.solve()
     report = result.report
     job.answer["phases"] |= report.seconds
     job.answer |= {
@@ -41,7 +45,7 @@ def work(job: Job) -> Array | None:
     if job.given.get("write"):
         with job.phase("write"):
             ending = ".vtu" if job.given["write"] is True else job.given["write"]
-            result.save(f"{job.given['folder']}/result{ending}")
+            result.save(f"{job.given['folder']}/result{ending}", job.given.get("mode"))
     return np.asarray(result.displacement())
 
 
