@@ -134,6 +134,8 @@ class Pyamg:
 
 FORWARD = ("block_gauss_seidel", {"sweep": "forward"})
 BACKWARD = ("block_gauss_seidel", {"sweep": "backward"})
+SMOOTHING = ("jacobi", {"omega": 2.0, "weighting": "local"})
+"""Of the prolongator; row sums bound the eigenvalues, as estimates by random vectors differ each time."""
 
 
 def aggregated(A: BlockMatrix, free: Mask, points: Array) -> Any:
@@ -144,6 +146,7 @@ def aggregated(A: BlockMatrix, free: Mask, points: Array) -> Any:
         A.scipy(),
         B=rigid_modes(points) * free[:, None],
         strength=("symmetric", {"theta": 0.0}),
+        smooth=SMOOTHING,
         presmoother=FORWARD,
         postsmoother=BACKWARD,
         improve_candidates=None,
