@@ -30,7 +30,6 @@ class Multigrid {
 public:
     Multigrid(Matrix matrix, Array<uint8_t> fixed, kl::Settings settings)
         : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
-        kl::require(A.data.size() == 9 * A.indices.size(), "data must be (nnz, 3, 3)");
         kl::require(fixed.size() == 3 * (A.indptr.size() - 1), "fixed must have one entry for each unknown");
         py::gil_scoped_release release;
         hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed);
@@ -38,6 +37,7 @@ public:
 
     // Smoothed aggregation below the finest level.
     void aggregate(Array<double> modes) {
+        kl::require(hierarchy.levels.size() == 1, "aggregated already");
         std::vector<double> B = free_modes(modes, fixed);
         py::gil_scoped_release release;
         hierarchy.coarsen(A.data.data(), fixed, std::move(B));
@@ -46,9 +46,12 @@ public:
     // A linear level below the finest one, and smoothed aggregation below that.
     void aggregate_linear(Matrix linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
                           Array<int32_t> indices, Array<double> weights, Array<double> modes) {
+        kl::require(hierarchy.levels.size() == 1, "aggregated already");
         below = std::move(linear);
         kl::require(linear_fixed.size() == 3 * (below.indptr.size() - 1), "one entry for each linear unknown");
         kl::require(indptr.size() == A.indptr.size(), "weights must have one row for each node");
+        kl::require(indices.size() == indptr.data()[indptr.size() - 1] && weights.size() == indices.size(),
+                    "one weight for each index is needed");
         std::vector<uint8_t> apart = bytes_of(linear_fixed);
         std::vector<double> B = free_modes(modes, apart);
         kl::Transfer transfer;
@@ -58,7 +61,6 @@ public:
         py::gil_scoped_release release;
         hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed);
         hierarchy.coarsen(below.data.data(), apart, std::move(B));
-
     }
 
     Array<double> cycle(Array<double> r) {
@@ -108,6 +110,9 @@ PYBIND11_MODULE(_multigrid, m) {
     kl::common(m);
     py::class_<Matrix>(m, "Matrix")
         .def(py::init([](Array<int32_t> indptr, Array<int32_t> indices, Array<double> data) {
+                 kl::require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
+                 kl::require(indptr.size() > 0 && indptr.data()[indptr.size() - 1] == indices.size(),
+                             "indptr must end with the number of blocks");
                  return Matrix{indptr, indices, data};
              }),
              py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("data").noconvert());

@@ -15,15 +15,21 @@ MAX_ITERATIONS = 1000
 
 
 class Share:
-    """Turns residuals, as shares of the first, into the share of the work that is done."""
+    """Turns residuals, as shares of the first, into the share of the work that is done; it never falls."""
 
     def __init__(self, tolerance: float, progress: Progress) -> None:
-        self.tolerance, self.progress = tolerance, progress
+        self.tolerance, self.progress, self.done = tolerance, progress, 0.0
 
     def __call__(self, residual: float) -> None:
         """Report after an iteration."""
-        done = np.log(max(residual, 1e-300)) / np.log(self.tolerance)
-        self.progress("solve", float(np.clip(done, 0.0, 1.0)))
+        share = float(np.log(max(residual, 1e-300)) / np.log(self.tolerance))
+        self.done = min(max(self.done, share), 1.0)
+        self.progress("solve", self.done)
+
+    def finish(self) -> None:
+        """Report that all is done, where round-off ended the iteration before its tolerance did."""
+        if self.done < 1:
+            self(self.tolerance)
 
 
 def conjugate_gradients(
@@ -62,6 +68,8 @@ def conjugate_gradients(
             each(norm / norm_b)
         limit = max(tolerance * norm_b, 2 * np.finfo(float).eps * (norm_A * np.linalg.norm(x) + norm_b))
         if norm <= limit:
+            if each:
+                each.finish()
             return x, iteration, True
         if norm < best:
             best, best_at = norm, iteration

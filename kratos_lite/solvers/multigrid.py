@@ -8,7 +8,8 @@ Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ def multigrid(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | N
     linear : the linear elements within quadratic ones.
     """
     compiled = kernels("multigrid")
-    return Pyamg(A, free, points) if compiled is None else Compiled(compiled, A, free, points, linear)
+    return Pyamg(A, free, points, linear) if compiled is None else Compiled(compiled, A, free, points, linear)
 
 
 class Compiled:
@@ -95,27 +96,27 @@ class Compiled:
         """Return x, iterations and success."""
         each = Share(tolerance, progress) if progress else None
         x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
+        if each and converged:
+            each.finish()
         return x, iterations, converged
 
 
 class Pyamg:
-    """The hierarchy of pyamg."""
+    """The hierarchy of pyamg: block Gauss-Seidel, forward before and backward after each coarser level.
 
-    def __init__(self, A: BlockMatrix, free: Mask, points: Array) -> None:
-        import pyamg
+    Attributes
+    ----------
+    levels : unknowns of each level.
+    """
 
+    def __init__(self, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
         self._A = uncoupled(A, free)
-        smoother = ("block_gauss_seidel", {"sweep": "symmetric"})
-        hierarchy = pyamg.smoothed_aggregation_solver(
-            self._A.scipy(),
-            B=rigid_modes(points) * free[:, None],
-            strength=("symmetric", {"theta": 0.0}),
-            presmoother=smoother,
-            postsmoother=smoother,
-            improve_candidates=None,
-            max_coarse=200,
-            coarse_solver="splu",
-        )
+        with one_thread():
+            hierarchy = (
+                aggregated(self._A, free, points)
+                if linear is None
+                else above_linear(self._A, free, points, linear)
+            )
         self._cycle = hierarchy.aspreconditioner(cycle="V")
         self.levels: list[int] = [level.A.shape[0] for level in hierarchy.levels]
 
@@ -127,7 +128,64 @@ class Pyamg:
         self, b: Array, tolerance: float, norm: float, progress: Progress | None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, progress=progress)
+        with one_thread():
+            return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, progress=progress)
+
+
+FORWARD = ("block_gauss_seidel", {"sweep": "forward"})
+BACKWARD = ("block_gauss_seidel", {"sweep": "backward"})
+SMOOTHING = ("jacobi", {"omega": 2.0, "weighting": "local"})
+"""Of the prolongator; row sums bound the eigenvalues, as estimates by random vectors differ each time."""
+
+
+def aggregated(A: BlockMatrix, free: Mask, points: Array) -> Any:
+    """Return pyamg's hierarchy of smoothed aggregation."""
+    import pyamg
+
+    return pyamg.smoothed_aggregation_solver(
+        A.scipy(),
+        B=rigid_modes(points) * free[:, None],
+        strength=("symmetric", {"theta": 0.0}),
+        smooth=SMOOTHING,
+        presmoother=FORWARD,
+        postsmoother=BACKWARD,
+        improve_candidates=None,
+        max_coarse=200,
+        coarse_solver="splu",
+    )
+
+
+def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel) -> Any:
+    """Return pyamg's hierarchy of the linear elements below a level of quadratic ones."""
+    from pyamg import MultilevelSolver
+    from pyamg.relaxation.smoothing import change_smoothers
+    from scipy.sparse import csr_array, diags_array, identity, kron
+
+    corners = free.reshape(-1, 3)[linear.nodes].ravel()
+    below = aggregated(uncoupled(linear.K, corners), corners, points[linear.nodes])
+    shape = (len(points), len(linear.nodes))
+    nodal = csr_array((linear.weights, linear.indices, linear.indptr), shape=shape)
+    top = MultilevelSolver.Level()
+    top.A = A.scipy()
+    top.P = (diags_array(free * 1.0) @ kron(nodal, identity(3)) @ diags_array(corners * 1.0)).tocsr()
+    top.R = top.P.T.tocsr()
+    hierarchy = MultilevelSolver([top, *below.levels], coarse_solver="splu")
+    change_smoothers(hierarchy, FORWARD, BACKWARD)
+    return hierarchy
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Keep dense algebra, on arrays too small for more, to one thread while pyamg works.
+
+    Idle threads that wait actively for the next small product took three quarters of the time.
+    """
+    import pyamg  # noqa: F401 (libraries that are loaded later would not heed the limit)
+
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return nullcontext()
+    return cast("AbstractContextManager[Any]", threadpool_limits(1))
 
 
 def uncoupled(A: BlockMatrix, free: Mask) -> BlockMatrix:
