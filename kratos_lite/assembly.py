@@ -30,7 +30,7 @@ SCATTER_BYTES = 64_000_000
 """Memory of the element matrices that are added to the global matrix at once."""
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the share that is done, 0 … 1."""
-CONSTANT_JACOBIANS = "constant Jacobians"
+CONSTANT_JACOBIANS = "all Jacobians but the first of elements where they are constant"
 Kernel = Callable[[KinematicLinear], Array]
 """Gives matrices (m, k, k) of elements."""
 

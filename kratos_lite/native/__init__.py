@@ -34,7 +34,16 @@ def kernels(name: str) -> Any:
 
 
 @cache
+def _said() -> list[str]:
+    """Return what was said so far about missing kernels."""
+    return []
+
+
 def _say_once(why: str) -> None:
+    """Warn of the first kernel that is missing; the others are missing for the same reason."""
+    if _said():
+        return
+    _said().append(why)
     import logging
 
     log = logging.getLogger("kratos_lite")

@@ -10,6 +10,7 @@
 #include <exception>
 #include <functional>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -22,7 +23,11 @@ namespace kl {
 class Pool {
 public:
     explicit Pool(int threads) {
-        for (int i = 1; i < threads; ++i) workers.emplace_back([this] { wait_for_work(); });
+        try {
+            for (int i = 1; i < threads; ++i) workers.emplace_back([this] { wait_for_work(); });
+        } catch (const std::system_error&) {
+            // the system gives no more threads: those there are do the work
+        }
     }
 
     // The pool is left to the operating system at exit: joining there can hang after a fork.
@@ -43,7 +48,6 @@ public:
         if (error) std::rethrow_exception(std::exchange(error, nullptr));
     }
 
-    int size() const { return static_cast<int>(workers.size()) + 1; }
 
 private:
     void work(const std::function<void(int64_t)>& task, int64_t tasks) {
@@ -97,6 +101,7 @@ void parallel(int64_t tasks, const F& f) {
     static std::mutex busy;
     static Pool* pool = nullptr;
     static long owner = 0;
+    static int size = 0;
 #ifndef _WIN32
     const long process = getpid();
 #else
@@ -107,9 +112,10 @@ void parallel(int64_t tasks, const F& f) {
         for (int64_t i = 0; i < tasks; ++i) f(i);
         return;
     }
-    if (!pool || owner != process || pool->size() != wanted_threads()) {
+    if (!pool || owner != process || size != wanted_threads()) {
         pool = new Pool(wanted_threads());  // a forked process has none of its parent's threads
         owner = process;
+        size = wanted_threads();
     }
     pool->run(tasks, f);
 }
