@@ -17,6 +17,11 @@ struct Matrix {
 
 std::vector<uint8_t> bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
 
+std::vector<double> coordinates(const Array<double>& points, size_t unknowns) {
+    kl::require(static_cast<size_t>(points.size()) == unknowns, "points must be (n, 3)");
+    return {points.data(), points.data() + points.size()};
+}
+
 // Modes (3n, 6) with zeros at fixed components.
 std::vector<double> free_modes(const Array<double>& modes, const std::vector<uint8_t>& fixed) {
     kl::require(modes.size() == 6 * static_cast<int64_t>(fixed.size()), "modes must be (3n, 6)");
@@ -28,12 +33,13 @@ std::vector<double> free_modes(const Array<double>& modes, const std::vector<uin
 
 class Multigrid {
 public:
-    Multigrid(Matrix matrix, Array<uint8_t> fixed, kl::Settings settings)
+    Multigrid(Matrix matrix, Array<uint8_t> fixed, Array<double> points, kl::Settings settings)
         : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
         kl::require(A.data.size() == 9 * A.indices.size(), "data must be (nnz, 3, 3)");
         kl::require(fixed.size() == 3 * (A.indptr.size() - 1), "fixed must have one entry for each unknown");
+        std::vector<double> X = coordinates(points, this->fixed.size());
         py::gil_scoped_release release;
-        hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed);
+        hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed, std::move(X));
     }
 
     // Smoothed aggregation below the finest level.
@@ -45,18 +51,20 @@ public:
 
     // A linear level below the finest one, and smoothed aggregation below that.
     void aggregate_linear(Matrix linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
-                          Array<int32_t> indices, Array<double> weights, Array<double> modes) {
+                          Array<int32_t> indices, Array<double> weights, Array<double> points,
+                          Array<double> modes) {
         below = std::move(linear);
         kl::require(linear_fixed.size() == 3 * (below.indptr.size() - 1), "one entry for each linear unknown");
         kl::require(indptr.size() == A.indptr.size(), "weights must have one row for each node");
         std::vector<uint8_t> apart = bytes_of(linear_fixed);
-        std::vector<double> B = free_modes(modes, apart);
+        std::vector<double> B = free_modes(modes, apart), X = coordinates(points, apart.size());
         kl::Transfer transfer;
         transfer.indptr.assign(indptr.data(), indptr.data() + indptr.size());
         transfer.indices.assign(indices.data(), indices.data() + indices.size());
         transfer.data.assign(weights.data(), weights.data() + weights.size());
         py::gil_scoped_release release;
-        hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed);
+        hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed,
+                             std::move(X));
         hierarchy.coarsen(below.data.data(), apart, std::move(B));
 
     }
@@ -112,13 +120,13 @@ PYBIND11_MODULE(_multigrid, m) {
              }),
              py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("data").noconvert());
     py::class_<Multigrid>(m, "Multigrid")
-        .def(py::init([](Matrix A, Array<uint8_t> fixed, int degree, int quadratic, float ratio, double theta) {
+        .def(py::init([](Matrix A, Array<uint8_t> fixed, Array<double> points, int degree, int quadratic, float ratio, double theta) {
             kl::Settings settings;
             settings.degree = degree;
             settings.quadratic = quadratic;
             settings.ratio = ratio;
             settings.theta = theta;
-            return std::make_unique<Multigrid>(std::move(A), fixed, settings);
+            return std::make_unique<Multigrid>(std::move(A), fixed, points, settings);
         }))
         .def("aggregate", &Multigrid::aggregate)
         .def("aggregate_linear", &Multigrid::aggregate_linear)

@@ -68,7 +68,7 @@ class Compiled:
     def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
         fixed = (~free).astype(np.uint8)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
-        self._kernel = module.Multigrid(matrix, fixed, DEGREE, QUADRATIC_DEGREE, RATIO, STRENGTH)
+        self._kernel = module.Multigrid(matrix, fixed, points, DEGREE, QUADRATIC_DEGREE, RATIO, STRENGTH)
         if linear is None:
             self._kernel.aggregate(rigid_modes(points))
         else:
@@ -79,6 +79,7 @@ class Compiled:
                 linear.indptr,
                 linear.indices,
                 linear.weights,
+                points[linear.nodes],
                 rigid_modes(points[linear.nodes]),
             )
         self.levels: list[int] = self._kernel.sizes()
