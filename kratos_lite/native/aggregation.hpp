@@ -147,7 +147,7 @@ struct SmoothRows {
     int64_t first, last;
 };
 
-// P = T - omega D^-1 A T for some rows; or, without D, A T alone.
+// P = T - omega D^-1 A T for some rows.
 template <int b>
 KL_INLINE void smooth_rows(const SmoothRows<b>& s) {
     constexpr int size = b * MODES;
@@ -163,7 +163,6 @@ KL_INLINE void smooth_rows(const SmoothRows<b>& s) {
             add_product<b, b>(row + at * size, s.A + static_cast<int64_t>(k) * b * b,
                               &s.T[static_cast<int64_t>(j) * size]);
         }
-        if (!s.Dinv) continue;
         for (int32_t c = 0; c < count; ++c) {
             double smoothed[size] = {};
             add_product<b, b>(smoothed, s.Dinv + i * b * b, row + c * size);

@@ -80,10 +80,10 @@ KL_INLINE void factor_rows(const Factor& f) {
     Skyline<double>& A = f.A;
     for (int64_t i = f.first; i < f.last; ++i) {
         const int64_t start = i - (A.at[i + 1] - A.at[i]);
-        double* row = &A.rows[A.at[i]] - start;
+        double* row = A.rows.data() + A.at[i] - start;
         for (int64_t j = start; j < i; ++j) {
             const int64_t other = j - (A.at[j + 1] - A.at[j]), from = std::max(start, other);
-            const double* column = &A.rows[A.at[j]] - other;
+            const double* column = A.rows.data() + A.at[j] - other;
             row[j] = (row[j] - dot_product<double, V>(row + from, column + from, j - from)) * A.pivots[j];
         }
         const double left = A.pivots[i] - dot_product<double, V>(row + start, row + start, i - start);
@@ -449,66 +449,97 @@ int32_t aggregate_clusters(const Graph& g, const double* A, const Clusters& clus
     return count;
 }
 
+// One cluster of a prolongator: A T in its rows, each column (rows, b, 6) by itself.
+template <int b>
+struct ClusterProduct {
+    Graph g;
+    const double* A;
+    const Ints& of;
+    const std::vector<double>& T;
+    const int32_t* members;
+    int64_t nodes;
+    const int32_t* columns;
+    int64_t count;
+    double* X;
+};
+
+template <int b>
+KL_INLINE void cluster_product(const ClusterProduct<b>& s) {
+    constexpr int size = b * MODES;
+    for (int64_t p = 0; p < s.nodes; ++p) {
+        const int32_t i = s.members[p];
+        if (s.of[i] < 0) continue;
+        for (int32_t k = s.g.indptr[i]; k < s.g.indptr[i + 1]; ++k) {
+            const int32_t j = s.g.indices[k];
+            if (s.of[j] < 0) continue;
+            const int64_t at = std::lower_bound(s.columns, s.columns + s.count, s.of[j]) - s.columns;
+            add_product<b, b>(s.X + (at * s.nodes + p) * size, s.A + int64_t{k} * b * b, &s.T[int64_t{j} * size]);
+        }
+    }
+}
+
+template <int V>
+KL_INLINE void cluster_product_3(const ClusterProduct<3>& s) { cluster_product<3>(s); }
+template <int V>
+KL_INLINE void cluster_product_6(const ClusterProduct<6>& s) { cluster_product<6>(s); }
+KL_DISPATCH(multiply_cluster, cluster_product_3, double, const ClusterProduct<3>&)
+KL_DISPATCH(multiply_cluster, cluster_product_6, double, const ClusterProduct<6>&)
+
+// Aggregates that the nodes of each cluster are linked to: the columns of their rows of P.
+inline void cluster_columns(const Graph& g, const Clusters& clusters, const Ints& of, Ints& starts, Ints& columns) {
+    Ints aggregates(g.indptr[g.rows]);
+    for (size_t k = 0; k < aggregates.size(); ++k) aggregates[k] = of[g.indices[k]];
+    union_pattern(
+        clusters.count(), g.rows,
+        [&](int64_t c, const auto& add) {
+            for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) {
+                const int32_t i = clusters.members[p];
+                for (int32_t k = g.indptr[i]; of[i] >= 0 && k < g.indptr[i + 1]; ++k)
+                    if (aggregates[k] >= 0) add(&aggregates[k], &aggregates[k] + 1);
+            }
+        },
+        starts, columns);
+}
+
 // P = T - omega D^-1 A T with the clusters' D; each node has the columns of its whole cluster.
 template <int b>
 Prolongator smoothed_prolongator(const Graph& g, const double* A, const Clusters& clusters,
                                  const std::vector<uint8_t>& fixed, const Ints& of,
                                  const std::vector<double>& T, double omega) {
     constexpr int size = b * MODES;
+    Ints starts, columns;
+    cluster_columns(g, clusters, of, starts, columns);
     Prolongator P;
-    Ints columns_start, columns, near(g.indptr[g.rows]);
-    for (size_t k = 0; k < near.size(); ++k) near[k] = of[g.indices[k]];
-    union_pattern(
-        clusters.count(), g.rows,
-        [&](int64_t c, const auto& add) {
-            for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) {
-                const int32_t i = clusters.members[p];
-                if (of[i] < 0) continue;
-                for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-                    if (near[k] >= 0) add(&near[k], &near[k] + 1);
-            }
-        },
-        columns_start, columns);
     P.indptr.assign(g.rows + 1, 0);
     for (int64_t i = 0; i < g.rows; ++i) {
         const int32_t c = clusters.of[i];
-        P.indptr[i + 1] = P.indptr[i] + (of[i] < 0 ? 0 : columns_start[c + 1] - columns_start[c]);
+        P.indptr[i + 1] = P.indptr[i] + (of[i] < 0 ? 0 : starts[c + 1] - starts[c]);
     }
     P.indices.resize(P.indptr[g.rows]);
-    P.data.assign(static_cast<size_t>(P.indptr[g.rows]) * size, 0.0);
-    parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        for (int64_t i = first; i < last; ++i)
-            std::copy_n(columns.begin() + columns_start[clusters.of[i]], P.indptr[i + 1] - P.indptr[i],
-                        P.indices.begin() + P.indptr[i]);
-        smooth_some(SmoothRows<b>{g, A, nullptr, fixed, of, T, omega, P, first, last});  // A T alone
-    });
+    P.data.resize(static_cast<size_t>(P.indptr[g.rows]) * size + 8);  // lanes read beyond the end
     clusters.over(256, [&](int64_t first, int64_t last) {
         std::vector<double> X;
         for (int64_t c = first; c < last; ++c) {
-            const int32_t start = clusters.starts[c], end = clusters.starts[c + 1];
-            X.resize(static_cast<size_t>(end - start) * size);
-            for (int32_t column = 0; column < columns_start[c + 1] - columns_start[c]; ++column) {
-                const auto block = [&](int32_t p) -> double* {
-                    const int32_t i = clusters.members[p];
-                    return of[i] < 0 ? nullptr : &P.data[(int64_t{P.indptr[i]} + column) * size];
-                };
-                for (int32_t p = start; p < end; ++p) {
-                    double* x = &X[static_cast<size_t>(p - start) * size];
-                    if (const double* from = block(p))
-                        std::copy_n(from, size, x);
-                    else
-                        std::fill_n(x, size, 0.0);
-                }
-                substitute_six_some(SixSubstitutions{clusters.exact, int64_t{start} * b, int64_t{end} * b, X.data()});
-                for (int32_t p = start; p < end; ++p) {
-                    double* to = block(p);
-                    if (!to) continue;
-                    const int64_t i = clusters.members[p];
-                    const bool mine = columns[columns_start[c] + column] == of[i];
-                    for (int e = 0; e < size; ++e)
-                        to[e] = fixed[i * b + e / MODES]
-                                    ? 0.0
-                                    : (mine ? T[i * size + e] : 0.0) - omega * X[static_cast<size_t>(p - start) * size + e];
+            const int64_t start = clusters.starts[c], nodes = clusters.starts[c + 1] - start;
+            const int32_t* own = columns.data() + starts[c];
+            const int64_t count = starts[c + 1] - starts[c];
+            X.assign(static_cast<size_t>(count * nodes * size), 0.0);
+            multiply_cluster(
+                ClusterProduct<b>{g, A, of, T, &clusters.members[start], nodes, own, count, X.data()});
+            for (int64_t e = 0; e < count; ++e)
+                substitute_six_some(
+                    SixSubstitutions{clusters.exact, start * b, (start + nodes) * b, &X[e * nodes * size]});
+            for (int64_t p = 0; p < nodes; ++p) {
+                const int64_t i = clusters.members[start + p];
+                if (of[i] < 0) continue;
+                std::copy_n(own, count, P.indices.begin() + P.indptr[i]);
+                for (int64_t e = 0; e < count; ++e) {
+                    const double* smoothed = &X[(e * nodes + p) * size];
+                    auto* out = &P.data[(P.indptr[i] + e) * size];
+                    for (int k = 0; k < size; ++k) {
+                        const double tentative = own[e] == of[i] ? T[i * size + k] : 0.0;
+                        out[k] = fixed[i * b + k / MODES] ? 0.0 : tentative - omega * smoothed[k];
+                    }
                 }
             }
         }

@@ -358,7 +358,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
     if (norm_b == 0) return {0, true};
     M.cycle(r.data(), z.data());
     p = z;
-    double rz = dot(r.data(), z.data(), n), best = norm_b;
+    double rz = dot(r.data(), z.data(), n), best = INFINITY;  // residuals may grow at first
     int best_at = 0;
     for (int k = 1; k <= most; ++k) {
         multiply(A, p.data(), Ap.data());

@@ -88,8 +88,7 @@ public:
         const auto each = [&](double residual) {
             if (!tell) return true;
             py::gil_scoped_acquire acquire;
-            progress(residual);
-            return true;
+            return !progress(residual).is(py::bool_(false));  // it may say stop
         };
         kl::Outcome outcome;
         {

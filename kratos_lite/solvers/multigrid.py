@@ -2,12 +2,14 @@
 
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid).
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
+On stretched meshes the kernels smooth lines or planes of close nodes exactly and aggregate them whole.
 Source: Vaněk, Mandel & Brezina, Computing 56 (1996) 179-196; Adams, Brezina, Hu & Tuminaro, J. Comput.
 Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,6 +23,7 @@ from kratos_lite.supports import rigid_modes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+GoOn = Callable[[float], bool]
 
 DEGREE, QUADRATIC_DEGREE = 2, 3
 """Degrees of the Chebyshev smoother, of linear and of quadratic elements."""
@@ -36,9 +39,12 @@ class Solver(Protocol):
     levels: list[int]
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
-        """Return x, iterations and success; b and x (3n,) are zero at fixed components."""
+        """Return x, iterations and success; b and x (3n,) are zero at fixed components.
+
+        After each iteration `go_on` is told the residual, as a share of |b|, and may say stop.
+        """
 
 
 def multigrid(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> Solver:
@@ -66,7 +72,7 @@ class Compiled:
     """
 
     def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
-        fixed = (~free).astype(np.uint8)
+        fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
         self._kernel = module.Multigrid(matrix, fixed, points, DEGREE, QUADRATIC_DEGREE, RATIO, STRENGTH)
         if linear is None:
@@ -91,10 +97,16 @@ class Compiled:
         return np.asarray(self._kernel.cycle(r))
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        each = Share(tolerance, progress) if progress else None
+        share = Share(tolerance, progress) if progress else None
+
+        def each(residual: float) -> bool:
+            if share:
+                share(residual)
+            return go_on is None or go_on(residual)
+
         x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
         return x, iterations, converged
 
@@ -125,9 +137,9 @@ class Pyamg:
         return np.asarray(self._cycle @ r)
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
-        """Return x, iterations and success."""
+        """Return x, iterations and success; `go_on` is not asked."""
         return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, progress=progress)
 
 
