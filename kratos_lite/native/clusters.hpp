@@ -161,7 +161,7 @@ public:
     Skyline<float> factor;
 
     bool empty() const { return of.empty(); }
-    int64_t count() const { return static_cast<int64_t>(starts.size()) - 1; }
+    int64_t count() const { return empty() ? 0 : static_cast<int64_t>(starts.size()) - 1; }
     int64_t bytes() const {
         return 4 * static_cast<int64_t>(of.size() + starts.size() + members.size() + factor.rows.size() +
                                         factor.pivots.size() + 2 * factor.at.size());

@@ -104,6 +104,12 @@ public:
         return out;
     }
 
+    py::list clusters() const {
+        py::list out;
+        for (const kl::Level& level : hierarchy.levels) out.append(level.clusters.count());
+        return out;
+    }
+
     Matrix A, below;
     std::vector<uint8_t> fixed;
     kl::Hierarchy hierarchy;
@@ -132,6 +138,7 @@ PYBIND11_MODULE(_multigrid, m) {
         .def("cycle", &Multigrid::cycle)
         .def("solve", &Multigrid::solve)
         .def("sizes", &Multigrid::sizes)
+        .def("clusters", &Multigrid::clusters)
         .def("bytes", [](const Multigrid& m) { return m.hierarchy.bytes(); })
         .def("complexity", [](const Multigrid& m) { return m.hierarchy.complexity(); });
 }

@@ -67,6 +67,7 @@ class Compiled:
     Attributes
     ----------
     levels : unknowns of each level.
+    clusters : parts of each level that its smoother solves exactly; 0 where these are the single nodes.
     memory : bytes of the hierarchy, which is kept in single precision.
     complexity : numbers in the matrices of all levels to those of the finest one.
     """
@@ -89,6 +90,7 @@ class Compiled:
                 rigid_modes(points[linear.nodes]),
             )
         self.levels: list[int] = self._kernel.sizes()
+        self.clusters: list[int] = self._kernel.clusters()
         self.memory: int = self._kernel.bytes()
         self.complexity: float = self._kernel.complexity()
 
