@@ -346,6 +346,8 @@ struct Outcome {
     bool converged;
 };
 
+constexpr int STALLED = 200;  // iterations without a new smallest residual; thin elements make plateaus
+
 // Conjugate gradients on A x = b with the V-cycle; A's rows at fixed components are left out.
 // Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
 inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<uint8_t>& fixed, Hierarchy& M,
@@ -382,7 +384,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
         if (norm < best) {
             best = norm;
             best_at = k;
-        } else if (k - best_at > 60) {
+        } else if (k - best_at > STALLED) {
             return {k, false};
         }
         M.cycle(r.data(), z.data());
