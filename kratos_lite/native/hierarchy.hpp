@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 
+#include "cluster_transfer.hpp"
 #include "level.hpp"
 
 namespace kl {
