@@ -459,7 +459,8 @@ def test_wrong_shapes_are_refused():
     system, b = equations(model)
     K, free = system.K, system._equations._free
     modes = np.zeros((K.shape[0], 6))
-    options = (2, 3, 20.0, 0.0)
+    points = np.zeros((K.shape[0] // 3, 3))
+    options = (points, 2, 12.0, 0.0)
 
     def kernel(fixed):
         return MODULE.Multigrid(MODULE.Matrix(K.indptr, K.indices, K.data), fixed, *options)
@@ -492,18 +493,19 @@ def test_a_linear_level_of_the_wrong_shape_is_refused():
     K, level = system.K, linear_level(system.points, system.batches)
     below = MODULE.Matrix(level.K.indptr, level.K.indices, level.K.data)
     fixed, corners = np.zeros(K.shape[0], np.uint8), np.zeros(level.K.shape[0], np.uint8)
-    right = (corners, level.indptr, level.indices, level.weights, np.zeros((len(corners), 6)))
+    points, inner = np.zeros((K.shape[0] // 3, 3)), np.zeros((len(corners) // 3, 3))
+    right = (corners, level.indptr, level.indices, level.weights, inner, np.zeros((len(corners), 6)))
     wrong = {
         0: (corners[:-1], "one entry for each linear unknown"),
         1: (level.indptr[:-1], "one row for each node"),
         2: (level.indices[:-1], "one weight for each"),
         3: (level.weights[:-1], "one weight for each"),
-        4: (np.zeros((3, 6)), "modes must be"),
+        5: (np.zeros((3, 6)), "modes must be"),
     }
     for place, (value, message) in wrong.items():
         arguments = [*right[:place], value, *right[place + 1 :]]
         matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
-        kernel = MODULE.Multigrid(matrix, fixed, 2, 3, 20.0, 0.0)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0)
         with pytest.raises(ValueError, match=message):
             kernel.aggregate_linear(below, *arguments)
 

@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 
+#include "cluster_transfer.hpp"
 #include "level.hpp"
 
 namespace kl {
@@ -123,23 +124,28 @@ class Hierarchy {
 public:
     explicit Hierarchy(const Settings& settings) : settings(settings) {}
 
-    // The finest level of 3x3 blocks; and, for quadratic elements, the linear level below it.
-    void add_nodal(const Graph& g, const double* data, const std::vector<uint8_t>& fixed) {
+    // The finest level of 3x3 blocks, with nodes at points (n, 3); and, for quadratic elements, the
+    // linear level below it.
+    void add_nodal(const Graph& g, const double* data, const std::vector<uint8_t>& fixed,
+                   std::vector<double> points) {
         levels.emplace_back();
+        X = std::move(points);
         inverse = levels.back().take(g, data, fixed, 3);
+        levels.back().cluster(data, fixed, X.data(), settings.theta);
         levels.back().largest = largest_eigenvalue(levels.back());
     }
 
     // The linear level of quadratic elements below the level that is last: weights (n, m) from its
     // nodes to all.
     void add_linear(const Graph& g, const double* data, std::vector<uint8_t> fixed, Transfer transfer,
-                    const std::vector<uint8_t>& fine_fixed) {
+                    const std::vector<uint8_t>& fine_fixed, std::vector<double> points) {
+        levels.back().clusters.exact = {};
         transfer.weights = true;
         transfer.fine_fixed = fine_fixed;
         transfer.coarse_fixed = fixed;
         transfer.columns = Transposed(g.rows, transfer.indptr, transfer.indices);
         transfers.push_back(std::move(transfer));
-        add_nodal(g, data, fixed);
+        add_nodal(g, data, fixed, std::move(points));
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
@@ -165,11 +171,13 @@ public:
             graph = {count, coarse.own_indptr.data(), coarse.own_indices.data()};
             fixed.assign(count * MODES, 0);
             inverse = coarse.take(graph, data, fixed, MODES);
+            coarse.cluster(data, fixed, X.data(), settings.theta);
             coarse.largest = largest_eigenvalue(coarse);
         }
         factorise(data, fixed);
         inverse.clear();
         inverse.shrink_to_fit();
+        levels.back().clusters.exact = {};
     }
 
     // z = M r, the V-cycle on a right side of any size.
@@ -266,6 +274,18 @@ private:
         return strong;
     }
 
+    // The middle of each aggregate.
+    static std::vector<double> middles(const std::vector<double>& X, const Ints& of, int32_t count) {
+        std::vector<double> sum(3 * static_cast<size_t>(count), 0.0), nodes(count, 0.0);
+        for (size_t i = 0; i < of.size(); ++i) {
+            if (of[i] < 0) continue;
+            nodes[of[i]] += 1;
+            for (int c = 0; c < 3; ++c) sum[3 * static_cast<size_t>(of[i]) + c] += X[3 * i + c];
+        }
+        for (size_t e = 0; e < sum.size(); ++e) sum[e] /= nodes[e / 3];
+        return sum;
+    }
+
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     template <int b>
     int64_t add_transfer(const Graph& g, const double* data, const std::vector<uint8_t>& fixed,
@@ -277,11 +297,17 @@ private:
         }
         const std::vector<uint8_t> strong = strong_links(g, data, b * b);
         Ints of;
-        const int32_t count = aggregate(g, apart, strong, of);
-        if (count == 0 || count > 0.8 * g.rows) return 0;
+        Clusters& clusters = levels.back().clusters;
+        const int32_t count = clusters.empty() ? aggregate(g, apart, strong, of)
+                                               : aggregate_clusters<b>(g, data, clusters, apart, strong, of);
+        if (count == 0 || count * MODES > 0.9 * b * g.rows) return 0;
         orthonormalise<b>(of, count, B, R);
         const double omega = 4.0 / 3.0 / levels.back().largest;
-        Prolongator P = smoothed_prolongator<b>(g, data, inverse.data(), fixed, of, B, omega);
+        Prolongator P = clusters.empty()
+                            ? smoothed_prolongator<b>(g, data, inverse.data(), fixed, of, B, omega)
+                            : smoothed_prolongator<b>(g, data, clusters, fixed, of, B, omega);
+        clusters.exact = {};
+        X = middles(X, of, count);
         Transposed columns(count, P.indptr, P.indices);
         next = galerkin<b>(g, data, P, columns, count);
         transfers.emplace_back();
@@ -297,6 +323,7 @@ private:
     Settings settings;
     Cholesky coarsest;
     std::vector<double> inverse;  // D^-1 of the last level, while setting up
+    std::vector<double> X;        // nodes of the last level
 };
 
 inline double dot(const double* x, const double* y, int64_t n) {
@@ -317,6 +344,8 @@ struct Outcome {
     bool converged;
 };
 
+constexpr int STALLED = 200;  // iterations without a new smallest residual; thin elements make plateaus
+
 // Conjugate gradients on A x = b with the V-cycle; A's rows at fixed components are left out.
 // Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
 inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<uint8_t>& fixed, Hierarchy& M,
@@ -329,7 +358,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
     if (norm_b == 0) return {0, true};
     M.cycle(r.data(), z.data());
     p = z;
-    double rz = dot(r.data(), z.data(), n), best = norm_b;
+    double rz = dot(r.data(), z.data(), n), best = INFINITY;  // residuals may grow at first
     int best_at = 0;
     for (int k = 1; k <= most; ++k) {
         multiply(A, p.data(), Ap.data());
@@ -353,7 +382,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
         if (norm < best) {
             best = norm;
             best_at = k;
-        } else if (k - best_at > 60) {
+        } else if (k - best_at > STALLED) {
             return {k, false};
         }
         M.cycle(r.data(), z.data());

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "aggregation.hpp"
+#include "clusters.hpp"
 
 namespace kl {
 
@@ -80,10 +80,17 @@ public:
     Floats A, Dinv;
     float largest = 0;  // eigenvalue of D^-1 A, from above
     Floats x, y, d, c;
+    Clusters clusters;  // where D is more than the diagonal blocks
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
-    int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()); }
+    int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes(); }
+
+    // Solve exactly within clusters of the nodes at X, if it has any.
+    void cluster(const double* data, const std::vector<uint8_t>& fixed, const double* X, double theta) {
+        clusters = find_clusters(graph, data, b, X, theta);
+        if (!clusters.empty()) clusters.factorise(graph, data, b, fixed);
+    }
 
     // Take a float copy of the blocks with rows and columns of fixed components uncoupled, and the
     // inverse of the diagonal blocks, which is also returned in double.
@@ -103,17 +110,19 @@ public:
 
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
-        const float* inverse = smooth ? Dinv.data() : nullptr;
+        const float* inverse = smooth && clusters.empty() ? Dinv.data() : nullptr;
         over_rows(n, grain(), [&](int64_t first, int64_t last) {
             if (b == 3)
                 step_some(Step<3>{graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last});
             else
                 step_some(Step<6>{graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last});
         });
+        if (smooth && !clusters.empty()) clusters.step(b, to, from, d.data(), to, alpha, beta);
     }
 
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
     void first_step(float beta) {
+        if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         over_rows(n, 8 * grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 for (int r = 0; r < b; ++r) {

@@ -17,6 +17,11 @@ struct Matrix {
 
 std::vector<uint8_t> bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
 
+std::vector<double> coordinates(const Array<double>& points, size_t unknowns) {
+    kl::require(static_cast<size_t>(points.size()) == unknowns, "points must be (n, 3)");
+    return {points.data(), points.data() + points.size()};
+}
+
 // Modes (3n, 6) with zeros at fixed components.
 std::vector<double> free_modes(const Array<double>& modes, const std::vector<uint8_t>& fixed) {
     kl::require(modes.size() == 6 * static_cast<int64_t>(fixed.size()), "modes must be (3n, 6)");
@@ -28,11 +33,12 @@ std::vector<double> free_modes(const Array<double>& modes, const std::vector<uin
 
 class Multigrid {
 public:
-    Multigrid(Matrix matrix, Array<uint8_t> fixed, kl::Settings settings)
+    Multigrid(Matrix matrix, Array<uint8_t> fixed, Array<double> points, kl::Settings settings)
         : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
         kl::require(fixed.size() == 3 * (A.indptr.size() - 1), "fixed must have one entry for each unknown");
+        std::vector<double> X = coordinates(points, this->fixed.size());
         py::gil_scoped_release release;
-        hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed);
+        hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed, std::move(X));
     }
 
     // Smoothed aggregation below the finest level.
@@ -45,7 +51,8 @@ public:
 
     // A linear level below the finest one, and smoothed aggregation below that.
     void aggregate_linear(Matrix linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
-                          Array<int32_t> indices, Array<double> weights, Array<double> modes) {
+                          Array<int32_t> indices, Array<double> weights, Array<double> points,
+                          Array<double> modes) {
         kl::require(hierarchy.levels.size() == 1, "aggregated already");
         below = std::move(linear);
         kl::require(linear_fixed.size() == 3 * (below.indptr.size() - 1), "one entry for each linear unknown");
@@ -53,13 +60,14 @@ public:
         kl::require(indices.size() == indptr.data()[indptr.size() - 1] && weights.size() == indices.size(),
                     "one weight for each index is needed");
         std::vector<uint8_t> apart = bytes_of(linear_fixed);
-        std::vector<double> B = free_modes(modes, apart);
+        std::vector<double> B = free_modes(modes, apart), X = coordinates(points, apart.size());
         kl::Transfer transfer;
         transfer.indptr.assign(indptr.data(), indptr.data() + indptr.size());
         transfer.indices.assign(indices.data(), indices.data() + indices.size());
         transfer.data.assign(weights.data(), weights.data() + weights.size());
         py::gil_scoped_release release;
-        hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed);
+        hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed,
+                             std::move(X));
         hierarchy.coarsen(below.data.data(), apart, std::move(B));
     }
 
@@ -69,6 +77,7 @@ public:
         const double* from = r.data();
         double* to = z.mutable_data();
         py::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(busy);
         hierarchy.cycle(from, to);
         return z;
     }
@@ -82,12 +91,12 @@ public:
         const auto each = [&](double residual) {
             if (!tell) return true;
             py::gil_scoped_acquire acquire;
-            progress(residual);
-            return true;
+            return !progress(residual).is(py::bool_(false));  // it may say stop
         };
         kl::Outcome outcome;
         {
             py::gil_scoped_release release;
+            std::lock_guard<std::mutex> lock(busy);
             outcome = kl::conjugate_gradients(A.blocks(), fixed, hierarchy, from, to, tolerance, norm, most, each);
         }
         return py::make_tuple(x, outcome.iterations, outcome.converged);
@@ -99,9 +108,18 @@ public:
         return out;
     }
 
+    py::list clusters() const {
+        py::list out;
+        for (const kl::Level& level : hierarchy.levels) out.append(level.clusters.count());
+        return out;
+    }
+
     Matrix A, below;
     std::vector<uint8_t> fixed;
     kl::Hierarchy hierarchy;
+
+private:
+    std::mutex busy;  // the levels' vectors serve one solution at a time
 };
 
 }  // namespace
@@ -117,18 +135,20 @@ PYBIND11_MODULE(_multigrid, m) {
              }),
              py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("data").noconvert());
     py::class_<Multigrid>(m, "Multigrid")
-        .def(py::init([](Matrix A, Array<uint8_t> fixed, int degree, float ratio, double theta) {
+        .def(py::init([](Matrix A, Array<uint8_t> fixed, Array<double> points, int degree, float ratio,
+                         double theta) {
             kl::Settings settings;
             settings.degree = degree;
             settings.ratio = ratio;
             settings.theta = theta;
-            return std::make_unique<Multigrid>(std::move(A), fixed, settings);
+            return std::make_unique<Multigrid>(std::move(A), fixed, points, settings);
         }))
         .def("aggregate", &Multigrid::aggregate)
         .def("aggregate_linear", &Multigrid::aggregate_linear)
         .def("cycle", &Multigrid::cycle)
         .def("solve", &Multigrid::solve)
         .def("sizes", &Multigrid::sizes)
+        .def("clusters", &Multigrid::clusters)
         .def("bytes", [](const Multigrid& m) { return m.hierarchy.bytes(); })
         .def("complexity", [](const Multigrid& m) { return m.hierarchy.complexity(); });
 }

@@ -30,7 +30,16 @@ public:
         }
     }
 
-    // The pool is left to the operating system at exit: joining there can hang after a fork.
+    ~Pool() {
+        {
+            std::lock_guard<std::mutex> lock(mutex);
+            over = true;
+            ++generation;
+        }
+        start.notify_all();
+        for (std::thread& worker : workers) worker.join();
+    }
+
     // It returns when every task is done, whether or not all threads woke up in time to help.
     void run(int64_t tasks, const std::function<void(int64_t)>& task) {
         {
@@ -67,6 +76,7 @@ private:
         for (uint64_t seen = 0;;) {
             start.wait(lock, [&] { return generation != seen; });
             seen = generation;
+            if (over) return;
             if (!job) continue;
             const auto& task = *job;
             const int64_t tasks = total;
@@ -85,6 +95,7 @@ private:
     std::atomic<int64_t> next{0};
     int64_t total = 0;
     int helping = 0;
+    bool over = false;
     uint64_t generation = 0;
     std::exception_ptr error;
 };
@@ -113,7 +124,8 @@ void parallel(int64_t tasks, const F& f) {
         return;
     }
     if (!pool || owner != process || size != wanted_threads()) {
-        pool = new Pool(wanted_threads());  // a forked process has none of its parent's threads
+        if (owner == process) delete pool;  // a forked process has none of its parent's threads
+        pool = new Pool(wanted_threads());  // left to the operating system at exit: joining there can hang
         owner = process;
         size = wanted_threads();
     }

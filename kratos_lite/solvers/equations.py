@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -20,8 +22,46 @@ Array = NDArray[np.float64]
 
 FALLBACK_LIMIT = 150_000
 """Up to this many unknowns a factorisation is tried when the iteration fails."""
+SUPERLU_LIMIT = 30_000
+"""Up to this many unknowns SuperLU factorises in less time than a slow iteration takes."""
+PATIENCE, PATIENCE_FROM = 400, 60
+"""Iterations that take as long as a factorisation, and those that show a rate."""
 ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
+
+
+class Outlook:
+    """Tells from the residuals so far, as shares of the first, whether an iteration is worth going on with.
+
+    It is not when, after 60 iterations, their rate promises more than `PATIENCE` in all.  The rate is
+    that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
+
+    Attributes
+    ----------
+    stopped : whether it has said so.
+
+    Examples
+    --------
+    >>> fast, slow = Outlook(1e-8), Outlook(1e-8)
+    >>> all(fast(0.9**k) for k in range(150)), [slow(0.99**k) for k in range(100)].index(False)
+    (True, 59)
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance, self.stopped = tolerance, False
+        self._logs: list[float] = []
+
+    def __call__(self, residual: float) -> bool:
+        """Take the next residual; return whether to go on."""
+        self._logs.append(math.log(max(residual, 1e-300)))
+        done, left = len(self._logs), self._logs[-1] - math.log(self.tolerance)
+        if done < PATIENCE_FROM or left <= 0:
+            return True
+        quarter = done // 4
+        before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
+        rate = (math.fsum(before) - math.fsum(now)) / quarter**2
+        self.stopped = (PATIENCE - done) * rate < left
+        return not self.stopped
 
 
 @dataclass(eq=False)
@@ -128,11 +168,23 @@ class Equations:
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorisation.
         aim = min(tolerance, ROUND_OFF) if len(b) <= DIRECT_LIMIT else tolerance
-        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress)
+        outlook = Outlook(tolerance) if quick_to_factorise(len(b)) else None
+        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, outlook)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
         error = float(np.abs(b - (self._blocks @ x)[free]).max() / scale) if scale > 0 else 0.0
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
+        if outlook and outlook.stopped:
+            stopped += f", at a rate that takes more than {PATIENCE}: a factorisation is faster"
         return Solution(q, "amg", "" if converged else stopped, iterations, error)
+
+
+def quick_to_factorise(unknowns: int) -> bool:
+    """Tell whether a factorisation takes less time than some hundred iterations.
+
+    >>> quick_to_factorise(FALLBACK_LIMIT + 1)
+    False
+    """
+    return unknowns <= (FALLBACK_LIMIT if find_spec("pypardiso") else SUPERLU_LIMIT)
 
 
 def linked(K: BlockMatrix, T: Any, free: NDArray[np.int64]) -> BlockMatrix:

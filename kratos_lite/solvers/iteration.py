@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 MAX_ITERATIONS = 1000
 """A multigrid that needs more than these does not converge."""
+STALLED = 200
+"""Nor does one that finds no smaller residual in as many iterations."""
 
 
 class Share:
@@ -40,11 +42,13 @@ def conjugate_gradients(
     norm_A: float,
     max_iterations: int = MAX_ITERATIONS,
     progress: Progress | None = None,
+    go_on: Callable[[float], bool] | None = None,
 ) -> tuple[Array, int, bool]:
     """Solve A x = b with symmetric positive definite A; return x, iterations and success.
 
     It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
-    2 eps (|A| |x| + |b|); and gives up when 60 iterations bring no new smallest residual.
+    2 eps (|A| |x| + |b|); and gives up when `STALLED` iterations bring no new smallest residual, or when
+    `go_on`, told |r| / |b|, says so.
     Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
     """
     x, r = np.zeros_like(b), b.copy()
@@ -52,7 +56,7 @@ def conjugate_gradients(
     if norm_b == 0:
         return x, 0, True
     each = Share(tolerance, progress) if progress else None
-    best, best_at = norm_b, 0
+    best, best_at = np.inf, 0  # residuals may grow at first
     z = precondition(r)
     p, rz = z.copy(), float(r @ z)
     for iteration in range(1, max_iterations + 1):
@@ -71,9 +75,11 @@ def conjugate_gradients(
             if each:
                 each.finish()
             return x, iteration, True
+        if go_on and not go_on(norm / norm_b):
+            return x, iteration, False
         if norm < best:
             best, best_at = norm, iteration
-        elif iteration - best_at > 60:
+        elif iteration - best_at > STALLED:
             return x, iteration, False
         z = precondition(r)
         rz, old = float(r @ z), rz

@@ -2,12 +2,14 @@
 
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid).
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
+On stretched meshes the kernels smooth lines or planes of close nodes exactly and aggregate them whole.
 Source: Vaněk, Mandel & Brezina, Computing 56 (1996) 179-196; Adams, Brezina, Hu & Tuminaro, J. Comput.
 Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol, cast
 
@@ -22,6 +24,7 @@ from kratos_lite.supports import rigid_modes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+GoOn = Callable[[float], bool]
 
 DEGREE = 2
 """Degree of the Chebyshev smoother: 1 … 3 cost the same in all."""
@@ -37,9 +40,12 @@ class Solver(Protocol):
     levels: list[int]
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
-        """Return x, iterations and success; b and x (3n,) are zero at fixed components."""
+        """Return x, iterations and success; b and x (3n,) are zero at fixed components.
+
+        After each iteration `go_on` is told the residual, as a share of |b|, and may say stop.
+        """
 
 
 def multigrid(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> Solver:
@@ -62,14 +68,15 @@ class Compiled:
     Attributes
     ----------
     levels : unknowns of each level.
+    clusters : parts of each level that its smoother solves exactly; 0 where these are the single nodes.
     memory : bytes of the hierarchy, which is kept in single precision.
     complexity : numbers in the matrices of all levels to those of the finest one.
     """
 
     def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
-        fixed = (~free).astype(np.uint8)
+        fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
-        self._kernel = module.Multigrid(matrix, fixed, DEGREE, RATIO, STRENGTH)
+        self._kernel = module.Multigrid(matrix, fixed, points, DEGREE, RATIO, STRENGTH)
         if linear is None:
             self._kernel.aggregate(rigid_modes(points))
         else:
@@ -80,9 +87,11 @@ class Compiled:
                 linear.indptr,
                 linear.indices,
                 linear.weights,
+                points[linear.nodes],
                 rigid_modes(points[linear.nodes]),
             )
         self.levels: list[int] = self._kernel.sizes()
+        self.clusters: list[int] = self._kernel.clusters()
         self.memory: int = self._kernel.bytes()
         self.complexity: float = self._kernel.complexity()
 
@@ -91,13 +100,19 @@ class Compiled:
         return np.asarray(self._kernel.cycle(r))
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
-        each = Share(tolerance, progress) if progress else None
+        share = Share(tolerance, progress) if progress else None
+
+        def each(residual: float) -> bool:
+            if share:
+                share(residual)
+            return go_on is None or go_on(residual)
+
         x, iterations, converged = self._kernel.solve(b, tolerance, norm, MAX_ITERATIONS, each)
-        if each and converged:
-            each.finish()
+        if share and converged:
+            share.finish()
         return x, iterations, converged
 
 
@@ -125,11 +140,13 @@ class Pyamg:
         return np.asarray(self._cycle @ r)
 
     def solve(
-        self, b: Array, tolerance: float, norm: float, progress: Progress | None
+        self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success."""
         with one_thread():
-            return conjugate_gradients(self._A, b, self.precondition, tolerance, norm, progress=progress)
+            return conjugate_gradients(
+                self._A, b, self.precondition, tolerance, norm, progress=progress, go_on=go_on
+            )
 
 
 FORWARD = ("block_gauss_seidel", {"sweep": "forward"})

@@ -1,0 +1,309 @@
+// Clusters of nodes close together on a stretched mesh (lines across thin elements, planes across
+// long ones).  Stiffness couples their nodes far more than others, so that only a smoother which
+// solves each cluster exactly, and aggregates of whole clusters, serve conjugate gradients there.
+//
+// Source of block smoothing along strong couplings: Trottenberg, Oosterlee & Schüller, Multigrid
+// (2001), section 5.1.  The tests on distances are our own.
+
+#pragma once
+#include <cmath>
+#include <numeric>
+
+#include "aggregation.hpp"
+#include "skyline.hpp"
+
+namespace kl {
+
+constexpr double NEAR = 9, FAR = 16;     // squares of distances, to that of the nearest node
+constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
+constexpr double FILL = 4;               // nodes in the envelope of a cluster, to its blocks in A
+constexpr double UNLIKE = 1e3;           // stiffness of one node to that of another
+constexpr int64_t SAMPLE = 2000;         // nodes that show whether a mesh is stretched
+
+inline double squared_distance(const double* X, int64_t i, int64_t j) {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) sum += (X[3 * i + c] - X[3 * j + c]) * (X[3 * i + c] - X[3 * j + c]);
+    return sum;
+}
+
+// Squares of the distances to the nearest and to the farthest linked node; nodes at the same place
+// do not count.
+inline std::pair<double, double> extent(const Graph& g, const double* X, int64_t i) {
+    double low = INFINITY, high = 0;
+    for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+        const double d = squared_distance(X, i, g.indices[k]);
+        if (d > 0) low = std::fmin(low, d);
+        high = std::fmax(high, d);
+    }
+    return {low, high};
+}
+
+// Of some nodes of the whole mesh, have a few both near and far ones?
+inline bool looks_stretched(const Graph& g, const double* X) {
+    const int64_t step = std::max<int64_t>(1, g.rows / SAMPLE);
+    int64_t seen = 0, stretched = 0;
+    for (int64_t i = 0; i < g.rows; i += step, ++seen) {
+        const auto [low, high] = extent(g, X, i);
+        stretched += high > FAR * low;
+    }
+    return 20 * stretched > seen;
+}
+
+// A partition of the nodes, and the factor of each part of a matrix.
+class Clusters {
+public:
+    Ints of, starts, members;  // cluster of each node; nodes of each cluster in the order of its factor
+    Skyline<double> exact;     // while setting up
+    Skyline<float> factor;
+
+    bool empty() const { return of.empty(); }
+    int64_t count() const { return empty() ? 0 : static_cast<int64_t>(starts.size()) - 1; }
+    int64_t bytes() const {
+        return 4 * static_cast<int64_t>(of.size() + starts.size() + members.size() + factor.rows.size() +
+                                        factor.pivots.size() + 2 * factor.at.size());
+    }
+
+    // f(first, last) for ranges of clusters of about as many nodes.
+    template <class F>
+    void over(int64_t nodes, const F& f) const {
+        const int64_t all = static_cast<int64_t>(members.size());
+        parallel_ranges(count(), std::max<int64_t>(1, nodes * count() / std::max<int64_t>(1, all)), f);
+    }
+
+    // Number the clusters by their labels and order the nodes of each for a small envelope.
+    void collect(const Graph& g, const Ints& label) {
+        of.assign(g.rows, -1);
+        Ints number(g.rows, -1);
+        int32_t found = 0;
+        for (int64_t i = 0; i < g.rows; ++i) {
+            int32_t& n = number[label[i]];
+            if (n < 0) n = found++;
+            of[i] = n;
+        }
+        starts.assign(found + 1, 0);
+        for (int32_t c : of) ++starts[c + 1];
+        std::partial_sum(starts.begin(), starts.end(), starts.begin());
+        members.resize(g.rows);
+        Ints next(starts.begin(), starts.end() - 1);
+        for (int64_t i = 0; i < g.rows; ++i) members[next[of[i]]++] = static_cast<int32_t>(i);
+        Ints place(g.rows);
+        over(1024, [&](int64_t first, int64_t last) {
+            for (int64_t c = first; c < last; ++c) arrange(g, c, place);
+        });
+    }
+
+    // Nodes of the envelope of cluster c, where each node has its place.
+    int64_t envelope(const Graph& g, int64_t c, Ints& place) const {
+        int64_t sum = 0;
+        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) place[members[p]] = p;
+        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) sum += p - leftmost(g, p, place) + 1;
+        return sum;
+    }
+
+    // Factorise the part of each cluster of A, of b x b blocks, where fixed components stand alone.
+    void factorise(const Graph& g, const double* A, int b, const std::vector<uint8_t>& fixed) {
+        Ints place(g.rows);
+        for (int64_t p = 0; p < g.rows; ++p) place[members[p]] = static_cast<int32_t>(p);
+        exact.at.assign(g.rows * b + 1, 0);
+        for (int64_t p = 0; p < g.rows; ++p) {
+            const int64_t before = p - leftmost(g, p, place);
+            for (int r = 0; r < b; ++r) exact.at[p * b + r + 1] = exact.at[p * b + r] + before * b + r;
+        }
+        exact.rows.assign(exact.at.back(), 0.0);
+        exact.pivots.assign(g.rows * b, 0.0);
+        over(256, [&](int64_t first, int64_t last) {
+            for (int64_t c = first; c < last; ++c) {
+                for (int32_t p = starts[c]; p < starts[c + 1]; ++p) fill(g, A, b, fixed, place, p);
+                factorise_some(Factor{exact, int64_t{starts[c]} * b, int64_t{starts[c + 1]} * b});
+            }
+        });
+        factor.at = exact.at;
+        factor.rows.assign(exact.rows.begin(), exact.rows.end());
+        factor.pivots.assign(exact.pivots.begin(), exact.pivots.end());
+    }
+
+    // d = alpha d + beta D^-1 r and x = from + d, or from zero; x may be r.
+    void step(int b, const float* r, const float* from, float* d, float* x, float alpha, float beta) const {
+        over(1024, [&](int64_t first, int64_t last) {
+            std::vector<float> z(static_cast<size_t>(starts[last] - starts[first]) * b);
+            const int64_t start = starts[first];
+            for (int64_t p = start; p < starts[last]; ++p)
+                for (int c = 0; c < b; ++c) z[(p - start) * b + c] = r[int64_t{members[p]} * b + c];
+            substitute_some(Substitution{factor, start * b, int64_t{starts[last]} * b, z.data()});
+            for (int64_t p = start; p < starts[last]; ++p)
+                for (int c = 0; c < b; ++c) {
+                    const int64_t i = int64_t{members[p]} * b + c;
+                    d[i] = (from ? alpha * d[i] : 0) + beta * z[(p - start) * b + c];
+                    x[i] = (from ? from[i] : 0) + d[i];
+                }
+        });
+    }
+
+private:
+    // The first place that a node of the same cluster linked to that at place p has.
+    int64_t leftmost(const Graph& g, int64_t p, const Ints& place) const {
+        const int32_t i = members[p];
+        int64_t left = p;
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
+            if (of[g.indices[k]] == of[i]) left = std::min<int64_t>(left, place[g.indices[k]]);
+        return left;
+    }
+
+    // Take the order of a cluster's nodes that a search in breadth gives, if it is better than theirs.
+    void arrange(const Graph& g, int64_t c, Ints& place) {
+        const int32_t start = starts[c], size = starts[c + 1] - start;
+        if (size < 3) return;
+        const int64_t before = envelope(g, c, place);
+        const Ints given(members.begin() + start, members.begin() + start + size);
+        const Ints there = breadth(g, c, given[0], place);
+        Ints found = breadth(g, c, there.back(), place);  // from one end to the other
+        std::copy(found.rbegin(), found.rend(), members.begin() + start);
+        if (envelope(g, c, place) >= before) std::copy(given.begin(), given.end(), members.begin() + start);
+    }
+
+    // Nodes of cluster c from one of them outwards; those without links to it come last.
+    Ints breadth(const Graph& g, int64_t c, int32_t from, Ints& place) const {
+        const Ints all(members.begin() + starts[c], members.begin() + starts[c + 1]);
+        for (int32_t i : all) place[i] = -1;
+        Ints found;
+        for (int64_t next = -1; next < static_cast<int64_t>(all.size()); ++next) {
+            const int32_t seed = next < 0 ? from : all[next];
+            if (place[seed] >= 0) continue;
+            place[seed] = 0;
+            found.push_back(seed);
+            for (size_t at = found.size() - 1; at < found.size(); ++at)
+                for (int32_t k = g.indptr[found[at]]; k < g.indptr[found[at] + 1]; ++k) {
+                    const int32_t j = g.indices[k];
+                    if (of[j] != c || place[j] >= 0) continue;
+                    place[j] = 0;
+                    found.push_back(j);
+                }
+        }
+        return found;
+    }
+
+    void fill(const Graph& g, const double* A, int b, const std::vector<uint8_t>& fixed, const Ints& place,
+              int64_t p) {
+        const int64_t i = members[p];
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+            const int64_t j = g.indices[k], q = place[j];
+            if (of[j] != of[i] || q > p) continue;
+            for (int r = 0; r < b; ++r)
+                for (int c = 0; c < b && q * b + c <= p * b + r; ++c) {
+                    const double value = A[(k * int64_t{b} + r) * b + c];
+                    const int64_t row = p * b + r, column = q * b + c;
+                    if (row == column)
+                        exact.pivots[row] = value;
+                    else if (!fixed[i * b + r] && !fixed[j * b + c])
+                        exact.rows[exact.at[row + 1] - (row - column)] = value;
+                }
+        }
+    }
+};
+
+// Squared Frobenius norms of blocks.
+inline double squared_norm(const double* block, int size) {
+    double sum = 0;
+    for (int e = 0; e < size; ++e) sum += block[e] * block[e];
+    return sum;
+}
+
+inline std::vector<double> diagonal_norms(const Graph& g, const double* A, int size) {
+    std::vector<double> norms(g.rows, 0.0);
+    for (int64_t i = 0; i < g.rows; ++i)
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
+            if (g.indices[k] == i) norms[i] = std::sqrt(squared_norm(A + int64_t{k} * size, size));
+    return norms;
+}
+
+// Label nodes by the lowest node that links join them to; joins(i, k) says whether link k of i does.
+template <class F>
+Ints components(const Graph& g, const F& joins) {
+    Ints label(g.rows);
+    std::iota(label.begin(), label.end(), 0);
+    const auto root = [&](int32_t i) {
+        while (label[i] != i) i = label[i] = label[label[i]];
+        return i;
+    };
+    for (int32_t i = 0; i < g.rows; ++i)
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+            if (g.indices[k] >= i || !joins(i, k)) continue;
+            const int32_t a = root(i), b = root(g.indices[k]);
+            label[std::max(a, b)] = std::min(a, b);
+        }
+    for (int32_t i = 0; i < g.rows; ++i) label[i] = root(i);
+    return label;
+}
+
+// Links of each node by length, and how many of each length each component has.
+struct Lengths {
+    std::vector<uint8_t> near;
+    Ints label, size, far, between;
+};
+
+inline Lengths lengths(const Graph& g, const double* X) {
+    Lengths out;
+    std::vector<double> least(g.rows);
+    parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
+        for (int64_t i = first; i < last; ++i) least[i] = extent(g, X, i).first;
+    });
+    const auto ratio = [&](int64_t i, int32_t k) {
+        const int32_t j = g.indices[k];
+        return squared_distance(X, i, j) / std::fmin(least[i], least[j]);
+    };
+    out.near.resize(g.indptr[g.rows]);
+    parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
+        for (int64_t i = first; i < last; ++i)
+            for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) out.near[k] = ratio(i, k) <= NEAR;
+    });
+    out.label = components(g, [&](int32_t, int32_t k) { return out.near[k]; });
+    for (Ints* counts : {&out.size, &out.far, &out.between}) counts->assign(g.rows, 0);
+    for (int64_t i = 0; i < g.rows; ++i) {
+        const int32_t c = out.label[i];
+        ++out.size[c];
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
+            if (!out.near[k]) ++(ratio(i, k) > FAR ? out.far : out.between)[c];
+    }
+    return out;
+}
+
+// The clusters of a mesh with nodes at X (n, 3), not factorised; none unless most nodes belong to
+// clusters that a gap sets apart from the links between them, and that are cheap to factorise.
+inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta) {
+    if (!looks_stretched(g, X)) return {};
+    const Lengths links = lengths(g, X);
+    Ints label(g.rows);
+    int64_t apart = 0;
+    for (int32_t i = 0; i < g.rows; ++i) {
+        const int32_t c = links.label[i];
+        const bool gap = links.size[c] > 1 && links.far[c] >= links.size[c] &&
+                         links.between[c] <= BETWEEN * links.far[c];
+        label[i] = gap ? c : i;
+        apart += gap;
+    }
+    if (2 * apart < g.rows) return {};
+    Clusters found;
+    found.collect(g, label);
+    Ints place(g.rows);
+    std::vector<uint8_t> cheap(found.count());
+    int64_t joined = 0;
+    for (int64_t c = 0; c < found.count(); ++c) {
+        int64_t blocks = 0;
+        for (int32_t p = found.starts[c]; p < found.starts[c + 1]; ++p)
+            blocks += g.indptr[found.members[p] + 1] - g.indptr[found.members[p]];
+        const int32_t size = found.starts[c + 1] - found.starts[c];
+        cheap[c] = size > 1 && found.envelope(g, c, place) <= FILL * blocks;
+        joined += cheap[c] ? size : 0;
+    }
+    if (2 * joined < g.rows) return {};
+    const std::vector<double> own = diagonal_norms(g, A, b * b);
+    label = components(g, [&](int32_t i, int32_t k) {  // unlike materials part them
+        const int32_t j = g.indices[k];
+        return links.near[k] && found.of[i] == found.of[j] && cheap[found.of[i]] &&
+               squared_norm(A + int64_t{k} * b * b, b * b) >= theta * theta * own[i] * own[j];
+    });
+    found.collect(g, label);
+    return found;
+}
+
+}  // namespace kl
