@@ -144,13 +144,14 @@ def check_rules(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
                     f"element {element} ({batch.element.__name__}): det J must be > 0 at all points of "
                     f"{batch.rule}; the element's own rule, or a better shape, avoids this"
                 )
-    found = {(batch.element, batch.rule) for batch in replaced}
-    return [
+    found = dict.fromkeys((batch.element, batch.rule) for batch in replaced)
+    said = [
         f"{element.__name__} with {len(rule)} Gauss points has {n} spurious zero-energy modes; "
         f"its own rule has {len(element.rule)} points and none"
         for element, rule in found
         if (n := spurious_modes(element, rule)) > 0
     ]
+    return list(dict.fromkeys(said))
 
 
 def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -79,12 +80,13 @@ class Result:
         report: Report,
         u0: Array | None = None,
     ) -> None:
-        self.mesh = mesh
+        self.mesh = copy(mesh)
+        self.mesh.points = mesh.points.copy()  # where they were, whatever becomes of the model
         self.batches = list(batches)
         self.u = u
         self.reactions = reactions
         self.loads = loads
-        for array in (u, reactions, loads):
+        for array in (u, reactions, loads, self.mesh.points):
             array.setflags(write=False)  # strains and stresses are made of them later
         self.report = report
         self._strained = u if u0 is None else u - u0

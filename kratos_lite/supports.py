@@ -116,7 +116,7 @@ class Reduction:
     ----------
     free : (q,) int, the free degrees of freedom.
     c : (N,) float, the displacement at q = 0.
-    T : (N, q) sparse, or None where u[free] = q is all (no links).
+    T : (N, q) sparse, or None where q is added to the free ones of c and no more (no links).
     """
 
     free: Ints
@@ -128,7 +128,7 @@ class Reduction:
         if self.T is not None:
             return np.asarray(self.T @ q + self.c)
         u = self.c.copy()
-        u[self.free] = q
+        u[self.free] += q
         return u
 
     def reduce(self, r: Array) -> Array:
@@ -140,12 +140,18 @@ def reduction(supports: Supports, active: Ints, links: Links | None = None) -> R
     """Return the reduction for the degrees of freedom of the `active` node rows, renumbered in order.
 
     Constraints of slaves on other nodes are left out.  `links` are the resolved ones, if they are known.
+    Where all supports move alike along an axis, c carries the free degrees of freedom along: what is
+    left to solve for is the strain alone, and its error does not grow with the motion.
     """
     fixed, c = supports.fixed, supports.values
     if len(active) < len(fixed):
         fixed, c = fixed[active], c[active]
     fixed, c = fixed.ravel(), c.ravel() * fixed.ravel()
     if not supports.links:
+        for axis in range(3):
+            held, along = fixed[axis::3], c[axis::3]
+            if held.any() and np.ptp(along[held]) == 0 and along[held][0] != 0:
+                along[:] = along[held][0]
         return Reduction(np.flatnonzero(~fixed), c)
     local = np.full(supports.mesh.n_nodes, -1)
     local[active] = np.arange(len(active))

@@ -11,7 +11,8 @@ import kratos_lite
 
 PACKAGE = Path(kratos_lite.__file__).parent
 FLOORS = [
-    {"errors", "native"},
+    {"errors"},
+    {"native"},
     {"blockmatrix", "registry", "voigt", "arguments"},
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},

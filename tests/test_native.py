@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from kratos_lite.blockmatrix import BlockMatrix
-from kratos_lite.native import described, kernels
+from kratos_lite.errors import InputError
+from kratos_lite.native import described, kernels, threads
 
 compiled = pytest.mark.skipif(kernels("sparse") is None, reason="the compiled kernels were not built")
 
@@ -98,3 +99,28 @@ def test_a_missing_kernel_is_said_once():
 @compiled
 def test_described_names_what_computes():
     assert described().startswith("compiled (")
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [
+        *(("KRATOS_LITE_THREADS", value) for value in ("²", "0", "-1", "2.0", "many")),
+        ("KRATOS_LITE_KERNELS", "numpi"),
+        ("KRATOS_LITE_ISA", "avx"),
+    ],
+)
+def test_nonsense_in_the_environment_is_refused(monkeypatch, variable, value):
+    monkeypatch.setenv("KRATOS_LITE_KERNELS", "")
+    monkeypatch.setenv(variable, value)
+    with pytest.raises(InputError, match=f"{variable}='{value}'; expected"):
+        threads() if variable == "KRATOS_LITE_THREADS" else kernels.__wrapped__("sparse")
+
+
+@pytest.mark.parametrize("value", ["1000000", "9" * 5000])
+def test_threads_are_at_most_four_a_core(monkeypatch, value):
+    monkeypatch.delenv("KRATOS_LITE_THREADS", raising=False)
+    cores = threads()
+    monkeypatch.setenv("KRATOS_LITE_THREADS", value)
+    assert threads() == 4 * cores
+    monkeypatch.setenv("KRATOS_LITE_THREADS", "01")
+    assert threads() == 1

@@ -86,14 +86,17 @@ def write_vtu(
     }
     arrays = [np.ascontiguousarray(array) for group in groups.values() for _, array in group]
     stored = [[] if mode == "ascii" else _compressed(a) if mode == "compressed" else _raw(a) for a in arrays]
-    offsets = accumulate((sum(map(len, pieces)) for pieces in stored), initial=0)
+    # Stored from the last to the first: meshio 5 moves offsets as it reads, and takes the first array
+    # in the header that has the one it looks for, which must not be an array it has moved already.
+    ends = accumulate((sum(map(len, pieces)) for pieces in reversed(stored)), initial=0)
+    offsets = iter([*ends][-2::-1])
     said = (_text(a) if mode == "ascii" else f' format="appended" offset="{next(offsets)}"/>' for a in arrays)
     head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, said)
     tail = "</VTKFile>\n" if mode == "ascii" else "\n</AppendedData>\n</VTKFile>\n"
 
     def write(file: BinaryIO) -> None:
         file.write(head.encode())
-        for pieces in stored:
+        for pieces in reversed(stored):
             file.writelines(pieces)
         file.write(tail.encode())
 

@@ -6,9 +6,11 @@ which is the reference the kernels are tested against.
 
 Environment
 -----------
-KRATOS_LITE_KERNELS : ``numpy`` leaves the compiled kernels aside.
-KRATOS_LITE_THREADS : number of threads; the default is every core this process may use.
+KRATOS_LITE_KERNELS : ``numpy`` leaves the compiled kernels aside; ``compiled`` is the default.
+KRATOS_LITE_THREADS : number of threads, at most four a core; the default is every core this process may use.
 KRATOS_LITE_ISA : ``base``, ``avx2`` or ``avx512`` in place of the best this machine has.
+
+Anything else in one of them is an InputError.
 """
 
 from __future__ import annotations
@@ -18,12 +20,15 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from kratos_lite.errors import InputError
+
 
 @cache
 def kernels(name: str) -> Any:
     """Return the compiled module of a name, or None if it is not there or not wanted."""
-    if os.environ.get("KRATOS_LITE_KERNELS", "").lower() == "numpy":
+    if _chosen("KRATOS_LITE_KERNELS", "numpy", "compiled") == "numpy":
         return None
+    _chosen("KRATOS_LITE_ISA", "base", "avx2", "avx512")
     try:
         module = import_module(f"kratos_lite.native._{name}")
     except ImportError as error:
@@ -31,6 +36,14 @@ def kernels(name: str) -> Any:
         return None
     module.set_threads(threads())
     return module
+
+
+def _chosen(variable: str, *known: str) -> str:
+    """Return the value of an environment variable, one of those known or empty."""
+    value = os.environ.get(variable, "")
+    if value and value not in known:
+        raise InputError(f"{variable}={value!r}; expected {' or '.join(known)}, or nothing")
+    return value
 
 
 @cache
@@ -52,11 +65,14 @@ def _say_once(why: str) -> None:
 
 def threads() -> int:
     """Return the number of threads that kernels use."""
-    wanted = os.environ.get("KRATOS_LITE_THREADS", "")
-    if wanted.isdigit() and int(wanted) > 0:
-        return int(wanted)
     affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    wanted = os.environ.get("KRATOS_LITE_THREADS", "")
+    if not wanted:
+        return cores
+    if not (wanted.isascii() and wanted.isdigit() and wanted.strip("0")):
+        raise InputError(f"KRATOS_LITE_THREADS={wanted!r}; expected a whole number of threads from 1 on")
+    return min(int(wanted.lstrip("0")[:9]), 4 * cores)
 
 
 def described() -> str:

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstring>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "text.hpp"
@@ -22,6 +23,7 @@ struct Value {
     std::vector<int64_t> counts;     // ids: how many in each statement
     std::vector<double> reals;
     std::vector<std::string> names;  // each name once
+    std::unordered_map<std::string, int64_t> places;  // where each stands among them
 
     void cut(size_t statements) {
         if (word == Word::real) {
@@ -38,11 +40,13 @@ struct Value {
 
     void add_name(const char* begin, const char* end) {
         const std::string found(begin, end);
-        size_t place = ints.empty() ? 0 : ints.back();
-        if (place >= names.size() || names[place] != found)
-            for (place = 0; place < names.size() && names[place] != found;) ++place;
-        if (place == names.size()) names.push_back(found);
-        ints.push_back(place);
+        if (!ints.empty() && names[ints.back()] == found) {  // most repeat the one before
+            ints.push_back(ints.back());
+            return;
+        }
+        const auto [place, is_new] = places.try_emplace(found, names.size());
+        if (is_new) names.push_back(found);
+        ints.push_back(place->second);
     }
 };
 

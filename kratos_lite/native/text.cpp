@@ -54,9 +54,9 @@ py::object rows(const py::bytes& text, int64_t begin, int64_t end, const std::st
 kl::Value value_of(const std::string& word) {
     static const char* const names[] = {"<id>", "<number>", "<real>", "<Name>", "<ids>", "<next>"};
     for (int i = 0; i < 6; ++i)
-        if (word == names[i]) return {static_cast<kl::Word>(i + 1), "", {}, {}, {}, {}};
+        if (word == names[i]) return {static_cast<kl::Word>(i + 1), "", {}, {}, {}, {}, {}};
     kl::require(!word.empty() && word[0] != '<', "this word of a form is not known");
-    return {kl::Word::literal, word, {}, {}, {}, {}};
+    return {kl::Word::literal, word, {}, {}, {}, {}, {}};
 }
 
 template <class T>

@@ -129,3 +129,13 @@ def test_a_mistake_is_told_in_the_same_words(tmp_path, monkeypatch):
         read_elem(path)
     assert str(compiled.value) == str(words.value)
     assert "a.elem:302:12: found '!'" in str(words.value)
+
+
+def test_each_of_many_names_stays_itself(tmp_path, at_any_size):
+    names = [f"NAME_{i}" for i in range(500)]
+    names += names[::-1] + names[::7]
+    path = tmp_path / "a.prop"
+    path.write_text("".join(f"PROPERTIES[1][{name}] = {i};\n" for i, name in enumerate(names)))
+    (run,) = Source(path, Problems(), []).scan(FORMS[".prop"])
+    assert run.columns[1] == [name.encode() for name in names]
+    assert run.columns[2].tolist() == list(range(len(names)))

@@ -61,6 +61,16 @@ def test_anything_unusual_is_left_to_python(row):
     assert _compiled(Source("a", data), (0, len(data)), Layout("node", "ir")) is None
 
 
+@pytest.mark.parametrize("word", ["0", "1", "00", "01", "001"])
+def test_truth_may_have_leading_zeros_for_every_reader(word):
+    data = f"7 {word} 1.5\n".encode()
+    for reader in (_compiled, _fast, _exact):
+        source = Source("a", data)
+        rows = reader(source, (0, len(data)), Layout("node", "ibr"))
+        assert (rows.ints.tolist(), rows.reals.tolist()) == ([[7, int(word)]], [[1.5]])
+        assert not source.problems
+
+
 def big():
     """Return rows that fill several pieces of work, with empty lines between."""
     rng = np.random.default_rng(1)

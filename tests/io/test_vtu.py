@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.errors import InputError
+from kratos_lite.generate import box
 from kratos_lite.io.vtu import BLOCK, MODES, write_pvd, write_vtu
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import SHAPES, Shape
@@ -163,6 +164,19 @@ def test_meshio_reads_the_same_file(tmp_path, mode):
         # meshio follows the text of VTK on its linear wedge, not VTK's formulas: it exchanges two corners
         order = [0, 2, 1, 3, 5, 4] if name == "Wedge6" else list(SHAPES[name].to_vtk)
         np.testing.assert_array_equal(cells.data, block.nodes[:, order])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_meshio_takes_no_array_for_another(tmp_path, mode):
+    meshio = pytest.importorskip("meshio")
+    # With 8 nodes, meshio moves the fourth number field to the offset at which the fifth is stored.
+    data = {f"field {i}": np.random.default_rng(i).random(8) for i in range(6)}
+    write_vtu(tmp_path / "a.vtu", box(), data, mode=mode)
+    found = meshio.read(tmp_path / "a.vtu").point_data
+    for name, values in data.items():
+        np.testing.assert_array_equal(found[name], values)
+    for name, values in arrays(read(tmp_path / "a.vtu").GetPointData()).items():
+        np.testing.assert_array_equal(values, data[name])
 
 
 @pytest.mark.parametrize("mode", MODES)

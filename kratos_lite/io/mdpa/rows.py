@@ -242,9 +242,10 @@ def _number(token: bytes, kind: str) -> float:
     if kind == "r":
         return real(token)
     if kind == "b":
-        if token not in TRUTH:
+        word = (token.lstrip(b"0") or b"0") if token.isdigit() else token
+        if word not in TRUTH:
             raise ValueError(f"{shown(token)} is neither true nor false; write 1 or 0")
-        return TRUTH[token]
+        return TRUTH[word]
     return 0 if kind == "p" and not token.strip(b"0") else integer(token)
 
 

@@ -1,0 +1,106 @@
+"""What was solved stays right, whatever is changed, refused or moved as a whole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import system
+from kratos_lite.checks import check_rules
+
+ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
+
+
+def pressed(stress=1e5):
+    """Return a block between two plates, with initial stress."""
+    model = kl.Model(kl.box(cells=(2, 2, 2)), ROCK)
+    model.fix("z-")
+    model.fix("z+", "z", 1e-3)
+    model.add_prestress([stress, 0, 0, 0, 0, 0])
+    return model
+
+
+def refuse(model, equations):
+    """Have a change of the constraints refused, and take it back."""
+    model.link((13, "x"), {(14, "x"): 1.0})
+    model.link((13, "x"), {(12, "x"): 1.0})
+    with pytest.raises(kl.ModelError, match="slave of two constraints"):
+        equations.solve()
+    model.supports.links.clear()
+
+
+def test_prescribed_values_are_taken_over_after_a_refusal():
+    model = pressed()
+    equations = model.system()
+    equations.solve()
+    model.supports.values[model.mesh.nodes("z+"), 2] = 5e-3
+    refuse(model, equations)
+    np.testing.assert_allclose(equations.solve().u, model.solve().u, rtol=0, atol=1e-15)
+
+
+def test_initial_stress_that_was_refused_leaves_nothing_behind():
+    model = pressed()
+    equations = model.system()
+    right = equations.solve().stress("element")
+    old = model.prestress.copy()
+    model.prestress *= 100
+    refuse(model, equations)
+    model.prestress[:] = old
+    np.testing.assert_array_equal(equations.solve().stress("element"), right)
+
+
+def carried(kind, shift, cells=(4, 4, 4), held="xyz"):
+    """Return a block whose bottom and top are moved alike."""
+    model = kl.Model(kl.box(cells=cells, element=kind), ROCK)
+    for side in ("z-", "z+"):
+        model.fix(side, held, shift)
+    return model
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("kind", ["KinematicLinear3D8N", "KinematicLinear3D20N", "KinematicLinear3D10N"])
+@pytest.mark.parametrize("seed", range(4))
+def test_supports_may_carry_a_body_along(kind, solver, seed):
+    shift = np.random.default_rng(seed).normal(size=3) * 1e-3
+    result = carried(kind, shift).solve(solver)
+    np.testing.assert_allclose(result.u, np.tile(shift, (len(result.u), 1)), rtol=0, atol=1e-16)
+    assert np.abs(result.stress("element")).max() < 1e-4  # Pa, of a modulus of 1e9
+    assert result.report.force_error == result.report.moment_error == 0
+
+
+def test_a_body_that_is_carried_along_deforms_as_one_that_stays():
+    moved, still = carried("KinematicLinear3D8N", (1e-3, 2e-3, 0.0)), carried("KinematicLinear3D8N", 0.0)
+    for model in (moved, still):
+        model.add(kl.Gravity((0, 0, -9.81)))
+    a, b = moved.solve("amg"), still.solve("amg")
+    np.testing.assert_allclose(a.u - b.u, np.tile((1e-3, 2e-3, 0), (len(a.u), 1)), rtol=0, atol=1e-16)
+
+
+def test_lost_equilibrium_of_prescribed_values_is_an_error(monkeypatch):
+    right = system.assemble_dense
+    monkeypatch.setattr(system, "assemble_dense", lambda *a: right(*a) * (1 + 0.1 * np.eye(24)))
+    model = kl.Model(kl.box(), ROCK)
+    model.fix("z-")
+    model.fix("z+", "z", 1e-3)
+    with pytest.raises(kl.SolveError, match="miss equilibrium by"):
+        model.solve("dense")
+
+
+def test_a_result_keeps_the_points_it_was_solved_with():
+    model = pressed()
+    result, other = model.solve(), model.solve()
+    right = result.stress("element").copy()
+    model.mesh.points[:, 2] *= 2
+    np.testing.assert_array_equal(other.stress("element"), right)
+    np.testing.assert_array_equal(result.stress("element"), right)
+    assert result.mesh.points[:, 2].max() == other.mesh.points[:, 2].max() == 1
+
+
+def test_warnings_of_rules_come_once():
+    model = pressed()
+    model.use_rule(1)
+    batches = model.batches()
+    same = [replace(batch, rule=replace(batch.rule, name="another")) for batch in batches]
+    (text,) = check_rules(model.mesh, batches + same)
+    assert text.startswith("KinematicLinear3D8N with 1 Gauss points has 12 spurious zero-energy modes")
