@@ -89,7 +89,7 @@ def _sentence(scene: str, kinds: dict[str, tuple[np.ndarray, np.ndarray]]) -> st
         error = kinds[best][1].min()
         return f"{scene}: no element reaches 1 % at these sizes; {best} comes closest ({error:.1e})."
     order = sorted(times, key=lambda kind: times[kind])
-    rest = ", ".join(f"{kind} takes {times[kind] / times[order[0]]:.2g} times as long" for kind in order[1:])
+    rest = ", ".join(f"{kind} takes {times[kind] / times[order[0]]:.1f} times as long" for kind in order[1:])
     missing = [kind for kind in kinds if kind not in times]
     text = f"{scene}: for an error of {level:.2%} take {order[0]} ({seconds(times[order[0]])} s)"
     text += f"; {rest}" if rest else ""
