@@ -226,7 +226,7 @@ def test_sentence_names_the_cheapest_element():
     bricks = {"8N": [(1.0, 0.1), (100.0, 0.001)], "27N": [(1.0, 0.01), (2.0, 0.001)]}
     rows = rows_of(bricks | {"4N": [(1.0, 0.9)]})
     (sentence,) = curves.cheapest(rows)
-    assert sentence.startswith("s: for an error of 0.10% take 27N (2 s); 8N takes 50 times as long;")
+    assert sentence.startswith("s: for an error of 0.10% take 27N (2 s); 8N takes 50.0 times as long;")
     assert sentence.endswith("; 4N do not reach it.")
     assert "| s | kratos_lite | 8N | 10 | 100 | — | 1.0e-03 |" in curves.time_to_error(rows)
     assert curves.time_to(1e-4, np.array([1.0]), np.array([1e-3])) is None
