@@ -122,10 +122,8 @@ class StaticSystem:
             self._prescribe()
             self.initial = initial_loads(model, self.batches)
             self.equations: System | None = None
-            self._solved, self._still = (
-                np.zeros(0, dtype=bool),
-                0,
-            )  # parts in the equations; elements left out
+            self._solved = np.zeros(0, dtype=bool)  # parts in the equations
+            self._still = 0  # elements left out of them
             self._state = model.state()
 
     def _prescribe(self) -> None:

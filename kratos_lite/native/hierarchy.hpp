@@ -189,11 +189,11 @@ public:
             std::fill(z, z + top.size(), 0.0);
             return;
         }
-        over_rows(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) top.c[i] = static_cast<float>(r[i] / norm);
         });
         descend(0);
-        over_rows(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(top.size(), VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) z[i] = norm * top.x[i];
         });
     }
@@ -362,14 +362,14 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
     int best_at = 0;
     for (int k = 1; k <= most; ++k) {
         multiply(A, p.data(), Ap.data());
-        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 if (fixed[i]) Ap[i] = 0;
         });
         const double curvature = dot(p.data(), Ap.data(), n);
         if (!(curvature > 0 && rz > 0)) return {k, false};
         const double alpha = rz / curvature;
-        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
                 x[i] += alpha * p[i];
                 r[i] -= alpha * Ap[i];
@@ -389,7 +389,7 @@ inline Outcome conjugate_gradients(const Blocks<double>& A, const std::vector<ui
         const double old = rz;
         rz = dot(r.data(), z.data(), n);
         const double beta = rz / old;
-        over_rows(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) p[i] = z[i] + beta * p[i];
         });
     }

@@ -13,11 +13,6 @@ using Floats = std::vector<float>;
 
 constexpr int64_t VECTOR_GRAIN = 16384;  // numbers of one task on a vector
 
-template <class F>
-void over_rows(int64_t rows, int64_t grain, const F& f) {
-    parallel_ranges(rows, grain, f);
-}
-
 // One step of the smoother for some rows: s = c - A x, then d = alpha d + beta D^-1 s and next = x + d;
 // or, without D, next = s alone.
 template <int b>
@@ -101,7 +96,7 @@ public:
         A.resize(static_cast<size_t>(g.indptr[n]) * b * b + 8);
         Dinv.assign(static_cast<size_t>(n) * b * b + 8, 0.0f);
         std::vector<double> inverse(static_cast<size_t>(n) * b * b);
-        over_rows(n, grain(), [&](int64_t first, int64_t last) {
+        parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             b == 3 ? take_rows<3>(data, fixed, inverse, first, last) : take_rows<6>(data, fixed, inverse, first, last);
         });
         for (Floats* v : {&x, &y, &d, &c}) v->assign(size() + 8, 0.0f);
@@ -111,7 +106,7 @@ public:
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
         const float* inverse = smooth && clusters.empty() ? Dinv.data() : nullptr;
-        over_rows(n, grain(), [&](int64_t first, int64_t last) {
+        parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             if (b == 3)
                 step_some(Step<3>{graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last});
             else
@@ -123,7 +118,7 @@ public:
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
     void first_step(float beta) {
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
-        over_rows(n, 8 * grain(), [&](int64_t first, int64_t last) {
+        parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 for (int r = 0; r < b; ++r) {
                     float z = 0;
@@ -237,7 +232,7 @@ inline float largest_eigenvalue(Level& level, int steps = 15) {
         rz = dot(r.data(), level.x.data(), size);
         if (!(rz > 0)) break;
         beta = k ? rz / old_rz : 0;
-        over_rows(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) z[i] = level.x[i] + static_cast<float>(beta) * z[i];
         });
         level.step(z.data(), level.y.data(), 0, 0, false);  // y = -A z
@@ -246,7 +241,7 @@ inline float largest_eigenvalue(Level& level, int steps = 15) {
         alpha = rz / curvature;
         if (k) beside.push_back(std::sqrt(beta) / old_alpha);
         diagonal.push_back(1 / alpha + (k ? beta / old_alpha : 0));
-        over_rows(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        parallel_ranges(size, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) r[i] += static_cast<float>(alpha) * level.y[i];
         });
     }
