@@ -19,6 +19,7 @@ from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import lame_constants, tabulate
+from kratos_lite.materials import LinearMaterial
 from kratos_lite.native import kernels
 
 if TYPE_CHECKING:
@@ -31,8 +32,8 @@ SCATTER_BYTES = 64_000_000
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the share that is done, 0 … 1."""
 CONSTANT_JACOBIANS = "all Jacobians but the first of elements where they are constant"
-Kernel = Callable[[KinematicLinear], Array]
-"""Gives matrices (m, k, k) of elements."""
+Kernel = Callable[[KinematicLinear, LinearMaterial], Array]
+"""Gives matrices (m, k, k) of elements and their material."""
 
 
 class Pattern:
@@ -194,7 +195,7 @@ def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, k
     points : (n, 3) float, m.
     batches : elements with these points.
     pattern : the sparsity of their nodes, in the order of the batches.
-    kernel : function of elements, X (m, k, 3), that gives (m, k, k), symmetric or not.
+    kernel : function of elements, X (m, k, 3), and their material that gives (m, k, k), symmetric or not.
 
     Returns
     -------
@@ -206,7 +207,7 @@ def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, k
     >>> model = kl.Model(kl.box((1, 1, 1), cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
     >>> batches = model.batches()
     >>> pattern = Pattern(model.mesh.n_nodes, [batch.nodes for batch in batches])
-    >>> volume = assemble_scalar(model.mesh.points, batches, pattern, lambda e: e.scalar_mass())
+    >>> volume = assemble_scalar(model.mesh.points, batches, pattern, lambda e, material: e.scalar_mass())
     >>> round(float(volume.sum()), 12)
     1.0
     """
@@ -215,7 +216,7 @@ def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, k
     data = np.zeros(len(pattern.indices))
     for group, batch in enumerate(batches):
         for chunk in batch.chunks():
-            pattern.add(data, group, chunk, kernel(batch.at(points, chunk)))
+            pattern.add(data, group, chunk, kernel(batch.at(points, chunk), batch.material))
     n = pattern.n_nodes
     return csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
 

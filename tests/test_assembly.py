@@ -267,19 +267,19 @@ def test_a_pattern_of_another_mesh_is_refused():
 def dense_scalar(points, batches, kernel):
     total = np.zeros((len(points), len(points)))
     for batch in batches:
-        for nodes, matrix in zip(batch.nodes, kernel(batch.at(points)), strict=True):
+        for nodes, matrix in zip(batch.nodes, kernel(batch.at(points), batch.material), strict=True):
             total[np.ix_(nodes, nodes)] += matrix
     return total
 
 
-def transport(element):
+def transport(element, material):
     """Return ∫ N_a dN_b/dX dV, which is not symmetric."""
     dV, D = element._gauss
     N = element.N(element.rule.points)
     return np.einsum("mg,ga,mgb->mab", dV, N, D[..., 0, :])
 
 
-@pytest.mark.parametrize("kernel", [lambda e: e.scalar_mass(7620.0), transport], ids=["mass", "transport"])
+@pytest.mark.parametrize("kernel", [lambda e, material: e.scalar_mass(material.density), transport], ids=["mass", "transport"])
 @pytest.mark.parametrize("name", ["KinematicLinear3D4N", "KinematicLinear3D8N", "KinematicLinear3D20N"])
 def test_scalar_matrices(path, name, kernel):
     points, batches = scene(name, distortion=0.02)

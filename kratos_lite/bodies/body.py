@@ -1,0 +1,287 @@
+"""Body: what every kind of body has, whatever it may do with its shape.
+
+A body has a configuration q and a velocity u.  Its kind says how these move its material points X:
+`position` and `velocity`.  Everything else (loads, constraints, energies, momenta, time integration)
+stands on the few methods that a kind defines.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite import checks
+from kratos_lite.arguments import finite
+from kratos_lite.batches import Batch
+from kratos_lite.characteristics import Characteristics
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.grouping import batches_of, element_class
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Mesh
+from kratos_lite.registry import Registry
+
+if TYPE_CHECKING:
+    from kratos_lite.bodies.constraints import Constraint
+    from kratos_lite.bodies.loads import BodyLoad, Bound, Factor
+    from kratos_lite.loads import Load
+
+Array = NDArray[np.float64]
+Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
+Gauge: TypeAlias = Callable[[Array], Array]
+
+BODIES: Registry[type[Body]] = Registry("kind of body")
+"""Every kind of body by its class name and by its `kind`."""
+
+
+class Body(ABC):
+    """A body in motion.
+
+    Attributes
+    ----------
+    kind : name of the kind, as in input files.
+    q, u : configuration and velocity; their layout is that of the kind.
+    time, step : s, and number of steps taken.
+    mesh : the shape, or None for a body that is given by its characteristics alone.
+    characteristics : mass, volume, mass centre, Euler and inertia tensor.
+    damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
+    external_work : work of loads and reactions since the start, J.
+    """
+
+    kind: ClassVar[str]
+    schemes: ClassVar[tuple[str, ...]] = ()
+    dofs: int
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "kind" in cls.__dict__:
+            BODIES.add(cls.__name__, cls, [cls.kind])
+
+    def __init__(
+        self,
+        mesh: Mesh | None,
+        characteristics: Characteristics,
+        q: Array,
+        u: Array,
+        scheme: str | None,
+        damping: float = 0.0,
+    ) -> None:
+        self.mesh, self.characteristics = mesh, characteristics
+        self.q, self.u = q, u
+        self.time, self.step = 0.0, 0
+        self.external_work: Array = np.zeros(q.shape[:-1])
+        self.loads: list[Bound] = []
+        self.constraints: list[Constraint] = []
+        self.reactions: list[Array] = []
+        self.scheme = scheme or self.default_scheme()
+        self.damping = self._checked_damping(damping)
+
+    # ---- what a kind defines ---------------------------------------------------------------------
+
+    @abstractmethod
+    def default_scheme(self) -> str:
+        """Return the scheme that is used if none is named."""
+
+    @abstractmethod
+    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
+        """Return where material points X (m, 3) or (3,) are, as (..., m, 3) or (..., 3) in m."""
+
+    @abstractmethod
+    def velocity(self, X: ArrayLike) -> Array:
+        """Return the velocity of material points X, shaped as by `position`, in m/s."""
+
+    @abstractmethod
+    def place(self, q: ArrayLike) -> None:
+        """Set the configuration.
+
+        Raises
+        ------
+        InputError
+            If it is none of this body: a wrong shape, no rotation, an inverted shape.
+        """
+
+    @abstractmethod
+    def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
+        """Let the body move as a rigid one: linear velocity of its mass centre, and spatial angular velocity.
+
+        Parameters
+        ----------
+        linear : (3,) or (..., 3) m/s.
+        angular : (3,) or (..., 3) rad/s.
+        """
+
+    @abstractmethod
+    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs (k,) and H (3, k) with velocity(X) = H u[dofs], for one point X (3,) of one body."""
+
+    @abstractmethod
+    def push(self, X: Array, force: Array, q: Array) -> Array:
+        """Return the generalised force (..., dofs) of a spatial force (..., 3) in N on the point X (3,)."""
+
+    @abstractmethod
+    def push_nodes(self, forces: Array, q: Array) -> Array:
+        """Return the generalised force (..., dofs) of spatial forces (n, 3) in N on the nodes of the mesh."""
+
+    @abstractmethod
+    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return what a vector (3,) fixed in the body at X points at in space, (..., 3)."""
+
+    @abstractmethod
+    def times_mass(self, v: Array) -> Array:
+        """Return the mass matrix times v (..., dofs)."""
+
+    @abstractmethod
+    def mass_center(self) -> Array:
+        """Return where the mass centre is, (..., 3) in m."""
+
+    @abstractmethod
+    def linear_momentum(self) -> Array:
+        """Return ∫ρ v dV, (..., 3) in kg m/s."""
+
+    @abstractmethod
+    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
+        """Return ∫ρ (x - about) × v dV, (..., 3) in kg m²/s, about the mass centre if not given."""
+
+    def internal_load(self, q: Array | None = None) -> Array:
+        """Return the generalised internal load (..., dofs): what deformation resists with."""
+        return np.zeros_like(self.u)
+
+    def internal_energy(self) -> Array | float:
+        """Return the strain energy (...) in J."""
+        return np.zeros(self.q.shape[:-1])
+
+    def stiffness(self, q: Array | None = None) -> Any:
+        """Return the tangent of `internal_load`.
+
+        Raises
+        ------
+        ModelError
+            If bodies of this kind do not deform.
+        """
+        raise ModelError(f"a {self.kind} body has no stiffness; a pseudo-rigid or finite-element one has")
+
+    # ---- characteristics -----------------------------------------------------------------------------
+
+    @property
+    def mass(self) -> Array:
+        """Mass (...) in kg."""
+        return np.asarray(self.characteristics.mass)
+
+    @property
+    def center(self) -> Array:
+        """Mass centre X̄ (..., 3) of the undeformed body in m."""
+        return np.asarray(self.characteristics.center)
+
+    @property
+    def scheme(self) -> str:
+        """Name of the time integration scheme, one of `schemes`."""
+        return self._scheme
+
+    @scheme.setter
+    def scheme(self, name: str) -> None:
+        if name not in self.schemes:
+            known = ", ".join(self.schemes) or "none"
+            raise InputError(f"the schemes of a {self.kind} body are {known}; got {name!r}")
+        self._scheme = name
+
+    @staticmethod
+    def _checked_damping(value: float) -> float:
+        damping = finite(value, "a damping")
+        if damping.ndim or damping < 0:
+            raise InputError(f"a damping must be one number of seconds, ≥ 0; got {value}")
+        return float(damping)
+
+    # ---- loads and constraints ---------------------------------------------------------------------------
+
+    def add(self, load: BodyLoad | Load, factor: Factor = 1.0) -> None:
+        """Let a load act.
+
+        Parameters
+        ----------
+        load : a load of bodies (`Force`, `Torque`, …), or one of models (`Gravity`, `Traction`, `Pressure`,
+            …), which acts on the nodes as on the undeformed mesh and keeps its direction in space.
+        factor : number, `TimeSeries`, or function of the time in s, by which it is multiplied.
+        """
+        from kratos_lite.bodies.loads import bind
+
+        self.loads.append(bind(load, self, factor))
+
+    def constrain(self, constraint: Constraint) -> None:
+        """Hold the body: a fixed point or direction, a prescribed motion, a rigid link.
+
+        Raises
+        ------
+        MeshError
+            If a point lies outside the body.
+        """
+        constraint.bind(self)
+        self.constraints.append(constraint)
+
+    def external_load(self, q: Array | None = None, time: float | None = None) -> Array:
+        """Return the generalised external load (..., dofs) at a configuration and a time in s."""
+        q, t = self.q if q is None else q, self.time if time is None else time
+        total = np.zeros_like(self.u)
+        for load in self.loads:
+            total += load(q, self.u, t)
+        return total
+
+    # ---- energies ------------------------------------------------------------------------------------------
+
+    def kinetic_energy(self) -> Array | float:
+        """Return ½ ∫ρ v·v dV, (...) in J."""
+        return np.asarray((self.u * self.times_mass(self.u)).sum(axis=-1) / 2)
+
+    def potential_energy(self) -> Array | float:
+        """Return the potential energy (...) in J of gravity and other dead loads of constant size."""
+        return np.asarray(sum((load.potential(self.q) for load in self.loads), np.zeros(self.q.shape[:-1])))
+
+    def energy(self) -> Array | float:
+        """Return kinetic + internal + potential energy, (...) in J."""
+        return self.kinetic_energy() + self.internal_energy() + self.potential_energy()
+
+    def __repr__(self) -> str:
+        many = f"{len(self.q)} bodies, " if self.q.ndim > 1 else ""
+        return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.scheme})"
+
+
+def elements_of(mesh: Mesh, material: Material) -> list[Batch]:
+    """Return the elements of a mesh with their material, after checks of its geometry.
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        If the mesh is broken or inverted, or elements have no material.
+    """
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
+    kinds = [element_class(mesh, block) for block in mesh.blocks]
+    checks.check_blocks(mesh, kinds)
+    checks.check_points(mesh)
+    checks.check_repeated_nodes(mesh)
+    checks.check_jacobians(mesh, kinds)
+    given = material if isinstance(material, Mapping) else {None: material}
+    material_of = np.full(mesh.n_elements, -1)
+    for number, (where, one) in enumerate(given.items()):
+        if not isinstance(one, LinearMaterial):
+            raise InputError(f"a material such as Isotropic3D is needed; got {type(one).__name__}")
+        material_of[mesh.elements(where)] = number
+    return batches_of(mesh, list(given.values()), material_of)
+
+
+def points_of(X: ArrayLike) -> Array:
+    """Return material points as floats (3,) or (m, 3)."""
+    points = finite(X, "material points")
+    if points.ndim not in (1, 2) or points.shape[-1] != 3:
+        raise InputError(f"material points must have shape (3,) or (m, 3); got {points.shape}")
+    return points
+
+
+def vector_of(value: ArrayLike, what: str) -> Array:
+    """Return a vector (..., 3) as floats."""
+    vector = finite(value, what)
+    if vector.shape[-1:] != (3,):
+        raise InputError(f"{what} must have three components; got shape {vector.shape}")
+    return vector

@@ -1,0 +1,247 @@
+"""Constraints on a single body: fixed points and directions, prescribed motions, rigid links.
+
+A constraint has rows H, along which its reactions push, and a gap, which a step closes.  The gap is taken at
+the end of the step: a point that is fixed stays where it is, and a link keeps its length, to round-off.
+
+Source: Solfec-1.0 user manual, constraints; its velocity-level laws are replaced by those of positions.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.bodies.body import Body, points_of, vector_of
+from kratos_lite.bodies.loads import inside, one_point
+from kratos_lite.bodies.series import Factor, function_of, integral_of
+from kratos_lite.errors import InputError, ModelError
+
+Array = NDArray[np.float64]
+
+
+class Constraint(ABC):
+    """Something that holds material points of a body.
+
+    Attributes
+    ----------
+    points : (m, 3) m, in the undeformed body.
+    positional : whether it is about positions, so that it also holds a body at rest.
+    reactions : (m, 3) N, mean force on the points over the last step.
+    """
+
+    positional = True
+
+    def __init__(self, points: ArrayLike) -> None:
+        self.points = np.atleast_2d(points_of(points))
+        self.reactions = np.zeros_like(self.points)
+        self._body: Body | None = None
+
+    def bind(self, body: Body) -> None:
+        """Take hold of a body where it is now.
+
+        Raises
+        ------
+        MeshError
+            If a point lies outside the body.
+        ModelError
+            If the body is many bodies, or the constraint holds another one already.
+        """
+        if body.q.ndim > 1:
+            raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
+        if self._body is not None and self._body is not body:
+            raise ModelError("this constraint holds another body already; make one for each body")
+        inside(body, self.points, "a constraint")
+        self._body, self._start = body, body.position(self.points)
+
+    def begin(self, body: Body, h: float) -> None:
+        """Prepare a step of h s from the state of the body."""
+
+    @abstractmethod
+    def directions(self, x: Array) -> Array:
+        """Return the directions (m, r, 3) along which points at x (m, 3) are held, r for each point."""
+
+    @abstractmethod
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much positions (m, 3) and velocities (m, 3) at a time miss, (m, r) in m/s.
+
+        Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
+        """
+
+    def rows(self, body: Body, q: Array) -> Array:
+        """Return H (m r, dofs): velocities of the points along their directions are H u."""
+        directions = self.directions(body.position(self.points, q))
+        H = np.zeros((*directions.shape[:2], body.dofs))
+        for i, X in enumerate(self.points):
+            dofs, matrix = body.rows(X, q)
+            H[i][:, dofs] = directions[i] @ matrix
+        return H.reshape(-1, body.dofs)
+
+    def gaps(self, body: Body, q: Array, u: Array, time: float, h: float) -> Array:
+        """Return the gaps (m r,) at the end of a step in m/s."""
+        v = np.empty_like(self.points)
+        for i, X in enumerate(self.points):
+            dofs, matrix = body.rows(X, q)
+            v[i] = matrix @ u[dofs]
+        return self.gap(body.position(self.points, q), v, time, h).ravel()
+
+    def react(self, body: Body, q: Array, multipliers: Array) -> None:
+        """Note the reactions of multipliers (m r,)."""
+        directions = self.directions(body.position(self.points, q))
+        self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)
+
+
+class FixPoint(Constraint):
+    """Points that stay where they are.
+
+    Parameters
+    ----------
+    points : (3,) or (m, 3) m, in the undeformed body.
+    """
+
+    def directions(self, x: Array) -> Array:
+        """Return x, y and z."""
+        return np.broadcast_to(np.eye(3), (len(self.points), 3, 3))
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return how far the points have moved; see `Constraint.gap`."""
+        return np.asarray((x - self._start) * (2 / h))
+
+
+class Along(Constraint):
+    """A constraint along one direction fixed in space.
+
+    Parameters
+    ----------
+    points : (3,) or (m, 3) m, in the undeformed body.
+    direction : (3,), of any length but 0.
+    """
+
+    def __init__(self, points: ArrayLike, direction: ArrayLike) -> None:
+        super().__init__(points)
+        n = vector_of(direction, "a direction")
+        length = float(np.linalg.norm(n))
+        if n.shape != (3,) or length == 0:
+            raise InputError(f"a direction needs three components, not all 0; got {direction!r}")
+        self.direction = n / length
+
+    def directions(self, x: Array) -> Array:
+        """Return the direction, for each point."""
+        return np.broadcast_to(self.direction, (len(self.points), 1, 3))
+
+    def _moved(self, x: Array) -> Array:
+        return np.asarray((x - self._start) @ self.direction)[:, None]
+
+
+class FixDirection(Along):
+    """Points that do not move along a direction, but are free across it."""
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return how far the points have moved; see `Constraint.gap`."""
+        return self._moved(x) * (2 / h)
+
+
+class SetDisplacement(Along):
+    """Points that move along a direction as prescribed.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    displacement : m, number, `TimeSeries` or function of the time; its change since the constraint was made is
+        what the points move.
+    """
+
+    def __init__(self, points: ArrayLike, direction: ArrayLike, displacement: Factor) -> None:
+        super().__init__(points, direction)
+        self.displacement = function_of(displacement, "a displacement")
+
+    def bind(self, body: Body) -> None:
+        """Take hold of a body where it is now; see `Constraint.bind`."""
+        super().bind(body)
+        self._origin = self.displacement(body.time)
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much the points are off; see `Constraint.gap`."""
+        return (self._moved(x) - (self.displacement(time) - self._origin)) * (2 / h)
+
+
+class SetVelocity(Along):
+    """Points with a prescribed velocity along a direction at the end of each step.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    velocity : m/s, number, `TimeSeries` or function of the time.
+    """
+
+    positional = False
+
+    def __init__(self, points: ArrayLike, direction: ArrayLike, velocity: Factor) -> None:
+        super().__init__(points, direction)
+        self.speed = function_of(velocity, "a velocity")
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return the velocity that is missing; see `Constraint.gap`."""
+        return np.asarray(v @ self.direction)[:, None] - self.speed(time)
+
+
+class SetAcceleration(Along):
+    """Points with a prescribed acceleration along a direction: it adds up to their velocity.
+
+    Parameters
+    ----------
+    points, direction : as for `FixDirection`.
+    acceleration : m/s², number, `TimeSeries` or function of the time.
+    """
+
+    positional = False
+
+    def __init__(self, points: ArrayLike, direction: ArrayLike, acceleration: Factor) -> None:
+        super().__init__(points, direction)
+        function_of(acceleration, "an acceleration")
+        self.acceleration = acceleration
+
+    def begin(self, body: Body, h: float) -> None:
+        """Add what the acceleration adds to the velocity in a step."""
+        gained = integral_of(self.acceleration, body.time, body.time + h)
+        self._target = (body.velocity(self.points) @ self.direction)[:, None] + gained
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return the velocity that is missing; see `Constraint.gap`."""
+        return np.asarray(v @ self.direction)[:, None] - self._target
+
+
+class RigidLink(Constraint):
+    """A rod without mass from a material point to a fixed point in space.
+
+    Parameters
+    ----------
+    point : (3,) m, in the undeformed body.
+    anchor : (3,) m, in space.
+
+    The length is the distance at the time when the constraint is made.
+    """
+
+    def __init__(self, point: ArrayLike, anchor: ArrayLike) -> None:
+        super().__init__(one_point(point))
+        self.anchor = one_point(anchor)
+
+    def bind(self, body: Body) -> None:
+        """Take hold of a body where it is now; InputError if point and anchor coincide."""
+        super().bind(body)
+        self.length = float(np.linalg.norm(self._start[0] - self.anchor))
+        if self.length == 0:
+            raise InputError("a rigid link needs a length: point and anchor coincide; use FixPoint")
+
+    def directions(self, x: Array) -> Array:
+        """Return the direction from the anchor to the point."""
+        y = x - self.anchor
+        return np.asarray(y / np.linalg.norm(y))[:, None]
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much the link is too long; see `Constraint.gap`."""
+        stretch = np.linalg.norm(x - self.anchor, axis=1) - self.length
+        return np.asarray(stretch[:, None] * (2 / h))
+
+

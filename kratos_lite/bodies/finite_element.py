@@ -1,0 +1,252 @@
+"""FiniteElementBody: a body that deforms as its mesh lets it.
+
+Source: Solfec-1.0 theory, finite-element bodies.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.assembly import Pattern
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.deformable import Deformable, Solve
+from kratos_lite.bodies.forms import FORMS, Form, Modal
+from kratos_lite.bodies.mass import Mass
+from kratos_lite.characteristics import Characteristics
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh
+from kratos_lite.modes import modes
+
+Array = NDArray[np.float64]
+
+
+class FiniteElementBody(Deformable):
+    """A body of solid elements, all kinds mixed freely.
+
+    q (3n,): nodal displacements (q1x q1y q1z q2x …) in m.  u (3n,): nodal velocities in m/s.
+    x = Σ N_a (X_a + q_a); n nodes of the mesh.
+
+    Parameters
+    ----------
+    mesh : the shape.
+    material : one material, or materials by part name or property id.
+    form : ``TL`` total Lagrangian (Saint Venant–Kirchhoff), ``BC`` body co-rotational (small strains seen
+        from one rotation of the body), ``BC-MODAL`` the same with the lowest modes only.
+    modes : number of modes for ``BC-MODAL``.
+    lumped : whether the mass stands in the nodes; the consistent mass is exact for rigid motions.
+    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``TL`` and ``DEF_LIM`` for the others if not given.
+    damping : η in s.
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        If the mesh is inverted, nodes belong to no element, or there is no mass.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = FiniteElementBody(kl.box((0.4, 0.6, 1.0)), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    >>> body.set_velocity(angular=(0, 10, 0))
+    >>> print(f"{body.q.size} displacements, {body.kinetic_energy():.0f} J")
+    24 displacements, 1160 J
+    """
+
+    kind = "finite-element"
+    mesh: Mesh
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        material: Material,
+        *,
+        form: str = "TL",
+        modes: int | None = None,
+        lumped: bool = False,
+        scheme: str | None = None,
+        damping: float = 0.0,
+        tolerance: float = 1e-12,
+    ) -> None:
+        self.batches = elements_of(mesh, material)
+        lost = mesh.node_ids[~mesh.used_nodes()]
+        if len(lost):
+            raise ModelError(f"node {lost[0]} belongs to no element, so it has no mass; leave it out of the mesh")
+        self.points, self.tolerance, self.dofs = mesh.points, tolerance, 3 * mesh.n_nodes
+        characteristics = Characteristics.of(mesh.points, self.batches)
+        pattern = Pattern(mesh.n_nodes, [batch.nodes for batch in self.batches])
+        self.lumped = lumped
+        self._mass = Mass(mesh.points, self.batches, pattern, lumped)
+        self.form = self._form(form, modes)
+        self.schemes = self.form.schemes  # type: ignore[misc]
+        self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
+        super().__init__(mesh, characteristics, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping)
+
+    def _form(self, name: str, count: int | None) -> Form:
+        kind = FORMS[name]
+        if kind is not Modal and count is not None:
+            raise InputError(f"modes are for form='BC-MODAL'; got form={name!r}")
+        if kind is Modal:
+            return Modal(self.points, self.batches, self._mass, 12 if count is None else count)
+        return kind(self.points, self.batches, self._mass)
+
+    def default_scheme(self) -> str:
+        """Return the most robust scheme that the form has."""
+        return self.form.schemes[0]
+
+    # ---- motion ---------------------------------------------------------------------------------------
+
+    @property
+    def displacement(self) -> Array:
+        """Nodal displacements (n, 3) in m."""
+        return self.q.reshape(-1, 3)
+
+    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
+        """Return x = X + Σ N_a q_a of points X (m, 3) or (3,) in m.
+
+        Raises
+        ------
+        MeshError
+            If a point lies outside the undeformed body.
+        """
+        q = (self.q if q is None else q).reshape(-1, 3)
+        return self.points + q if X is self.points else points_of(X) + self._interpolated(X, q)
+
+    def velocity(self, X: ArrayLike) -> Array:
+        """Return v = Σ N_a u_a of points X (m, 3) or (3,) in m/s."""
+        return self._interpolated(X, self.u.reshape(-1, 3))
+
+    def _interpolated(self, X: ArrayLike, nodal: Array) -> Array:
+        if X is self.points:
+            return nodal.copy()
+        points = points_of(X)
+        located = self.mesh.locate(np.atleast_2d(points), required=True)
+        return np.asarray(located.interpolate(nodal).reshape(points.shape))
+
+    def place(self, q: ArrayLike) -> None:
+        """Set the displacements (3n,) or (n, 3); see `Body.place`."""
+        q = finite(q, "a configuration")
+        if q.shape not in ((self.dofs,), self.points.shape):
+            raise InputError(f"a configuration of this body has shape ({self.dofs},); got {q.shape}")
+        moved = self.points + q.reshape(-1, 3)
+        for batch in self.batches:
+            for chunk in batch.chunks():
+                lowest = batch.at(moved, chunk).dV.min(axis=1)
+                if (lowest <= 0).any():
+                    element = self.mesh.element_ids[batch.rows[chunk][int(np.argmin(lowest))]]
+                    raise InputError(f"these displacements turn element {element} inside out: det J ≤ 0")
+        self.q = q.ravel().copy()
+
+    def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
+        """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""
+        arms = self.points + self.displacement - self.mass_center()
+        v = vector_of(linear, "a velocity") + np.cross(vector_of(angular, "an angular velocity"), arms)
+        self.u = v.ravel()
+
+    def _at(self, X: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
+        key = X.tobytes()
+        if key not in self._known:
+            self._known[key] = self.mesh.locate(X[None], required=True).nodes_and_weights()
+        return self._known[key]
+
+    # ---- forces -----------------------------------------------------------------------------------------
+
+    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs of the nodes around X and H = N(X) 1; see `Body.rows`."""
+        nodes, N = self._at(X)
+        return (3 * nodes[:, None] + np.arange(3)).ravel(), np.kron(N, np.eye(3))
+
+    def push(self, X: Array, force: Array, q: Array) -> Array:
+        """Return N_a(X) f at the nodes; see `Body.push`."""
+        nodes, N = self._at(X)
+        out = np.zeros((len(self.points), 3))
+        out[nodes] = N[:, None] * force
+        return out.ravel()
+
+    def push_nodes(self, forces: Array, q: Array) -> Array:
+        """Return the nodal forces as (3n,); see `Body.push_nodes`."""
+        return forces.ravel()
+
+    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return F(X) times the vector; see `Body.convected`."""
+        located = self.mesh.locate(X[None], required=True)
+        block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
+        assert block.shape is not None
+        dN = block.shape.dN(located.xi[0])
+        gradient = dN @ np.linalg.inv(self.points[nodes].T @ dN)
+        return np.asarray(vector + q.reshape(-1, 3)[nodes].T @ (gradient @ vector))
+
+    def times_mass(self, v: Array) -> Array:
+        """Return M v (3n,); see `Body.times_mass`."""
+        return self._mass.times(v)
+
+    # ---- deformation ------------------------------------------------------------------------------------
+
+    def internal_load(self, q: Array | None = None) -> Array:
+        """Return the internal load of the form, (3n,) in N."""
+        return self.form.load(self.q if q is None else q)
+
+    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
+        """Return the load of the energy–momentum method; see `Deformable`."""
+        return self.form.load_over(q, dq, damping)
+
+    def internal_energy(self) -> float:
+        """Return the strain energy in J."""
+        return self.form.energy(self.q)
+
+    def stiffness(self, q: Array | None = None) -> BlockMatrix:
+        """Return the tangent (3n, 3n) of the internal load in N/m."""
+        return self.form.stiffness(self.q if q is None else q)
+
+    def damping_load(self, q: Array, u: Array) -> Array:
+        """Return K(q) u; see `Deformable`."""
+        return self.form.damping_load(q, u)
+
+    def mass_solver(self) -> Solve:
+        """Return what solves M x = b."""
+        return self.form.solver(self.q, 0.0) if isinstance(self.form, Modal) else self._mass.solve
+
+    def solver(self, q: Array, c: float) -> Solve:
+        """Return what solves (M + c K(q)) x = b."""
+        return self.form.solver(q, c)
+
+    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
+        """Return what solves (M + c D) x = b; see `Deformable`."""
+        return self.form.increment_solver(q, dq, damping, c)
+
+    def highest_frequency(self) -> float:
+        """Return an upper bound of the angular frequencies in rad/s: that of the worst element alone."""
+        return self.form.highest_frequency(self.q)
+
+    def modes(self, count: int = 12) -> tuple[Array, Array]:
+        """Return the lowest natural frequencies (count,) of the free undeformed body in rad/s, and their shapes.
+
+        Shapes are (3n, count) with φ^T M φ = 1; the first six are the rigid motions.
+        """
+        return modes(self.form.K0.scipy().tocsr(), self._mass.matrix(), count)
+
+    # ---- momenta --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _shares(self) -> Array:
+        return self._mass.nodal / self._mass.nodal.sum()
+
+    def mass_center(self) -> Array:
+        """Return x̄ (3,) in m."""
+        return np.asarray(self._shares @ (self.points + self.displacement))
+
+    def linear_momentum(self) -> Array:
+        """Return Σ (M u)_a, (3,) in kg m/s."""
+        return np.asarray(self._mass.nodal @ self.u.reshape(-1, 3))
+
+    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
+        """Return Σ (x_a - about) × (M u)_a, (3,) in kg m²/s; see `Body`."""
+        origin = self.mass_center() if about is None else vector_of(about, "a point")
+        arms = self.points + self.displacement - origin
+        return np.asarray(np.cross(arms, self.times_mass(self.u).reshape(-1, 3)).sum(axis=0))
+
+

@@ -1,0 +1,73 @@
+"""Mass: the mass matrix of a mesh, one number for each pair of nodes, as it is the same for x, y and z."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import fields
+from kratos_lite.assembly import Pattern, assemble_scalar
+from kratos_lite.batches import Batch
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.solvers import direct
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Array = NDArray[np.float64]
+
+
+class Mass:
+    """The mass matrix of elements: consistent, or lumped at the nodes.
+
+    Attributes
+    ----------
+    scalar : (n, n) sparse in kg; a diagonal for lumped mass.
+    nodal : (n,) kg, its row sums.
+    pattern : the sparsity of matrices on the nodes.
+    """
+
+    def __init__(self, points: Array, batches: Sequence[Batch], pattern: Pattern, lumped: bool) -> None:
+        from scipy.sparse import diags_array
+
+        self.lumped, self.pattern = lumped, pattern
+        self.scalar: csr_array[Any, Any]
+        if lumped:
+            self.nodal = fields.lumped_mass(points, batches)
+            self.scalar = diags_array(self.nodal, format="csr")
+            return
+        self.scalar = assemble_scalar(points, batches, pattern, lambda e, m: e.scalar_mass(m.density))
+        self.nodal = np.asarray(self.scalar.sum(axis=1)).ravel()
+
+    def times(self, v: Array) -> Array:
+        """Return M v of nodal vectors (3n,)."""
+        nodal = v.reshape(-1, 3)
+        return np.asarray(self.nodal[:, None] * nodal if self.lumped else self.scalar @ nodal).ravel()
+
+    def solve(self, b: Array) -> Array:
+        """Return M^-1 b of nodal vectors (3n,) or columns of them (3n, k)."""
+        nodal = b.reshape(len(self.nodal), -1)
+        x = nodal / self.nodal[:, None] if self.lumped else self._factors.solve(nodal)
+        return np.asarray(x).reshape(b.shape)
+
+    def add_to(self, A: BlockMatrix) -> None:
+        """Add the mass matrix to a matrix of blocks on the same pattern."""
+        places = A.diagonal_blocks() if self.lumped else slice(None)
+        m = self.nodal if self.lumped else self.scalar.data
+        for axis in range(3):
+            A.data[places, axis, axis] += m
+
+    def matrix(self) -> csr_array[Any, Any]:
+        """Return the mass matrix of all components, (3n, 3n) in kg."""
+        from scipy.sparse import csr_array, eye_array, kron
+
+        return csr_array(kron(self.scalar, eye_array(3), format="csr"))
+
+    @cached_property
+    def _factors(self) -> direct.Factorisation:
+        return direct.factorise(self.scalar)
+

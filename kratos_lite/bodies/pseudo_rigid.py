@@ -1,0 +1,251 @@
+"""PseudoRigidBody: one deformation gradient for the whole body.
+
+Source: Solfec-1.0 theory, pseudo-rigid bodies; Cohen & Muncaster, The Theory of Pseudo-Rigid Bodies (1988).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite import kirchhoff
+from kratos_lite.arguments import finite
+from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.deformable import Deformable, Solve
+from kratos_lite.characteristics import Characteristics
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Mesh
+from kratos_lite.rotations import axial, hat
+
+Array = NDArray[np.float64]
+
+
+class PseudoRigidBody(Deformable):
+    """A body that deforms homogeneously, or many independent ones.
+
+    q (..., 12): deformation gradient F row by row (F11 F12 F13 F21 …), then the mass centre x̄ in m.
+    u (..., 12): Ḟ row by row in 1/s, then the velocity of the mass centre in m/s.
+    x = F (X - X̄) + x̄; the material is Saint Venant–Kirchhoff, S = C : E.
+
+    Parameters
+    ----------
+    mesh : the shape; may be left out where characteristics are given.
+    material : one material (a body of several has no single C).
+    characteristics : mass, volume, centre and Euler tensor in place of those of mesh and material.
+    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
+    damping : η in s.
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        If the mesh is inverted, there is no mass, or no body has such an Euler tensor.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = PseudoRigidBody(kl.box((0.4, 0.6, 1.0)), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    >>> print(f"{body.critical_step():.4e} s")
+    5.8400e-03 s
+    """
+
+    kind = "pseudo-rigid"
+    dofs = 12
+
+    def __init__(
+        self,
+        mesh: Mesh | None = None,
+        material: Material | None = None,
+        *,
+        characteristics: Characteristics | None = None,
+        scheme: str | None = None,
+        damping: float = 0.0,
+        tolerance: float = 1e-14,
+    ) -> None:
+        if isinstance(material, Mapping):
+            if len(material) != 1:
+                raise InputError("a pseudo-rigid body is of one material; FiniteElementBody takes several")
+            (material,) = material.values()
+        if not isinstance(material, LinearMaterial):
+            raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
+        if characteristics is None:
+            if mesh is None:
+                raise InputError("a pseudo-rigid body needs a mesh, or its characteristics")
+            characteristics = Characteristics.of(mesh.points, elements_of(mesh, material))
+        characteristics.check_euler()
+        lead = np.shape(characteristics.mass)
+        q = np.zeros((*lead, 12))
+        q[..., [0, 4, 8]] = 1.0
+        q[..., 9:] = characteristics.center
+        self.material, self.C, self.tolerance = material, material.C, tolerance
+        super().__init__(mesh, characteristics, q, np.zeros((*lead, 12)), scheme, damping)
+
+    # ---- motion ---------------------------------------------------------------------------------------
+
+    @property
+    def deformation(self) -> Array:
+        """Deformation gradient F (..., 3, 3)."""
+        return gradient_of(self.q)
+
+    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
+        """Return x = F (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
+        return self._moved(X, self.q if q is None else q)
+
+    def velocity(self, X: ArrayLike) -> Array:
+        """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
+        return self._moved(X, self.u)
+
+    def _moved(self, X: ArrayLike, q: Array) -> Array:
+        points = points_of(X)
+        A = np.atleast_2d(points) - self.center[..., None, :]
+        x = A @ np.swapaxes(gradient_of(q), -1, -2) + q[..., None, 9:]
+        return np.asarray(x if points.ndim == 2 else x[..., 0, :])
+
+    def place(self, q: ArrayLike) -> None:
+        """Set the configuration (..., 12); see `Body.place`."""
+        q = finite(q, "a configuration")
+        if q.shape != self.q.shape:
+            raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
+        lowest = float(np.linalg.det(gradient_of(q)).min())
+        if lowest <= 0:
+            raise InputError(f"a deformation gradient must have det F > 0; got {lowest:g}: it turns the body over")
+        self.q = q.copy()
+
+    def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
+        """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
+        spin = hat(vector_of(angular, "an angular velocity")) @ self.deformation
+        self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
+        self.u[..., 9:] = vector_of(linear, "a velocity")
+
+    # ---- forces -----------------------------------------------------------------------------------------
+
+    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.rows`."""
+        H = np.hstack([np.kron(np.eye(3), X - self.center), np.eye(3)])
+        return np.arange(12), H
+
+    def push(self, X: Array, force: Array, q: Array) -> Array:
+        """Return f_i A_j row by row with A = X - X̄, and the force f; see `Body.push`."""
+        f = np.broadcast_to(force, (*q.shape[:-1], 3))
+        moment = f[..., :, None] * (X - self.center)[..., None, :]
+        return np.concatenate([moment.reshape(*moment.shape[:-2], 9), f], axis=-1)
+
+    def push_nodes(self, forces: Array, q: Array) -> Array:
+        """Return Σ f_i A_j row by row and Σ f of nodal forces; see `Body.push_nodes`."""
+        assert self.mesh is not None
+        moment = forces.T @ (self.mesh.points - self.center[..., None, :])
+        resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
+        return np.concatenate([moment.reshape(*moment.shape[:-2], 9), resultant], axis=-1)
+
+    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return F times the vector; see `Body.convected`."""
+        return np.asarray(gradient_of(q) @ vector)
+
+    def times_mass(self, v: Array) -> Array:
+        """Return V̇ E0 row by row and m v̄; see `Body.times_mass`."""
+        rows = (gradient_of(v) @ self.characteristics.euler).reshape(*v.shape[:-1], 9)
+        return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
+
+    # ---- deformation ------------------------------------------------------------------------------------
+
+    @property
+    def _volume(self) -> Array:
+        return np.asarray(self.characteristics.volume)[..., None, None]
+
+    def internal_load(self, q: Array | None = None) -> Array:
+        """Return V P(F) row by row, and no force on the mass centre, (..., 12)."""
+        F = gradient_of(self.q if q is None else q)
+        return _generalised(self._volume * kirchhoff.piola(self.C, F))
+
+    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
+        """Return V F_m S_a row by row; see `Deformable.load_over`."""
+        P = kirchhoff.piola(self.C, gradient_of(q), gradient_of(dq), damping)
+        return _generalised(self._volume * P)
+
+    def internal_energy(self) -> Array | float:
+        """Return V ½ E : C : E, (...) in J."""
+        return np.asarray(self.characteristics.volume * kirchhoff.energy_density(self.C, self.deformation))
+
+    def stiffness(self, q: Array | None = None) -> Array:
+        """Return V dP/dF (..., 9, 9), rows and columns as F in q."""
+        F = gradient_of(self.q if q is None else q)
+        return self._matrix(kirchhoff.piola_tangent(self.C, F))
+
+    def _matrix(self, tangent: Array) -> Array:
+        return np.asarray(self._volume * tangent.reshape(*tangent.shape[:-4], 9, 9))
+
+    def damping_load(self, q: Array, u: Array) -> Array:
+        """Return K(q) u; see `Deformable`."""
+        rows = (self.stiffness(q) @ u[..., :9, None])[..., 0]
+        return np.concatenate([rows, np.zeros_like(u[..., 9:])], axis=-1)
+
+    def mass_matrix(self) -> Array:
+        """Return the mass of Ḟ, diag(E0, E0, E0) (..., 9, 9) in kg m²."""
+        E0 = self.characteristics.euler
+        M = np.zeros((*E0.shape[:-2], 3, 3, 3, 3))
+        for i in range(3):
+            M[..., i, :, i, :] = E0
+        return M.reshape(*E0.shape[:-2], 9, 9)
+
+    def mass_solver(self) -> Solve:
+        """Return what solves M x = b."""
+        return self._solver(np.zeros((9, 9)))
+
+    def solver(self, q: Array, c: float) -> Solve:
+        """Return what solves (M + c K(q)) x = b."""
+        return self._solver(c * self.stiffness(q))
+
+    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
+        """Return what solves (M + c D) x = b; see `Deformable`."""
+        tangent = kirchhoff.piola_tangent(self.C, gradient_of(q), gradient_of(dq), damping)
+        return self._solver(c * self._matrix(tangent))
+
+    def _solver(self, stiffness: Array) -> Solve:
+        A, m = self.mass_matrix() + stiffness, self.mass[..., None]
+
+        def solve(b: Array) -> Array:
+            rows = np.linalg.solve(A, b[..., :9, None])[..., 0]
+            return np.concatenate([rows, b[..., 9:] / m], axis=-1)
+
+        return solve
+
+    def frequencies(self) -> Array:
+        """Return the nine angular frequencies (..., 9) at the configuration in rad/s, ascending; 0 if ω² < 0."""
+        L = np.linalg.inv(np.linalg.cholesky(self.mass_matrix()))
+        K = self.stiffness()
+        squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def highest_frequency(self) -> float:
+        """Return the highest angular frequency of all bodies in rad/s."""
+        return float(self.frequencies().max())
+
+    # ---- momenta --------------------------------------------------------------------------------------------
+
+    def mass_center(self) -> Array:
+        """Return x̄ (..., 3) in m."""
+        return self.q[..., 9:].copy()
+
+    def linear_momentum(self) -> Array:
+        """Return m v̄ (..., 3) in kg m/s."""
+        return np.asarray(self.mass[..., None] * self.u[..., 9:])
+
+    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
+        """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s; see `Body`."""
+        H = gradient_of(self.u) @ self.characteristics.euler @ np.swapaxes(self.deformation, -1, -2)
+        spin = 2 * axial(H)
+        if about is None:
+            return np.asarray(spin)
+        return np.asarray(spin + np.cross(self.q[..., 9:] - finite(about, "a point"), self.linear_momentum()))
+
+
+def gradient_of(q: Array) -> Array:
+    """Return F (..., 3, 3) of pseudo-rigid configurations, or Ḟ of velocities, (..., 12)."""
+    return q[..., :9].reshape(*q.shape[:-1], 3, 3)
+
+
+def _generalised(P: Array) -> Array:
+    """Return V P (..., 3, 3) as a generalised force (..., 12)."""
+    return np.concatenate([P.reshape(*P.shape[:-2], 9), np.zeros((*P.shape[:-2], 3))], axis=-1)

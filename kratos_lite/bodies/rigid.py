@@ -1,0 +1,219 @@
+"""RigidBody: a rotation and the place of the mass centre; Obstacle: one that nothing moves.
+
+Source: Solfec-1.0 theory, rigid bodies.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.bodies.body import Body, Material, elements_of, points_of, vector_of
+from kratos_lite.characteristics import Characteristics
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh
+from kratos_lite.rotations import axial, check_rotation, hat
+
+Array = NDArray[np.float64]
+
+
+class RigidBody(Body):
+    """A body that keeps its shape, or many independent ones.
+
+    q (..., 12): rotation Λ column by column (Λ11 Λ21 Λ31 Λ12 …), then the mass centre x̄ in m.
+    u (..., 6): referential angular velocity W in rad/s, then the velocity of the mass centre in m/s.
+    x = Λ (X - X̄) + x̄.
+
+    Parameters
+    ----------
+    mesh : the shape; may be left out where characteristics are given.
+    material : its density counts.
+    characteristics : mass, centre and inertia in place of those of mesh and material; with leading axes for
+        many bodies at once.
+    scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
+        ``RIG_IMP`` (momentum exact, symmetric in time).
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        If the mesh is inverted or has no volume, or there is no mass.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = RigidBody(kl.box((0.4, 0.6, 1.0)), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    >>> body.set_velocity(angular=(0, 10, 0))
+    >>> print(f"{body.mass:.0f} kg, {body.kinetic_energy():.0f} J")
+    240 kg, 1160 J
+    """
+
+    kind = "rigid"
+    dofs = 6
+    schemes: ClassVar[tuple[str, ...]] = ("RIG_NEG", "RIG_POS", "RIG_IMP")
+
+    def __init__(
+        self,
+        mesh: Mesh | None = None,
+        material: Material | None = None,
+        *,
+        characteristics: Characteristics | None = None,
+        scheme: str | None = None,
+        tolerance: float = 1e-14,
+    ) -> None:
+        if characteristics is None:
+            if mesh is None or material is None:
+                raise InputError(f"a {self.kind} body needs a mesh and a material, or its characteristics")
+            characteristics = Characteristics.of(mesh.points, elements_of(mesh, material))
+        lead = np.shape(characteristics.mass)
+        q = np.zeros((*lead, 12))
+        q[..., [0, 4, 8]] = 1.0
+        q[..., 9:] = characteristics.center
+        self.tolerance = tolerance
+        super().__init__(mesh, characteristics, q, np.zeros((*lead, 6)), scheme)
+
+    def default_scheme(self) -> str:
+        """Return ``RIG_NEG``."""
+        return "RIG_NEG"
+
+    # ---- motion ---------------------------------------------------------------------------------------
+
+    @property
+    def rotation(self) -> Array:
+        """Rotation Λ (..., 3, 3)."""
+        return rotation_of(self.q)
+
+    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
+        """Return x = Λ (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
+        q = self.q if q is None else q
+        A, many = self._arms(X)
+        x = A @ np.swapaxes(rotation_of(q), -1, -2) + q[..., None, 9:]
+        return np.asarray(x if many else x[..., 0, :])
+
+    def velocity(self, X: ArrayLike) -> Array:
+        """Return v = Λ (W × (X - X̄)) + v̄, shaped as by `position`, in m/s."""
+        A, many = self._arms(X)
+        spin = np.cross(self.u[..., None, :3], A)
+        v = spin @ np.swapaxes(self.rotation, -1, -2) + self.u[..., None, 3:]
+        return np.asarray(v if many else v[..., 0, :])
+
+    def _arms(self, X: ArrayLike) -> tuple[Array, bool]:
+        """Return X - X̄ as (..., m, 3), and whether X were many points."""
+        points = points_of(X)
+        return np.atleast_2d(points) - self.center[..., None, :], points.ndim == 2
+
+    def place(self, q: ArrayLike) -> None:
+        """Set the configuration (..., 12); see `Body.place`."""
+        q = finite(q, "a configuration")
+        if q.shape != self.q.shape:
+            raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
+        check_rotation(rotation_of(q), "the rotation of a configuration")
+        self.q = q.copy()
+
+    def turn(self, rotation: ArrayLike) -> None:
+        """Set the rotation Λ (3, 3) or (..., 3, 3) and leave the mass centre where it is."""
+        R = check_rotation(rotation)
+        q = self.q.copy()
+        q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
+        self.q = q
+
+    def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
+        """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
+        w = vector_of(angular, "an angular velocity")
+        self.u[..., 3:] = vector_of(linear, "a velocity")
+        self.u[..., :3] = (np.swapaxes(self.rotation, -1, -2) @ w[..., None])[..., 0]
+
+    # ---- forces -----------------------------------------------------------------------------------------
+
+    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.rows`."""
+        return np.arange(6), np.hstack([-rotation_of(q) @ hat(X - self.center), np.eye(3)])
+
+    def push(self, X: Array, force: Array, q: Array) -> Array:
+        """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.push`."""
+        f = np.broadcast_to(force, (*q.shape[:-1], 3))
+        referential = (np.swapaxes(rotation_of(q), -1, -2) @ f[..., None])[..., 0]
+        return np.concatenate([np.cross(X - self.center, referential), f], axis=-1)
+
+    def push_nodes(self, forces: Array, q: Array) -> Array:
+        """Return the resultant torque and force of nodal forces; see `Body.push_nodes`."""
+        assert self.mesh is not None
+        A = self.mesh.points - self.center[..., None, :]
+        moments = np.swapaxes(A, -1, -2) @ (forces @ rotation_of(q))
+        resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
+        return np.concatenate([2 * axial(np.swapaxes(moments, -1, -2)), resultant], axis=-1)
+
+    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return Λ times the vector; see `Body.convected`."""
+        return np.asarray(rotation_of(q) @ vector)
+
+    def times_mass(self, v: Array) -> Array:
+        """Return J W and m v̄; see `Body.times_mass`."""
+        spin = (self.characteristics.inertia @ v[..., :3, None])[..., 0]
+        return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
+
+    # ---- momenta --------------------------------------------------------------------------------------------
+
+    def mass_center(self) -> Array:
+        """Return x̄ (..., 3) in m."""
+        return self.q[..., 9:].copy()
+
+    def linear_momentum(self) -> Array:
+        """Return m v̄ (..., 3) in kg m/s."""
+        return np.asarray(self.mass[..., None] * self.u[..., 3:])
+
+    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
+        """Return Λ J W and the moment of the linear momentum, (..., 3) in kg m²/s; see `Body`."""
+        spin = (self.rotation @ self.times_mass(self.u)[..., :3, None])[..., 0]
+        if about is None:
+            return np.asarray(spin)
+        return np.asarray(spin + np.cross(self.q[..., 9:] - finite(about, "a point"), self.linear_momentum()))
+
+
+def rotation_of(q: Array) -> Array:
+    """Return the rotation (..., 3, 3) of rigid configurations (..., 12)."""
+    return np.swapaxes(q[..., :9].reshape(*q.shape[:-1], 3, 3), -1, -2)
+
+
+class Obstacle(RigidBody):
+    """A body that nothing pushes: it stands, or moves as `set_velocity` says.
+
+    Its vectors are those of a rigid body; it carries neither mass nor energy, and takes no loads.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> floor = Obstacle(kl.box((10.0, 10.0, 0.1)))
+    >>> floor.set_velocity(linear=(0.5, 0, 0))
+    >>> for state in kl.march(floor, dt=0.1, steps=20):
+    ...     pass
+    >>> floor.mass_center().round(12).tolist()
+    [6.0, 5.0, 0.05]
+    """
+
+    kind = "obstacle"
+
+    def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
+        from kratos_lite.materials import Isotropic3D
+
+        shape = Characteristics.of(mesh.points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0)))
+        super().__init__(mesh, characteristics=shape)
+
+    @property
+    def mass(self) -> Array:
+        """Return 0: an obstacle carries no mass."""
+        return np.zeros_like(self.characteristics.mass)
+
+    def times_mass(self, v: Array) -> Array:
+        """Return zeros."""
+        return np.zeros_like(v)
+
+    def add(self, load: object, factor: object = 1.0) -> None:
+        """Raise ModelError: nothing pushes an obstacle."""
+        raise ModelError("nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody")
+
+    def constrain(self, constraint: object) -> None:
+        """Raise ModelError: an obstacle needs no support."""
+        raise ModelError("an obstacle needs no constraint: it stands, or moves as set_velocity says")
