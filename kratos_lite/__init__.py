@@ -11,6 +11,31 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from kratos_lite.bodies import (
+        BODIES,
+        Body,
+        Callback,
+        FiniteElementBody,
+        FixDirection,
+        FixPoint,
+        FollowerPressure,
+        Force,
+        Obstacle,
+        PseudoRigidBody,
+        RigidBody,
+        RigidLink,
+        SetAcceleration,
+        SetDisplacement,
+        SetVelocity,
+        Spring,
+        State,
+        TimeSeries,
+        Torque,
+        convert,
+        equilibrium,
+        march,
+    )
+    from kratos_lite.characteristics import Characteristics
     from kratos_lite.elements import (
         ELEMENTS,
         KinematicLinear,
@@ -45,6 +70,12 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "kratos_lite.bodies": (
+        "BODIES Body Callback FiniteElementBody FixDirection FixPoint FollowerPressure Force Obstacle "
+        "PseudoRigidBody RigidBody RigidLink SetAcceleration SetDisplacement SetVelocity Spring State "
+        "TimeSeries Torque convert equilibrium march"
+    ),
+    "kratos_lite.characteristics": "Characteristics",
     "kratos_lite.elements": (
         "ELEMENTS KinematicLinear KinematicLinear3D4N KinematicLinear3D5N KinematicLinear3D6N "
         "KinematicLinear3D8N KinematicLinear3D10N KinematicLinear3D13N KinematicLinear3D15N "
@@ -63,10 +94,19 @@ _HOME = {
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
 __all__ = [
+    "BODIES",
     "ELEMENTS",
     "MATERIALS",
     "Block",
+    "Body",
     "BodyForce",
+    "Callback",
+    "Characteristics",
+    "FiniteElementBody",
+    "FixDirection",
+    "FixPoint",
+    "FollowerPressure",
+    "Force",
     "Gravity",
     "InputError",
     "Isotropic3D",
@@ -89,18 +129,32 @@ __all__ = [
     "Model",
     "ModelError",
     "NodalForces",
+    "Obstacle",
     "Orthotropic3D",
     "Part",
     "PointLoad",
     "Pressure",
+    "PseudoRigidBody",
     "Result",
+    "RigidBody",
+    "RigidLink",
+    "SetAcceleration",
+    "SetDisplacement",
+    "SetVelocity",
     "Shape",
     "SolveError",
+    "Spring",
+    "State",
+    "TimeSeries",
+    "Torque",
     "Traction",
     "__version__",
     "annulus",
     "box",
+    "convert",
     "element_picture",
+    "equilibrium",
+    "march",
     "picture",
     "read",
     "write",

@@ -20,7 +20,6 @@ from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.errors import MaterialError
-from kratos_lite.native import kernels
 
 Array = NDArray[np.float64]
 SAME_SHAPE = 1e-10

@@ -31,7 +31,8 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
 
     Returns
     -------
-    omega (count,) in rad/s, ascending; rigid motions have 0 but for rounding.  shapes (n, count) with φ^T M φ = 1.
+    omega (count,) in rad/s, ascending; rigid motions have 0 but for rounding.
+    shapes (n, count) with φ^T M φ = 1.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def _by_iteration(K: Any, M: Any, count: int) -> tuple[Array, Array]:
     n = K.shape[0]
     shift = 1e-4 * K.diagonal().sum() / M.diagonal().sum()
     factors = direct.factorise((K + shift * M).tocsr())
-    inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)  # type: ignore[call-arg]
+    inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
     squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start)
     order = np.argsort(squares)

@@ -1,7 +1,7 @@
 """Rotations: hat, exponential map, its derivative, and the polar rotation of a matrix.
 
 All functions take one vector (3,) or matrix (3, 3), or many through leading axes.
-Source: Solfec-1.0 theory, rigid rotations; Marsden & Ratiu, Introduction to Mechanics and Symmetry (1999), ch. 9.
+Source: Solfec-1.0 theory, rigid rotations; Marsden & Ratiu, Introduction to Mechanics and Symmetry (1999).
 """
 
 from __future__ import annotations

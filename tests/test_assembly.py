@@ -279,7 +279,9 @@ def transport(element, material):
     return np.einsum("mg,ga,mgb->mab", dV, N, D[..., 0, :])
 
 
-@pytest.mark.parametrize("kernel", [lambda e, material: e.scalar_mass(material.density), transport], ids=["mass", "transport"])
+@pytest.mark.parametrize(
+    "kernel", [lambda e, material: e.scalar_mass(material.density), transport], ids=["mass", "transport"]
+)
 @pytest.mark.parametrize("name", ["KinematicLinear3D4N", "KinematicLinear3D8N", "KinematicLinear3D20N"])
 def test_scalar_matrices(path, name, kernel):
     points, batches = scene(name, distortion=0.02)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -37,6 +38,14 @@ BODIES: Registry[type[Body]] = Registry("kind of body")
 """Every kind of body by its class name and by its `kind`."""
 
 
+@dataclass
+class Clock:
+    """Time in s and number of steps; bodies that advance together share one."""
+
+    time: float = 0.0
+    step: int = 0
+
+
 class Body(ABC):
     """A body in motion.
 
@@ -45,8 +54,9 @@ class Body(ABC):
     kind : name of the kind, as in input files.
     q, u : configuration and velocity; their layout is that of the kind.
     time, step : s, and number of steps taken.
-    mesh : the shape, or None for a body that is given by its characteristics alone.
+    mesh, material : the shape and what it is made of, or None for a body given by its characteristics.
     characteristics : mass, volume, mass centre, Euler and inertia tensor.
+    tolerance : relative size of the last Newton step of an implicit scheme.
     damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
     external_work : work of loads and reactions since the start, J.
     """
@@ -54,6 +64,7 @@ class Body(ABC):
     kind: ClassVar[str]
     schemes: ClassVar[tuple[str, ...]] = ()
     dofs: int
+    tolerance: float
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -63,19 +74,19 @@ class Body(ABC):
     def __init__(
         self,
         mesh: Mesh | None,
+        material: Material | None,
         characteristics: Characteristics,
         q: Array,
         u: Array,
         scheme: str | None,
         damping: float = 0.0,
     ) -> None:
-        self.mesh, self.characteristics = mesh, characteristics
+        self.mesh, self.material, self.characteristics = mesh, material, characteristics
         self.q, self.u = q, u
-        self.time, self.step = 0.0, 0
+        self.clock = Clock()
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
-        self.reactions: list[Array] = []
         self.scheme = scheme or self.default_scheme()
         self.damping = self._checked_damping(damping)
 
@@ -163,7 +174,25 @@ class Body(ABC):
         """
         raise ModelError(f"a {self.kind} body has no stiffness; a pseudo-rigid or finite-element one has")
 
-    # ---- characteristics -----------------------------------------------------------------------------
+    @property
+    def time(self) -> float:
+        """Time in s."""
+        return self.clock.time
+
+    @time.setter
+    def time(self, value: float) -> None:
+        self.clock.time = value
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return self.clock.step
+
+    @step.setter
+    def step(self, value: int) -> None:
+        self.clock.step = value
+
+    # ---- characteristics -------------------------------------------------------------------------
 
     @property
     def mass(self) -> Array:
@@ -194,7 +223,7 @@ class Body(ABC):
             raise InputError(f"a damping must be one number of seconds, ≥ 0; got {value}")
         return float(damping)
 
-    # ---- loads and constraints ---------------------------------------------------------------------------
+    # ---- loads and constraints -------------------------------------------------------------------
 
     def add(self, load: BodyLoad | Load, factor: Factor = 1.0) -> None:
         """Let a load act.
@@ -228,7 +257,21 @@ class Body(ABC):
             total += load(q, self.u, t)
         return total
 
-    # ---- energies ------------------------------------------------------------------------------------------
+    def constant_loads(self) -> tuple[Array, Array, Array]:
+        """Return the constant loads: acceleration (..., 3), forces (..., dofs) fixed in space, and in the body."""
+        lead = self.q.shape[:-1]
+        acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
+        for load in self.loads:
+            factor = load.factor(self.time)
+            if load.acceleration is not None:
+                acceleration += factor * load.acceleration
+            if load.spatial is not None:
+                spatial += factor * load.spatial
+            if load.convected is not None:
+                convected += factor * load.convected
+        return acceleration, spatial, convected
+
+    # ---- energies --------------------------------------------------------------------------------
 
     def kinetic_energy(self) -> Array | float:
         """Return ½ ∫ρ v·v dV, (...) in J."""

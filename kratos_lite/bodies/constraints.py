@@ -52,10 +52,10 @@ class Constraint(ABC):
             raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
         if self._body is not None and self._body is not body:
             raise ModelError("this constraint holds another body already; make one for each body")
-        inside(body, self.points, "a constraint")
+        inside(body, self.points)
         self._body, self._start = body, body.position(self.points)
 
-    def begin(self, body: Body, h: float) -> None:
+    def begin(self, body: Body, h: float) -> None:  # noqa: B027 - most have nothing to prepare
         """Prepare a step of h s from the state of the body."""
 
     @abstractmethod
@@ -69,14 +69,30 @@ class Constraint(ABC):
         Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
         """
 
-    def rows(self, body: Body, q: Array) -> Array:
-        """Return H (m r, dofs): velocities of the points along their directions are H u."""
+    def entries(self, body: Body, q: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Return rows, dofs and values of H (m r, dofs): points move along their directions with H u."""
         directions = self.directions(body.position(self.points, q))
-        H = np.zeros((*directions.shape[:2], body.dofs))
+        row, dof, value = [], [], []
         for i, X in enumerate(self.points):
             dofs, matrix = body.rows(X, q)
-            H[i][:, dofs] = directions[i] @ matrix
-        return H.reshape(-1, body.dofs)
+            block = directions[i] @ matrix
+            r, k = np.nonzero(np.abs(block) > 1e-14 * np.abs(matrix).max())
+            row.append(r + i * len(block))
+            dof.append(dofs[k])
+            value.append(block[r, k])
+        return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
+
+    def rows(self, body: Body, q: Array) -> Array:
+        """Return H (m r, dofs) as a full matrix."""
+        row, dof, value = self.entries(body, q)
+        H = np.zeros((self.count, body.dofs))
+        H[row, dof] = value
+        return H
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.points)
 
     def gaps(self, body: Body, q: Array, u: Array, time: float, h: float) -> Array:
         """Return the gaps (m r,) at the end of a step in m/s."""
@@ -99,6 +115,11 @@ class FixPoint(Constraint):
     ----------
     points : (3,) or (m, 3) m, in the undeformed body.
     """
+
+    @property
+    def count(self) -> int:
+        """Number of rows: three for each point."""
+        return 3 * len(self.points)
 
     def directions(self, x: Array) -> Array:
         """Return x, y and z."""
@@ -148,8 +169,8 @@ class SetDisplacement(Along):
     Parameters
     ----------
     points, direction : as for `FixDirection`.
-    displacement : m, number, `TimeSeries` or function of the time; its change since the constraint was made is
-        what the points move.
+    displacement : m, number, `TimeSeries` or function of the time; the points move by its change since the
+        constraint was made.
     """
 
     def __init__(self, points: ArrayLike, direction: ArrayLike, displacement: Factor) -> None:
@@ -243,5 +264,3 @@ class RigidLink(Constraint):
         """Return by how much the link is too long; see `Constraint.gap`."""
         stretch = np.linalg.norm(x - self.anchor, axis=1) - self.length
         return np.asarray(stretch[:, None] * (2 / h))
-
-

@@ -74,7 +74,9 @@ class FiniteElementBody(Deformable):
         self.batches = elements_of(mesh, material)
         lost = mesh.node_ids[~mesh.used_nodes()]
         if len(lost):
-            raise ModelError(f"node {lost[0]} belongs to no element, so it has no mass; leave it out of the mesh")
+            raise ModelError(
+                f"node {lost[0]} belongs to no element, so it has no mass; leave it out of the mesh"
+            )
         self.points, self.tolerance, self.dofs = mesh.points, tolerance, 3 * mesh.n_nodes
         characteristics = Characteristics.of(mesh.points, self.batches)
         pattern = Pattern(mesh.n_nodes, [batch.nodes for batch in self.batches])
@@ -83,7 +85,9 @@ class FiniteElementBody(Deformable):
         self.form = self._form(form, modes)
         self.schemes = self.form.schemes  # type: ignore[misc]
         self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
-        super().__init__(mesh, characteristics, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping)
+        super().__init__(
+            mesh, material, characteristics, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
+        )
 
     def _form(self, name: str, count: int | None) -> Form:
         kind = FORMS[name]
@@ -97,7 +101,7 @@ class FiniteElementBody(Deformable):
         """Return the most robust scheme that the form has."""
         return self.form.schemes[0]
 
-    # ---- motion ---------------------------------------------------------------------------------------
+    # ---- motion ----------------------------------------------------------------------------------
 
     @property
     def displacement(self) -> Array:
@@ -123,7 +127,7 @@ class FiniteElementBody(Deformable):
         if X is self.points:
             return nodal.copy()
         points = points_of(X)
-        located = self.mesh.locate(np.atleast_2d(points), required=True)
+        located = self.mesh.locate(np.atleast_2d(points)).require()
         return np.asarray(located.interpolate(nodal).reshape(points.shape))
 
     def place(self, q: ArrayLike) -> None:
@@ -150,15 +154,15 @@ class FiniteElementBody(Deformable):
         """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
         key = X.tobytes()
         if key not in self._known:
-            self._known[key] = self.mesh.locate(X[None], required=True).nodes_and_weights()
+            self._known[key] = self.mesh.locate(X[None]).require().nodes_and_weights()
         return self._known[key]
 
-    # ---- forces -----------------------------------------------------------------------------------------
+    # ---- forces ----------------------------------------------------------------------------------
 
     def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
         """Return dofs of the nodes around X and H = N(X) 1; see `Body.rows`."""
         nodes, N = self._at(X)
-        return (3 * nodes[:, None] + np.arange(3)).ravel(), np.kron(N, np.eye(3))
+        return (3 * nodes[:, None] + np.arange(3)).ravel(), (np.eye(3)[:, None] * N[:, None]).reshape(3, -1)
 
     def push(self, X: Array, force: Array, q: Array) -> Array:
         """Return N_a(X) f at the nodes; see `Body.push`."""
@@ -173,7 +177,7 @@ class FiniteElementBody(Deformable):
 
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `Body.convected`."""
-        located = self.mesh.locate(X[None], required=True)
+        located = self.mesh.locate(X[None]).require()
         block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
         assert block.shape is not None
         dN = block.shape.dN(located.xi[0])
@@ -184,7 +188,7 @@ class FiniteElementBody(Deformable):
         """Return M v (3n,); see `Body.times_mass`."""
         return self._mass.times(v)
 
-    # ---- deformation ------------------------------------------------------------------------------------
+    # ---- deformation -----------------------------------------------------------------------------
 
     def internal_load(self, q: Array | None = None) -> Array:
         """Return the internal load of the form, (3n,) in N."""
@@ -223,17 +227,17 @@ class FiniteElementBody(Deformable):
         return self.form.highest_frequency(self.q)
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
-        """Return the lowest natural frequencies (count,) of the free undeformed body in rad/s, and their shapes.
+        """Return the lowest natural frequencies of the free undeformed body, and their shapes.
 
-        Shapes are (3n, count) with φ^T M φ = 1; the first six are the rigid motions.
+        Frequencies are (count,) in rad/s, shapes (3n, count) with φ^T M φ = 1; the first six are the rigid motions.
         """
         return modes(self.form.K0.scipy().tocsr(), self._mass.matrix(), count)
 
-    # ---- momenta --------------------------------------------------------------------------------------------
+    # ---- momenta ---------------------------------------------------------------------------------
 
     @cached_property
     def _shares(self) -> Array:
-        return self._mass.nodal / self._mass.nodal.sum()
+        return np.asarray(self._mass.nodal / self._mass.nodal.sum())
 
     def mass_center(self) -> Array:
         """Return x̄ (3,) in m."""
@@ -248,5 +252,3 @@ class FiniteElementBody(Deformable):
         origin = self.mass_center() if about is None else vector_of(about, "a point")
         arms = self.points + self.displacement - origin
         return np.asarray(np.cross(arms, self.times_mass(self.u).reshape(-1, 3)).sum(axis=0))
-
-

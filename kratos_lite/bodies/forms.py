@@ -26,7 +26,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.modes import modes
 from kratos_lite.registry import Registry
 from kratos_lite.rotations import polar
-from kratos_lite.solvers.banded import Banded
+from kratos_lite.solvers.banded import Factoriser
 
 Array = NDArray[np.float64]
 
@@ -61,8 +61,12 @@ class Form(ABC):
         return self.mass.pattern
 
     @cached_property
-    def _band(self) -> Banded:
-        return Banded(self.pattern)
+    def _factoriser(self) -> Factoriser:
+        return Factoriser(self.pattern)
+
+    @cached_property
+    def _factoriser_unsymmetric(self) -> Factoriser:
+        return Factoriser(self.pattern, symmetric=False)
 
     @cached_property
     def K0(self) -> BlockMatrix:
@@ -73,7 +77,8 @@ class Form(ABC):
         """Return what solves (M + c K) x = b."""
         A = BlockMatrix(c * K.data, K.indices, K.indptr)
         self.mass.add_to(A)
-        return self._band.factorise(A, symmetric=symmetric).solve
+        factoriser = self._factoriser if symmetric else self._factoriser_unsymmetric
+        return factoriser.factorise(A).solve
 
     @abstractmethod
     def load(self, q: Array) -> Array:
@@ -214,7 +219,7 @@ class Corotational(Form):
             columns = b.reshape(len(self._Z), 3, -1)
             seen = np.einsum("nik,ij->njk", columns, R).reshape(b.shape)
             x = solve(seen).reshape(columns.shape)
-            return np.einsum("njk,ij->nik", x, R).reshape(b.shape)
+            return np.asarray(np.einsum("njk,ij->nik", x, R).reshape(b.shape))
 
         return rotated
 

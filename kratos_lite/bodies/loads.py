@@ -60,6 +60,18 @@ class Bound:
     convected: Array | None = None
     potential_energy: Callable[[Array], Array] = _no_potential
 
+    @classmethod
+    def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> Bound:
+        """Return constant loads on many bodies, for compiled steps alone."""
+
+        def generalised(q: Array, u: Array, time: float) -> Array:
+            raise ModelError("loads of many bodies are known only to steps that take them all at once")
+
+        def potential(q: Array) -> Array:
+            return np.asarray(-(mass * (acceleration * q[..., 9:]).sum(axis=-1)))
+
+        return cls(generalised, lambda t: 1.0, True, acceleration, spatial, convected, potential)
+
     def __call__(self, q: Array, u: Array, time: float) -> Array:
         """Return the generalised force (..., dofs) at a configuration, a velocity and a time."""
         return self.factor(time) * self.generalised(q, u, time)
@@ -105,9 +117,7 @@ def _gravity(g: Array, body: Body, factor: Callable[[float], float], steady: boo
             return np.asarray(-(pull @ q) - mass * (g @ body.center))
         return np.asarray(-mass * (q[..., 9:] @ g))
 
-    return Bound(
-        lambda q, u, t: pull, factor, steady, acceleration=g, spatial=pull, potential_energy=potential
-    )
+    return Bound(lambda q, u, t: pull, factor, steady, acceleration=g, potential_energy=potential)
 
 
 def uniform(body: Body, v: Array) -> Array:
@@ -126,7 +136,9 @@ def _dead(load: Load, body: Body, factor: Callable[[float], float], steady: bool
     batches = (
         body.batches
         if isinstance(body, FiniteElementBody)
-        else elements_of(body.mesh, getattr(body, "material", None) or Isotropic3D(1.0, 0.0, float(body.mass)))
+        else elements_of(
+            body.mesh, getattr(body, "material", None) or Isotropic3D(1.0, 0.0, float(body.mass))
+        )
     )
     f = load.forces(body.mesh, batches)
 
@@ -157,7 +169,7 @@ class Force(BodyLoad):
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, self.force
-        inside(body, X, "a force")
+        inside(body, X)
         if self.frame == "convected":
             fixed = body.push(X, f, _upright(body)) if isinstance(body, RigidBody) else None
             return Bound(
@@ -190,7 +202,7 @@ class Torque(BodyLoad):
         """Return the load on a body; ModelError unless it is rigid."""
         if not isinstance(body, RigidBody):
             raise ModelError(
-                f"a torque acts on rigid bodies; a {body.kind} one takes a pair of forces: kl.Force at two points"
+                f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces: kl.Force at two points"
             )
         zero, t = np.zeros(3), self.torque
         fixed = np.broadcast_to(np.concatenate([t, zero]), body.u.shape)
@@ -276,7 +288,7 @@ class Spring(BodyLoad):
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, anchor = self.point, self.anchor
-        inside(body, X, "a spring")
+        inside(body, X)
         L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
 
         def generalised(q: Array, u: Array, time: float) -> Array:
@@ -308,8 +320,8 @@ class Callback(BodyLoad):
 
     Parameters
     ----------
-    function : takes configuration q, velocity u and time t in s, and returns the generalised force (..., dofs);
-        for a rigid body also nine numbers: spatial force, spatial torque and referential torque.
+    function : takes configuration q, velocity u and time t in s, and returns the generalised force
+        (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
 
     Examples
     --------
@@ -351,10 +363,10 @@ def one_point(X: ArrayLike) -> Array:
     return point
 
 
-def inside(body: Body, X: Array, what: str) -> None:
-    """Raise MeshError if X is not a point of the body."""
+def inside(body: Body, X: Array) -> None:
+    """Raise MeshError if points X are not all of the body."""
     if body.mesh is not None:
-        body.mesh.locate(np.atleast_2d(X), required=what)
+        body.mesh.locate(np.atleast_2d(X)).require()
 
 
 def _upright(body: Body) -> Array:
@@ -368,4 +380,3 @@ def _checked_frame(frame: str) -> str:
     if frame not in FRAMES:
         raise InputError(f"frame must be 'spatial' or 'convected'; got {frame!r}")
     return frame
-

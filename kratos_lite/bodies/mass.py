@@ -36,12 +36,13 @@ class Mass:
 
         self.lumped, self.pattern = lumped, pattern
         self.scalar: csr_array[Any, Any]
+        self.nodal: Array
         if lumped:
             self.nodal = fields.lumped_mass(points, batches)
             self.scalar = diags_array(self.nodal, format="csr")
             return
         self.scalar = assemble_scalar(points, batches, pattern, lambda e, m: e.scalar_mass(m.density))
-        self.nodal = np.asarray(self.scalar.sum(axis=1)).ravel()
+        self.nodal = self.scalar @ np.ones(len(points))
 
     def times(self, v: Array) -> Array:
         """Return M v of nodal vectors (3n,)."""
@@ -70,4 +71,3 @@ class Mass:
     @cached_property
     def _factors(self) -> direct.Factorisation:
         return direct.factorise(self.scalar)
-

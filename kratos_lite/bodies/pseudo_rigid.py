@@ -15,7 +15,7 @@ from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.characteristics import Characteristics
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.rotations import axial, hat
@@ -74,15 +74,15 @@ class PseudoRigidBody(Deformable):
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its characteristics")
             characteristics = Characteristics.of(mesh.points, elements_of(mesh, material))
-        characteristics.check_euler()
+        characteristics.check_deformable()
         lead = np.shape(characteristics.mass)
         q = np.zeros((*lead, 12))
         q[..., [0, 4, 8]] = 1.0
         q[..., 9:] = characteristics.center
-        self.material, self.C, self.tolerance = material, material.C, tolerance
-        super().__init__(mesh, characteristics, q, np.zeros((*lead, 12)), scheme, damping)
+        self.C, self.tolerance = material.C, tolerance
+        super().__init__(mesh, material, characteristics, q, np.zeros((*lead, 12)), scheme, damping)
 
-    # ---- motion ---------------------------------------------------------------------------------------
+    # ---- motion ----------------------------------------------------------------------------------
 
     @property
     def deformation(self) -> Array:
@@ -110,7 +110,9 @@ class PseudoRigidBody(Deformable):
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
         lowest = float(np.linalg.det(gradient_of(q)).min())
         if lowest <= 0:
-            raise InputError(f"a deformation gradient must have det F > 0; got {lowest:g}: it turns the body over")
+            raise InputError(
+                f"a deformation gradient needs det F > 0; got {lowest:g}: it turns the body over"
+            )
         self.q = q.copy()
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
@@ -119,7 +121,7 @@ class PseudoRigidBody(Deformable):
         self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
         self.u[..., 9:] = vector_of(linear, "a velocity")
 
-    # ---- forces -----------------------------------------------------------------------------------------
+    # ---- forces ----------------------------------------------------------------------------------
 
     def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
         """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.rows`."""
@@ -148,7 +150,7 @@ class PseudoRigidBody(Deformable):
         rows = (gradient_of(v) @ self.characteristics.euler).reshape(*v.shape[:-1], 9)
         return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
 
-    # ---- deformation ------------------------------------------------------------------------------------
+    # ---- deformation -----------------------------------------------------------------------------
 
     @property
     def _volume(self) -> Array:
@@ -212,7 +214,7 @@ class PseudoRigidBody(Deformable):
         return solve
 
     def frequencies(self) -> Array:
-        """Return the nine angular frequencies (..., 9) at the configuration in rad/s, ascending; 0 if ω² < 0."""
+        """Return the angular frequencies (..., 9) at the configuration in rad/s, ascending; 0 if ω² < 0."""
         L = np.linalg.inv(np.linalg.cholesky(self.mass_matrix()))
         K = self.stiffness()
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))
@@ -222,7 +224,7 @@ class PseudoRigidBody(Deformable):
         """Return the highest angular frequency of all bodies in rad/s."""
         return float(self.frequencies().max())
 
-    # ---- momenta --------------------------------------------------------------------------------------------
+    # ---- momenta ---------------------------------------------------------------------------------
 
     def mass_center(self) -> Array:
         """Return x̄ (..., 3) in m."""

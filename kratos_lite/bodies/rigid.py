@@ -72,13 +72,13 @@ class RigidBody(Body):
         q[..., [0, 4, 8]] = 1.0
         q[..., 9:] = characteristics.center
         self.tolerance = tolerance
-        super().__init__(mesh, characteristics, q, np.zeros((*lead, 6)), scheme)
+        super().__init__(mesh, material, characteristics, q, np.zeros((*lead, 6)), scheme)
 
     def default_scheme(self) -> str:
         """Return ``RIG_NEG``."""
         return "RIG_NEG"
 
-    # ---- motion ---------------------------------------------------------------------------------------
+    # ---- motion ----------------------------------------------------------------------------------
 
     @property
     def rotation(self) -> Array:
@@ -125,7 +125,7 @@ class RigidBody(Body):
         self.u[..., 3:] = vector_of(linear, "a velocity")
         self.u[..., :3] = (np.swapaxes(self.rotation, -1, -2) @ w[..., None])[..., 0]
 
-    # ---- forces -----------------------------------------------------------------------------------------
+    # ---- forces ----------------------------------------------------------------------------------
 
     def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
         """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.rows`."""
@@ -154,7 +154,7 @@ class RigidBody(Body):
         spin = (self.characteristics.inertia @ v[..., :3, None])[..., 0]
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
-    # ---- momenta --------------------------------------------------------------------------------------------
+    # ---- momenta ---------------------------------------------------------------------------------
 
     def mass_center(self) -> Array:
         """Return x̄ (..., 3) in m."""
@@ -199,7 +199,7 @@ class Obstacle(RigidBody):
         from kratos_lite.materials import Isotropic3D
 
         shape = Characteristics.of(mesh.points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0)))
-        super().__init__(mesh, characteristics=shape)
+        super().__init__(mesh, material, characteristics=shape)
 
     @property
     def mass(self) -> Array:
@@ -212,7 +212,9 @@ class Obstacle(RigidBody):
 
     def add(self, load: object, factor: object = 1.0) -> None:
         """Raise ModelError: nothing pushes an obstacle."""
-        raise ModelError("nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody")
+        raise ModelError(
+            "nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody"
+        )
 
     def constrain(self, constraint: object) -> None:
         """Raise ModelError: an obstacle needs no support."""

@@ -112,7 +112,8 @@ def _balanced(body: Deformable, h: float, extra: Array, solve: Solve, loads: lis
             solve = body.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
         last = size
     raise SolveError(
-        f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; take a shorter step"
+        f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; "
+        "take a shorter step"
     )
 
 
@@ -120,7 +121,13 @@ def _balanced(body: Deformable, h: float, extra: Array, solve: Solve, loads: lis
 
 
 def _finish(
-    body: Body, h: float, qh: Array, load: Array, advance: Advance, solve: Solve, loads: list[Array] | None = None
+    body: Body,
+    h: float,
+    qh: Array,
+    load: Array,
+    advance: Advance,
+    solve: Solve,
+    loads: list[Array] | None = None,
 ) -> Array:
     """Take the step, with the reactions of the constraints; return load and reactions at the middle."""
     if not body.constraints:
@@ -129,7 +136,9 @@ def _finish(
     for constraint in body.constraints:
         constraint.begin(body, h)
     H = np.concatenate([constraint.rows(body, qh) for constraint in body.constraints])
-    response = h * (H @ solve(np.ascontiguousarray(H.T)) if body.dofs > 12 else H @ np.stack([solve(r) for r in H], 1))
+    response = h * (
+        H @ solve(np.ascontiguousarray(H.T)) if body.dofs > 12 else H @ np.stack([solve(r) for r in H], 1)
+    )
     inverse = np.linalg.pinv(response, rcond=1e-12, hermitian=True)
     multipliers, last, q, u = np.zeros(len(H)), np.inf, body.q, body.u
     for _ in range(NEWTON_MAX):
@@ -147,9 +156,8 @@ def _finish(
         raise SolveError(_unmet(body, h))
     at = 0
     for constraint in body.constraints:
-        rows = len(constraint.rows(body, qh))
-        constraint.react(body, qh, multipliers[at : at + rows])
-        at += rows
+        constraint.react(body, qh, multipliers[at : at + constraint.count])
+        at += constraint.count
     body.q, body.u = q, u
     return (load if loads is None else loads[0]) + H.T @ multipliers
 

@@ -1,0 +1,50 @@
+"""Bodies in motion: rigid, pseudo-rigid and finite-element, with one protocol for all.
+
+Source: Solfec-1.0, theory manual.
+"""
+
+from kratos_lite.bodies.body import BODIES, Body
+from kratos_lite.bodies.constraints import (
+    Constraint,
+    FixDirection,
+    FixPoint,
+    RigidLink,
+    SetAcceleration,
+    SetDisplacement,
+    SetVelocity,
+)
+from kratos_lite.bodies.conversion import convert
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.loads import Callback, FollowerPressure, Force, Spring, Torque
+from kratos_lite.bodies.marching import march
+from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
+from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.series import TimeSeries
+from kratos_lite.bodies.state import State
+from kratos_lite.bodies.statics import equilibrium
+
+__all__ = [
+    "BODIES",
+    "Body",
+    "Callback",
+    "Constraint",
+    "FiniteElementBody",
+    "FixDirection",
+    "FixPoint",
+    "FollowerPressure",
+    "Force",
+    "Obstacle",
+    "PseudoRigidBody",
+    "RigidBody",
+    "RigidLink",
+    "SetAcceleration",
+    "SetDisplacement",
+    "SetVelocity",
+    "Spring",
+    "State",
+    "TimeSeries",
+    "Torque",
+    "convert",
+    "equilibrium",
+    "march",
+]

@@ -1,0 +1,83 @@
+"""Conversion: the same body, in the same motion, as another kind."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
+from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.rotations import hat, polar
+
+Array = NDArray[np.float64]
+Kind = TypeVar("Kind", RigidBody, PseudoRigidBody, FiniteElementBody)
+
+
+def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
+    """Return the body as another kind, in the motion that this kind can have.
+
+    A rigid one gets the rotation by polar decomposition, and keeps both momenta; a pseudo-rigid one the
+    affine motion that is nearest with respect to mass; a finite-element one the affine motion exactly.
+    Loads and constraints do not go along: they are bound to the body that they were added to.
+
+    Parameters
+    ----------
+    body : a single body with a mesh and a material.
+    kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`.
+    options : further arguments of the kind, such as ``form="BC"``.
+
+    Raises
+    ------
+    InputError, ModelError
+        The kind is unknown, or the body has no mesh.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> rigid = kl.RigidBody(kl.box((0.4, 0.6, 1.0)), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    >>> rigid.set_velocity(angular=(0.05, 10, 0.05))
+    >>> soft = convert(rigid, kl.FiniteElementBody)
+    >>> print(f"{rigid.kinetic_energy():.3f} J, {soft.kinetic_energy():.3f} J")
+    1160.047 J, 1160.047 J
+    """
+    if kind not in (RigidBody, PseudoRigidBody, FiniteElementBody):
+        raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
+    if body.q.ndim > 1 or body.mesh is None or body.material is None:
+        raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
+    F, rate = affine(body)
+    center, velocity = body.mass_center(), body.linear_momentum() / body.mass
+    other = kind(body.mesh, body.material, **options)
+    if isinstance(other, FiniteElementBody):
+        arms = other.points - body.center
+        other.place(arms @ F.T + center - other.points)
+        other.u = (arms @ rate.T + velocity).ravel()
+    elif isinstance(other, PseudoRigidBody):
+        other.place(np.concatenate([F.ravel(), center]))
+        other.u = np.concatenate([rate.ravel(), velocity])
+    else:
+        other.place(np.concatenate([polar(F).T.ravel(), center]))
+        spin = other.rotation.T @ body.angular_momentum()
+        other.u = np.concatenate([np.linalg.solve(other.characteristics.inertia, spin), velocity])
+    other.time, other.step = body.time, body.step
+    return other
+
+
+def affine(body: Body) -> tuple[Array, Array]:
+    """Return F and Ḟ (3, 3) of the affine motion that is nearest to that of a body with respect to mass."""
+    if isinstance(body, RigidBody):
+        return body.rotation, body.rotation @ hat(body.u[:3])
+    if isinstance(body, PseudoRigidBody):
+        return body.deformation.copy(), body.u[:9].reshape(3, 3).copy()
+    assert isinstance(body, FiniteElementBody)
+    arms = body.points - body.center
+    weighted = body.times_mass(arms.ravel()).reshape(-1, 3)
+    inverse = np.linalg.inv(weighted.T @ arms)
+    return (
+        np.eye(3) + (body.displacement - body.mass_center() + body.center).T @ weighted @ inverse,
+        (body.u.reshape(-1, 3)).T @ weighted @ inverse,
+    )

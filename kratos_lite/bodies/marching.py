@@ -1,0 +1,196 @@
+"""March: bodies in time, step by step."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.assembly import Progress
+from kratos_lite.bodies import steps
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.many import together
+from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
+from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.schemes import SCHEMES
+from kratos_lite.bodies.state import State
+from kratos_lite.errors import InputError, SolveError
+
+Array = NDArray[np.float64]
+
+_log = logging.getLogger("kratos_lite")
+STIFF = 15.0
+"""h ω up to which ``DEF_LIM`` has never been seen to blow up."""
+SAFETY = 0.95
+"""Share of the critical step that automatic sub-steps take."""
+CHECKED = 100
+"""Steps of ``DEF_EXP`` after which its critical step is found anew, as the tangent may have stiffened."""
+
+
+def march(
+    body: Body | Sequence[Body],
+    dt: float,
+    steps: int,
+    *,
+    every: int = 1,
+    substeps: int | str = 1,
+    until: Callable[[State], bool] | None = None,
+    progress: Progress | None = None,
+) -> Iterator[State]:
+    """Advance a body, or many independent ones of one kind, and yield its states.
+
+    The body itself moves along: after the loop, or after leaving it early, it is where the last state says.
+
+    Parameters
+    ----------
+    body : one body; one object that holds many; or a sequence of rigid or pseudo-rigid bodies, which are
+        advanced together on arrays.
+    dt : step in s, > 0.
+    steps : number of steps.
+    every : a state is yielded after so many steps, and after the last.
+    substeps : steps into which each is divided, or ``"auto"``: as many as ``DEF_EXP`` needs to be stable.
+    until : function of a state; the march ends when it is true.
+    progress : called with ``"march"`` and the share done, 0 … 1, whenever a state is yielded.
+
+    Yields
+    ------
+    State
+        Copies of configuration and velocity, time and step.
+
+    Raises
+    ------
+    InputError
+        A number is wrong, or the step is beyond the stability of ``DEF_EXP``.
+    SolveError
+        A step has no solution, or the motion is no longer finite.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> stone = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0))
+    >>> stone.add(kl.Gravity((0, 0, -10.0)))
+    >>> states = list(march(stone, dt=0.1, steps=10, every=5))
+    >>> [round(float(state.q[11]), 9) for state in states]
+    [-1.2, -4.95]
+    """
+    one = body if isinstance(body, Body) else together(body)
+    h = _positive(dt)
+    for name, count in (("steps", steps), ("every", every)):
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+            raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+    return _states(one, h, int(steps), int(every), _divided(one, h, substeps), until, progress)
+
+
+def _states(
+    body: Body,
+    h: float,
+    count: int,
+    every: int,
+    parts: int,
+    until: Callable[[State], bool] | None,
+    progress: Progress | None,
+) -> Iterator[State]:
+    done = 0
+    while done < count:
+        chunk = min(every - done % every, count - done)
+        _advance(body, h, chunk, parts)
+        done += chunk
+        if progress:
+            progress("march", done / count)
+        state = State.of(body)
+        yield state
+        if until and until(state):
+            return
+
+
+def _positive(dt: float) -> float:
+    h = finite(dt, "a step")
+    if h.ndim or not h > 0:
+        raise InputError(f"a step must be one number of seconds > 0; got {dt}")
+    return float(h)
+
+
+def _divided(body: Body, h: float, substeps: int | str) -> int:
+    """Return the number of parts of each step; InputError if an explicit one is too long."""
+    if substeps != "auto" and (isinstance(substeps, (bool, str)) or substeps < 1):
+        raise InputError(f"substeps must be a whole number ≥ 1, or 'auto'; got {substeps!r}")
+    parts = 1 if isinstance(substeps, str) else int(substeps)
+    if not isinstance(body, Deformable):
+        return parts
+    if body.scheme == "DEF_EXP":
+        critical = body.critical_step()
+        if substeps == "auto":
+            parts = max(1, ceil(h / (SAFETY * critical)))
+            _log.info("DEF_EXP: each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
+        _check_stable(h / parts, critical)
+    elif body.scheme == "DEF_LIM" and h / parts * body.highest_frequency() > STIFF:
+        _log.warning(
+            "DEF_LIM with h ω = %.3g: above %g a stiff body that spins may gain energy without bound; "
+            "use ENERGY_MOMENTUM, a shorter step or damping",
+            h / parts * body.highest_frequency(),
+            STIFF,
+        )
+    return parts
+
+
+def _check_stable(h: float, critical: float) -> None:
+    if h > critical * (1 + 1e-9):
+        raise InputError(
+            f"DEF_EXP is not stable with steps of {h:g} s: the critical step is {critical:.4g} s; "
+            "take a shorter step, substeps='auto', or an implicit scheme"
+        )
+
+
+def _advance(body: Body, h: float, count: int, parts: int) -> None:
+    """Take `count` steps of h s, each in so many parts."""
+    compiled = _advance_compiled(body, h / parts, count * parts)
+    for _ in range(count):
+        if not compiled:
+            _step(body, h / parts, parts)
+        body.time += h  # one after the other, so that a restart comes to the same times
+        body.step += 1
+    if body.scheme == "DEF_EXP" and isinstance(body, Deformable):
+        _check_still_stable(body, h / parts, count)
+    if not np.isfinite(body.u).all():
+        raise SolveError(
+            f"the motion is no longer finite at t = {body.time:g} s: {body.scheme} with dt = {h / parts:g} s "
+            "has blown up; take a shorter step or ENERGY_MOMENTUM"
+        )
+
+
+def _step(body: Body, h: float, parts: int) -> None:
+    """Take one step in so many parts of h s."""
+    start = body.time
+    for part in range(parts):
+        body.time = start + part * h
+        before = body.u
+        load = SCHEMES[body.scheme](body, h)
+        body.external_work = body.external_work + h / 2 * ((before + body.u) * load).sum(axis=-1)
+        if isinstance(body, FiniteElementBody):
+            body.q, body.u = body.form.project(body.q, body.u)
+    body.time = start
+
+
+def _check_still_stable(body: Deformable, h: float, count: int) -> None:
+    """Raise InputError if the body has stiffened so much that steps of h s are no longer stable."""
+    if body.step // CHECKED > (body.step - count) // CHECKED:
+        _check_stable(h, body.critical_step())
+
+
+def _advance_compiled(body: Body, h: float, count: int) -> bool:
+    """Take steps with nothing but constant loads at once, without Python; return whether that is possible."""
+    if isinstance(body, Obstacle):
+        steps.drift(body, h * count)
+        return True
+    if body.constraints or not all(load.is_constant for load in body.loads):
+        return False
+    if isinstance(body, (RigidBody, PseudoRigidBody)):
+        steps.advance(body, h, count)
+        return True
+    return False

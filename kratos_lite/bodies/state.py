@@ -1,0 +1,81 @@
+"""State: all that a body needs to go on as if it had never stopped."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.errors import InputError
+from kratos_lite.io.output import write_whole
+
+Array = NDArray[np.float64]
+FIELDS = ("kind", "q", "u", "time", "step", "external_work")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A body at one time.
+
+    Attributes
+    ----------
+    kind : kind of the body.
+    q, u : configuration and velocity, copies.
+    time : s.
+    step : number of steps taken.
+    external_work : J.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    >>> path = getfixture("tmp_path") / "rest.npz"
+    >>> State.of(body).save(path)
+    >>> State.load(path).put_into(body)
+    """
+
+    kind: str
+    q: Array
+    u: Array
+    time: float
+    step: int
+    external_work: Array
+
+    @classmethod
+    def of(cls, body: Body) -> State:
+        """Return the state of a body."""
+        work = np.array(body.external_work)
+        return cls(body.kind, body.q.copy(), body.u.copy(), body.time, body.step, work)
+
+    def put_into(self, body: Body) -> None:
+        """Let a body go on from this state; InputError if it is of another kind or size."""
+        if body.kind != self.kind or body.q.shape != self.q.shape or body.u.shape != self.u.shape:
+            raise InputError(
+                f"this is the state of a {self.kind} body with q {self.q.shape}; "
+                f"it does not fit a {body.kind} one with q {body.q.shape}"
+            )
+        body.q, body.u = self.q.copy(), self.u.copy()
+        body.time, body.step, body.external_work = self.time, self.step, self.external_work.copy()
+
+    def save(self, path: str | Path) -> None:
+        """Write the state to an .npz file, as a whole or not at all."""
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **{name: np.asarray(getattr(self, name)) for name in FIELDS})
+        write_whole(path, buffer.getvalue())
+
+    @classmethod
+    def load(cls, path: str | Path) -> State:
+        """Read a state; InputError if the file is none."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                values = {name: file[name] for name in FIELDS}
+            kind, step, time = str(values["kind"]), int(values["step"]), float(values["time"])
+        except FileNotFoundError:
+            raise InputError(f"{path}: there is no such file") from None
+        except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+            raise InputError(f"{path}: not a state that State.save wrote ({error})") from None
+        return cls(kind, values["q"], values["u"], time, step, values["external_work"])

@@ -1,0 +1,194 @@
+"""Statics: where a body rests, by Newton with the tangent, not by a motion that dies out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import solvers
+from kratos_lite.assembly import Progress
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.errors import ModelError, SolveError
+from kratos_lite.supports import Reduction
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+INCREMENTS = (1, 4, 16, 64)
+"""Numbers of load increments that are tried one after the other."""
+NEWTON_MAX = 25
+CONVERGED = 1e-12
+"""Last Newton step, as a share of the displacement."""
+UNBALANCED = 1e-8
+"""Share of the loads that may be left over."""
+
+
+def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
+    """Bring a deformable body to rest under its loads and constraints at its time.
+
+    The configuration becomes that of equilibrium, the velocity zero; constraints know their reactions.
+
+    Parameters
+    ----------
+    body : pseudo-rigid or finite-element.
+    progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
+
+    Returns
+    -------
+    int : Newton iterations.
+
+    Raises
+    ------
+    ModelError
+        A rigid body, or a constraint on velocities.
+    SolveError
+        There is no equilibrium near by: the body is not held, or it buckles.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> mesh = kl.box(cells=(2, 2, 2))
+    >>> body = kl.FiniteElementBody(mesh, kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0), form="BC")
+    >>> for side, axis in (("x-", 0), ("x+", 0), ("y-", 1), ("y+", 1), ("z-", 2)):
+    ...     body.constrain(kl.FixDirection(mesh.points[mesh.nodes(side)], [axis == k for k in range(3)]))
+    >>> body.add(kl.Gravity((0, 0, -9.81)))
+    >>> iterations = equilibrium(body)
+    >>> print(f"{body.displacement[:, 2].min():.6e} m")
+    -1.322148e-04 m
+    """
+    if not isinstance(body, Deformable) or body.q.ndim > 1:
+        raise ModelError(f"equilibrium is for a single deformable body; got {body!r}")
+    for constraint in body.constraints:
+        if not constraint.positional:
+            raise ModelError(
+                f"a {type(constraint).__name__} says nothing of a body at rest; use SetDisplacement"
+            )
+    start = body.q.copy()
+    for count in INCREMENTS:
+        body.q = start.copy()
+        try:
+            iterations = sum(_increment(body, start, k / count, progress) for k in range(1, count + 1))
+        except (SolveError, np.linalg.LinAlgError) as error:
+            failed = error
+            continue
+        body.u = np.zeros_like(body.u)
+        return iterations
+    body.q = start
+    raise SolveError(
+        f"no equilibrium was found: {failed}; is the body held, and are the loads not too large?"
+    )
+
+
+def _increment(body: Deformable, start: Array, share: float, progress: Progress | None) -> int:
+    """Find the equilibrium under a share of the loads; return the number of iterations."""
+    initial = _gap(body, start)
+    for iteration in range(1, NEWTON_MAX + 1):
+        load = share * body.external_load(body.q)
+        gap = _gap(body, body.q) - (1 - share) * initial
+        step, multipliers = _newton(body, load - body.internal_load(body.q), gap)
+        body.q = body.q + step
+        if not np.isfinite(body.q).all():
+            break
+        size = max(float(np.abs(body.q - start).max()), 1e-300)
+        if np.abs(step).max() <= CONVERGED * size or not size > 1e-300:
+            _balance(body, share, multipliers)
+            if progress:
+                progress("equilibrium", share)
+            return iteration
+    raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {share:.0%} of the load")
+
+
+def _gap(body: Deformable, q: Array) -> Array:
+    """Return by how much the constraints are missed in m."""
+    gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
+    return np.concatenate([np.zeros(0), *gaps])
+
+
+def _entries(body: Deformable) -> tuple[Ints, Ints, Array]:
+    """Return rows, dofs and values of all constraints."""
+    none = np.zeros(0, dtype=np.int64)
+    parts, at = [(none, none, np.zeros(0))], 0
+    for constraint in body.constraints:
+        row, dof, value = constraint.entries(body, body.q)
+        parts.append((row + at, dof, value))
+        at += constraint.count
+    row, dof, value = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return row, dof, value
+
+
+def _newton(body: Deformable, residual: Array, gap: Array) -> tuple[Array, Array]:
+    """Return the step and the multipliers of K step = residual + H^T multipliers, H step = -gap."""
+    row, dof, value = _entries(body)
+    if not isinstance(body, FiniteElementBody):
+        return _newton_dense(body, residual, gap, row, dof, value)
+    K = body.stiffness(body.q)
+    if len(row) == len(gap) and len(set(row.tolist())) == len(row):  # each row prescribes one displacement
+        return _newton_eliminated(body, K, residual, gap, dof, value)
+    return _newton_sparse(K, residual, gap, row, dof, value)
+
+
+def _newton_dense(
+    body: Deformable, residual: Array, gap: Array, row: Ints, dof: Ints, value: Array
+) -> tuple[Array, Array]:
+    n, c = len(residual), len(gap)
+    A = np.zeros((n + c, n + c))
+    A[:9, :9] = body.stiffness(body.q)
+    A[n + row, dof], A[dof, n + row] = value, value
+    # least squares: a body that loads do not move needs no support, and redundant supports share their load
+    scale = np.concatenate(
+        [np.full(n, np.abs(A[:9, :9]).max() ** -0.5), np.full(c, np.abs(A[:9, :9]).max() ** 0.5)]
+    )
+    b = np.concatenate([residual, -gap])
+    x = scale * np.linalg.lstsq(scale[:, None] * A * scale, scale * b, rcond=1e-12)[0]
+    return x[:n], -x[n:]
+
+
+def _newton_eliminated(
+    body: FiniteElementBody, K: BlockMatrix, residual: Array, gap: Array, dof: Ints, value: Array
+) -> tuple[Array, Array]:
+    prescribed = np.zeros(body.dofs)
+    prescribed[dof] = -gap / value
+    free = np.ones(body.dofs, dtype=bool)
+    free[dof] = False
+    reduced = Reduction(np.flatnonzero(free), prescribed)
+    method, reason = solvers.choose("auto", len(reduced.free), body.dofs)
+    matrix: Any = K if method != "dense" else K.scipy().toarray()
+    step = solvers.Equations(matrix, reduced, body.points, method, reason).solve(residual, 1e-12).x
+    reaction = (K @ step - residual)[dof] / value
+    twice = np.bincount(dof, minlength=body.dofs)[dof]
+    return step, np.asarray(reaction / twice)
+
+
+def _newton_sparse(
+    K: BlockMatrix, residual: Array, gap: Array, row: Ints, dof: Ints, value: Array
+) -> tuple[Array, Array]:
+    from scipy.sparse import block_array, csr_array, eye_array
+
+    n, c = len(residual), len(gap)
+    size = K.norm()
+    H = csr_array((value, (row, dof)), shape=(c, n)) * size
+    soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
+    A = block_array([[K.scipy(), H.T], [H, soft]], format="csr") if c else K.scipy().tocsr()
+    x = solvers.direct.factorise(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
+    return x[:n], -x[n:] * size
+
+
+def _balance(body: Deformable, share: float, multipliers: Array) -> None:
+    """Note the reactions; SolveError if loads, reactions and internal load do not balance."""
+    reaction, at = np.zeros_like(body.q), 0
+    for constraint in body.constraints:
+        own = multipliers[at : at + constraint.count]
+        constraint.react(body, body.q, own)
+        row, dof, value = constraint.entries(body, body.q)
+        np.add.at(reaction, dof, own[row] * value)
+        at += constraint.count
+    load, inner = share * body.external_load(body.q), body.internal_load(body.q)
+    left = np.abs(load + reaction - inner).max()
+    scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
+    if left > UNBALANCED * scale:
+        raise SolveError(f"{left / scale:.1%} of the loads find no reaction, so the body would move")
