@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.shapes.base import Array, Shape
 
+INSIDE = 1e-9
+"""How far outside the reference cell a point still counts as inside, in reference coordinates."""
+
 
 class Inverse(NamedTuple):
     """Reference coordinates of points, and what is known of them.
@@ -16,7 +19,8 @@ class Inverse(NamedTuple):
     Attributes
     ----------
     xi : (..., 3) float, reference coordinates.
-    inside : (...) bool, whether the point lies in the cell (to 1e-9 of its size).
+    inside : (...) bool, whether the point lies in the cell, to 1e-9 of its size and the last digits of
+        the coordinates.
     converged : (...) bool, whether Newton found a xi with X(xi) = the point.
     iterations : Newton steps taken (1 where the map is affine).
     """
@@ -47,6 +51,7 @@ def inverse_map(
     points: ArrayLike,
     tolerance: float = 1e-13,
     max_iterations: int = 30,
+    start: ArrayLike | None = None,
 ) -> Inverse:
     """Return xi with Σ N_a(xi) X_a = point, by Newton from the centroid.
 
@@ -57,6 +62,7 @@ def inverse_map(
     points : (..., 3) float, m; one point per cell, or broadcast against them.
     tolerance : size of the last step, in reference coordinates, at which Newton stops.
     max_iterations : steps after which a point counts as not converged.
+    start : (3,) float, reference coordinates at which Newton starts instead of the centroid.
 
     Returns
     -------
@@ -64,8 +70,10 @@ def inverse_map(
 
     Notes
     -----
-    Where the map is affine one step is exact.  Steps are limited to the size of the cell, and
-    points that run away (they lie outside a curved cell) are reported as not converged.
+    Where the map is affine one step is exact, and a node, such as the apex of a pyramid where the Jacobian
+    has no limit, is found without any.  Steps are limited to the size of the cell, and points that run away
+    (they lie outside a curved cell) are reported as not converged.  A curved cell may take two xi to one
+    point, one of them outside; another `start` may then find the other.
     Source: Solfec-1.0 theory, finite-element shape functions, inverse map.
 
     Examples
@@ -79,30 +87,53 @@ def inverse_map(
     batch = np.broadcast_shapes(X.shape[:-2], p.shape[:-1])
     X = np.broadcast_to(X, (*batch, *X.shape[-2:])).reshape(-1, *X.shape[-2:])
     p = np.broadcast_to(p, (*batch, 3)).reshape(-1, 3)
-    size = np.ptp(X, axis=1).max(axis=1)
-    xi = np.tile(shape.nodes[: shape.corners].mean(axis=0), (len(p), 1))
+    first = shape.nodes[: shape.corners].mean(axis=0) if start is None else np.asarray(start, dtype=float)
+    middle = X[:, : shape.corners].mean(axis=1)  # taken off, so that no digits are lost far from the origin
+    cells = X - middle[:, None]
+    xi, converged, steps = _newton(shape, cells, p - middle, first, tolerance, max_iterations)
+    for a, node in enumerate(shape.nodes):
+        at_node = (X[:, a] == p).all(axis=1)
+        xi[at_node], converged[at_node] = node, True
+    digits = 4 * np.finfo(float).eps * np.abs(X).max(axis=(1, 2))
+    inside = converged & _inside(shape, cells, xi, digits)
+    return Inverse(xi.reshape(*batch, 3), inside.reshape(batch), converged.reshape(batch), steps)
+
+
+def _newton(
+    shape: type[Shape], X: Array, p: Array, start: Array, tolerance: float, max_iterations: int
+) -> tuple[Array, NDArray[np.bool_], int]:
+    """Return xi (m, 3), whether Newton found it (m,), and the steps taken, for X (m, n, 3) and p (m, 3)."""
+    small = 4e-15 * np.maximum(np.abs(X).max(axis=(1, 2)), np.abs(p).max(axis=1))
+    xi = np.tile(start, (len(p), 1))
     converged = np.zeros(len(p), dtype=bool)
+    miss = p - shape.N(start) @ X
     steps = 0
     active = np.arange(len(p))
     while len(active) and steps < max_iterations:
         steps += 1
         at, cells = xi[active], X[active]
-        miss = p[active] - (shape.N(at)[:, None, :] @ cells)[:, 0]
         J = np.swapaxes(cells, 1, 2) @ shape.dN(at)
         step = _solve(J, miss)
         length = np.abs(step).max(axis=1)
-        xi[active] = at + step * np.minimum(1.0, 2.0 / np.maximum(length, 1e-300))[:, None]
-        left = p[active] - (shape.N(xi[active])[:, None, :] @ cells)[:, 0]
-        done = (np.abs(left).max(axis=1) <= 4e-15 * _scale(size, p)[active]) | (length <= tolerance)
+        xi[active] = at = at + step * np.minimum(1.0, 2.0 / np.maximum(length, 1e-300))[:, None]
+        miss = p[active] - (shape.N(at)[:, None, :] @ cells)[:, 0]
+        done = (np.abs(miss).max(axis=1) <= small[active]) | (length <= tolerance)
         converged[active[done & np.isfinite(length)]] = True
-        active = active[~done & np.isfinite(length)]
-    inside = converged & (outside_by(shape.cell, xi) <= 1e-9)
-    return Inverse(xi.reshape(*batch, 3), inside.reshape(batch), converged.reshape(batch), steps)
+        going = ~done & np.isfinite(length)
+        active, miss = active[going], miss[going]
+    return xi, converged, steps
 
 
-def _scale(size: Array, p: Array) -> Array:
-    """Return the size of a cell, or of its distance from the origin where that is larger."""
-    return np.asarray(np.maximum(size, np.abs(p).max(axis=1)))
+def _inside(shape: type[Shape], X: Array, xi: Array, digits: Array) -> NDArray[np.bool_]:
+    """Return whether xi (m, 3) lie in the reference cell, as far as the last digits of X (m, n, 3) tell."""
+    outside = outside_by(shape.cell, xi)
+    inside = outside <= INSIDE
+    doubtful = np.flatnonzero((outside > INSIDE) & (outside < 1e-3))
+    J = np.swapaxes(X[doubtful], 1, 2) @ shape.dN(xi[doubtful])
+    columns = [np.abs(_solve(J, np.tile(axis, (len(J), 1)))) for axis in np.eye(3)]
+    stretch = np.sum(columns, axis=0).max(axis=1)
+    inside[doubtful] = outside[doubtful] <= INSIDE + digits[doubtful] * stretch
+    return inside
 
 
 def _solve(J: Array, r: Array) -> Array:
