@@ -13,6 +13,7 @@ from kratos_lite.mesh.blocks import (
     without_repeats,
 )
 from kratos_lite.mesh.connections import Faces, components, equal_sets
+from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
 from kratos_lite.mesh.topology import outward_signs
 
@@ -22,6 +23,7 @@ __all__ = [
     "Faces",
     "Floats",
     "Ints",
+    "Located",
     "Mesh",
     "Part",
     "Where",

@@ -24,6 +24,7 @@ from kratos_lite.mesh.blocks import (
     without_repeats,
 )
 from kratos_lite.mesh.connections import Faces
+from kratos_lite.mesh.locate import Located, locate
 
 Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
@@ -230,6 +231,20 @@ class Mesh:
         return np.flatnonzero(
             np.concatenate([np.zeros(0, bool), *(inside[b.nodes].all(axis=1) for b in self.blocks)])
         )
+
+    def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
+        """Return which elements contain points (..., 3) in m, and where in them the points lie.
+
+        A point on a face, edge or node of several elements belongs to the one in the lowest row.
+        Where a point lies outside, ``inside`` is False; with `required` that raises MeshError.
+
+        >>> from kratos_lite import box
+        >>> found = box(cells=(2, 1, 1)).locate([[0.75, 0.5, 0.5], [3.0, 0.0, 0.0]])
+        >>> found.rows.tolist(), found.xi[0].tolist()
+        ([1, -1], [0.0, 0.0, 0.0])
+        """
+        found = locate(self, points)
+        return found.require() if required else found
 
     # ---- faces -----------------------------------------------------------------------------
 

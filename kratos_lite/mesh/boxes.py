@@ -1,0 +1,98 @@
+"""Boxes: bounding boxes of cells, and a tree of them that finds those around points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.mesh.blocks import Block, Floats, Ints
+from kratos_lite.shapes import Hexahedron8, Pyramid5, Shape, Tetrahedron4, Wedge6
+
+BRANCHES = 8
+"""Boxes that one box of the next level encloses."""
+BULGE = 3.0
+"""Most that the functions of the nodes beyond the corners sum up to in any shape, absolute values taken."""
+LINEAR: dict[str, type[Shape]] = {
+    shape.cell: shape for shape in (Hexahedron8, Pyramid5, Tetrahedron4, Wedge6)
+}
+"""The shape of the corners alone, by family of cells."""
+
+
+def is_solid(block: Block) -> bool:
+    """Return whether the cells of a block have a volume that can contain points."""
+    return block.shape is not None and block.shape.nodes.shape[1] == 3
+
+
+def cell_boxes(points: Floats, block: Block) -> tuple[Floats, Floats]:
+    """Return lowest and highest coordinates (m, 3) that enclose the cells of a block of solids.
+
+    A cell with straight edges lies among its corners.  A curved one deviates from it by at most
+    Σ |N_a| |D_a|, with D_a the distance of node a from its place in the straight cell.
+    """
+    shape = block.shape
+    assert shape is not None
+    X = points[block.nodes]
+    corners = X[:, : shape.corners]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    if len(shape.nodes) > shape.corners:
+        straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ corners
+        bulge = BULGE * np.abs(X[:, shape.corners :] - straight).max(axis=1)
+        low, high = low - bulge, high + bulge
+    size = (high - low).max(axis=1, keepdims=True)
+    margin = 1e-8 * size + 8 * np.finfo(float).eps * np.maximum(np.abs(low), np.abs(high))
+    return low - margin, high + margin
+
+
+class BoxTree:
+    """A tree of boxes: those near each other have a box around them, and so on up to one.
+
+    Parameters
+    ----------
+    low, high : (n, 3) float, m; corners of the boxes; one with low > high contains nothing.
+    """
+
+    def __init__(self, low: Floats, high: Floats) -> None:
+        kept = np.flatnonzero((low <= high).all(axis=1))
+        self.order = kept[np.argsort(_along_a_curve((low[kept] + high[kept]) / 2), kind="stable")]
+        self.levels = [(_filled(low[self.order].T, np.inf), _filled(high[self.order].T, -np.inf))]
+        while self.levels[-1][0].shape[1] > 1:
+            low, high = (end.reshape(3, -1, BRANCHES) for end in self.levels[-1])
+            self.levels.append((_filled(low.min(axis=2), np.inf), _filled(high.max(axis=2), -np.inf)))
+
+    def around(self, points: Floats) -> tuple[Ints, Ints]:
+        """Return pairs of points and boxes that contain them, as rows of both, points in order."""
+        at = np.arange(len(points))
+        box = np.zeros(len(at), dtype=np.int64)
+        x = points.T.copy()
+        for number, (low, high) in enumerate(reversed(self.levels)):
+            if number:
+                box = (BRANCHES * box[:, None] + np.arange(BRANCHES)).ravel()
+                at = np.repeat(at, BRANCHES)
+            for axis in range(3):  # one after the other: few pairs are left for the last
+                here = x[axis].take(at)
+                hit = (low[axis].take(box) <= here) & (here <= high[axis].take(box))
+                at, box = at[hit], box[hit]
+        return at, self.order[box]
+
+
+def _filled(ends: Floats, nowhere: float) -> Floats:
+    """Return ends of boxes (3, n) with as many empty boxes more as the next level needs, if there is one."""
+    n = ends.shape[1]
+    more = -n % BRANCHES if n > 1 else 1 - n
+    return np.pad(ends, ((0, 0), (0, more)), constant_values=nowhere)
+
+
+def _along_a_curve(points: Floats) -> Ints:
+    """Return numbers (n,) that sort points so that those near each other stand together.
+
+    Source: Morton, A computer oriented geodetic data base (1966): the bits of the three coordinates in turn.
+    """
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
+    low = points.min(axis=0)
+    extent = float((points.max(axis=0) - low).max()) or 1.0
+    cell = ((points - low) / extent * (2**20 - 1)).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(20):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code

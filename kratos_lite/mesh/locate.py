@@ -1,0 +1,261 @@
+"""Locate: the elements of a mesh that contain given points, and where in them the points lie."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.errors import InputError, MeshError
+from kratos_lite.mesh.blocks import NO_ROWS, Floats, Ints, with_rows
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes, is_solid
+from kratos_lite.mesh.nearest import nearest_element
+from kratos_lite.shapes import Shape, inverse_map
+from kratos_lite.shapes.inverse import outside_by
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from kratos_lite.mesh.mesh import Mesh
+
+Mask = NDArray[np.bool_]
+
+POINTS_AT_ONCE = 2**14
+"""Points that are searched for together, so that candidates take little memory."""
+NEAR_EDGE = 1e-6
+"""Points this near the boundary of their cell, in reference coordinates, may lie in another as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Points (...) in a mesh: the element that contains each, and where in it the point lies.
+
+    Attributes
+    ----------
+    mesh : the mesh.
+    points : (..., 3) float, m; the points.
+    rows : (...) int, row of the element, the lowest of those that contain the point; -1 outside the mesh.
+    block, cell : (...) int, the same as number of the block and row in it; -1 outside.
+    xi : (..., 3) float, reference coordinates; nan outside.
+    """
+
+    mesh: Mesh
+    points: Floats
+    rows: Ints
+    block: Ints
+    cell: Ints
+    xi: Floats
+
+    @property
+    def inside(self) -> Mask:
+        """Whether each point lies in the mesh, (...)."""
+        return np.asarray(self.rows >= 0)
+
+    def __getitem__(self, chosen: Any) -> Located:
+        """Return some of the points: by number, rows or a mask such as `inside`."""
+        parts = (self.points, self.rows, self.block, self.cell, self.xi)
+        return Located(self.mesh, *(np.asarray(part[chosen]) for part in parts))
+
+    def require(self) -> Located:
+        """Return itself if all points lie in the mesh.
+
+        Raises
+        ------
+        MeshError
+            One does not; the text says which, how far outside and which element is nearest.
+        """
+        outside = np.argwhere(~self.inside)
+        if not len(outside):
+            return self
+        i = tuple(outside[0])
+        x = self.points[i]
+        which = "the point" if not i else f"point {', '.join(map(str, i))}"
+        more = f" (and {len(outside) - 1} more of {self.rows.size})" if len(outside) > 1 else ""
+        raise MeshError(
+            f"{which} at {x.tolist()} m{more} lies outside the mesh, {nearest_element(self.mesh, x)}; "
+            "move it into the mesh, or choose those inside by the mask mesh.locate(points).inside"
+        )
+
+    # ---- values ------------------------------------------------------------------------------
+
+    def interpolate(self, nodal: ArrayLike) -> Floats:
+        """Return Σ N_a v_a at the points, (..., *), of nodal values v (n, *); nan outside the mesh."""
+        values = np.asarray(nodal, dtype=float)
+        if values.shape[:1] != (self.mesh.n_nodes,):
+            raise InputError(f"nodal values must have shape ({self.mesh.n_nodes}, …); got {values.shape}")
+        out = np.full((self.rows.size, *values.shape[1:]), np.nan)
+        for at, nodes, N in self._shares():
+            out[at] = np.einsum("ma,ma...->m...", N, values[nodes])
+        return out.reshape((*self.rows.shape, *values.shape[1:]))
+
+    def spread(self, values: ArrayLike) -> Floats:
+        """Return nodal sums (n, *) of N_a times values (..., *) at the points: forces to nodes.
+
+        It is the transpose of `interpolate`.
+
+        Raises
+        ------
+        MeshError
+            A point lies outside the mesh.
+        """
+        self.require()
+        given = np.asarray(values, dtype=float)
+        lead = self.rows.shape
+        if given.shape[: len(lead)] != lead:
+            raise InputError(f"values at the points must have shape {lead} and more; got {given.shape}")
+        given = given.reshape(self.rows.size, *given.shape[len(lead) :])
+        total = np.zeros((self.mesh.n_nodes, *given.shape[1:]))
+        for at, nodes, N in self._shares():
+            np.add.at(total, nodes, np.einsum("ma,m...->ma...", N, given[at]))
+        return total
+
+    def weights(self) -> csr_array[Any]:
+        """Return the shape functions as a sparse matrix (m, n), one row per point.
+
+        Raises
+        ------
+        MeshError
+            A point lies outside the mesh.
+        """
+        from scipy.sparse import csr_array
+
+        self.require()
+        shares = list(self._shares())
+        rows = np.concatenate([NO_ROWS, *(np.repeat(at, nodes.shape[1]) for at, nodes, _ in shares)])
+        columns = np.concatenate([NO_ROWS, *(nodes.ravel() for _, nodes, _ in shares)])
+        entries = np.concatenate([np.zeros(0), *(N.ravel() for _, _, N in shares)])
+        return csr_array((entries, (rows, columns)), shape=(self.rows.size, self.mesh.n_nodes))
+
+    def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Floats]:
+        """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
+
+        >>> from kratos_lite import box
+        >>> nodes, weights = box().locate([0.5, 0.5, 0.5]).nodes_and_weights()
+        >>> nodes.tolist(), weights.tolist()
+        ([0, 4, 6, 2, 1, 5, 7, 3], [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125])
+        """
+        one = self[point] if self.rows.ndim else self
+        ((_, nodes, N),) = one.require()._shares()
+        return nodes[0].astype(np.int64), N[0]
+
+    def _shares(self) -> Iterator[tuple[Ints, NDArray[np.int32], Floats]]:
+        """Yield, for each block, points (m,) in it, counted through, nodes (m, k) and N (m, k)."""
+        numbers, cells, xi = np.ravel(self.block), np.ravel(self.cell), self.xi.reshape(-1, 3)
+        for number, block in enumerate(self.mesh.blocks):
+            at = np.flatnonzero(numbers == number)
+            if len(at) and block.shape is not None:
+                yield at, block.nodes[cells[at]], block.shape.N(xi[at])
+
+
+def locate(mesh: Mesh, points: ArrayLike) -> Located:
+    """Return the elements that contain points (..., 3), by the inverse isoparametric map.
+
+    A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
+
+    Raises
+    ------
+    InputError
+        Points are not finite or not of shape (..., 3).
+    MeshError
+        A node of the mesh has no finite coordinates.
+    """
+    x = finite(points, "points to locate")
+    if x.shape[-1:] != (3,):
+        raise InputError(f"points to locate must have shape (m, 3) or (3,); got {x.shape}")
+    flat = x.reshape(-1, 3)
+    search = _Search(mesh)
+    parts = [search.find(flat[i : i + POINTS_AT_ONCE]) for i in range(0, len(flat), POINTS_AT_ONCE)]
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(part[0] for part in parts)])
+    xi = np.concatenate([np.zeros((0, 3)), *(part[1] for part in parts)])
+    block = np.where(rows >= 0, search.block_of(rows), -1)
+    cell = np.where(rows >= 0, rows - search.starts[block], -1)
+    rows, block, cell = (value.reshape(x.shape[:-1]) for value in (rows, block, cell))
+    return Located(mesh, x, rows, block, cell, xi.reshape(x.shape))
+
+
+class _Search:
+    """The elements of a mesh, ready to be searched; one without a shape contains nothing."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+        if len(bad):
+            raise MeshError(f"node {mesh.node_ids[bad[0]]} must have finite coordinates to locate points")
+        self.mesh = mesh
+        n = mesh.n_elements
+        self.starts = np.array([0, *(at.stop for _, at in with_rows(mesh.blocks))])[:-1]
+        low, high, self.middle = np.full((n, 3), np.inf), np.full((n, 3), -np.inf), np.zeros((n, 3))
+        for block, at in with_rows(mesh.blocks):
+            if is_solid(block):
+                low[at], high[at] = cell_boxes(mesh.points, block)
+                self.middle[at] = (low[at] + high[at]) / 2
+        self.size = (high - low).max(axis=1, initial=0.0)
+        self.tree = BoxTree(low, high)
+
+    def block_of(self, rows: Ints) -> Ints:
+        """Return the number of the block of each element row."""
+        return np.asarray(np.searchsorted(self.starts, rows, side="right") - 1)
+
+    def find(self, x: Floats) -> tuple[Ints, Floats]:
+        """Return element rows (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
+        at, row = self.tree.around(x)
+        distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
+        order = np.lexsort((row, distance, at))
+        at, row = at[order], row[order]
+        found, xi = np.full(len(x), -1), np.full((len(x), 3), np.nan)
+        first = np.searchsorted(at, np.arange(len(x) + 1))
+        tried = first[:-1].copy()
+        pending = np.flatnonzero(tried < first[1:])
+        while len(pending):
+            self._try(x, pending, row[tried[pending]], found, xi)
+            tried[pending] += 1
+            pending = pending[(found[pending] < 0) & (tried[pending] < first[pending + 1])]
+        lost = found[at] < 0
+        self._retry(x, at[lost], row[lost], found, xi)
+        lower = self._near_edge(found, xi)[at] & (row < found[at])
+        order = np.lexsort((-row[lower], at[lower]))  # the lowest row is the last to be written
+        self._try(x, at[lower][order], row[lower][order], found, xi)
+        return found, xi
+
+    def _try(
+        self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats, start: Floats | None = None
+    ) -> None:
+        """Write row and xi of those points x[at] that lie in the elements in `rows`."""
+        numbers = self.block_of(rows)
+        hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
+        for number, block in enumerate(self.mesh.blocks):
+            mine = np.flatnonzero(numbers == number)
+            if len(mine) and block.shape is not None:
+                X = self.mesh.points[block.nodes[rows[mine] - self.starts[number]]]
+                inverse = inverse_map(block.shape, X, x[at[mine]], start=start)
+                hits[mine], where[mine] = inverse.inside, inverse.xi
+        found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
+
+    def _retry(self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats) -> None:
+        """Try curved cells again from near their corners; from the middle Newton may reach another xi."""
+        numbers = self.block_of(rows)
+        for number, block in enumerate(self.mesh.blocks):
+            if block.shape is None or block.shape.degree < 2:
+                continue
+            for start in _near_corners(block.shape):
+                left = (numbers == number) & (found[at] < 0)
+                self._try(x, at[left], rows[left], found, xi, start)
+
+    def _near_edge(self, found: Ints, xi: Floats) -> Mask:
+        """Return which points lie so near the boundary of their cell that others may contain them too."""
+        near = np.zeros(len(found), dtype=bool)
+        numbers = np.where(found >= 0, self.block_of(found), -1)
+        for number, block in enumerate(self.mesh.blocks):
+            mine = np.flatnonzero(numbers == number)
+            if len(mine) and block.shape is not None:
+                near[mine] = outside_by(block.shape.cell, xi[mine]) > -NEAR_EDGE
+        return near
+
+
+def _near_corners(shape: type[Shape]) -> Floats:
+    """Return the points (c, 3) in the middle between the centroid and each corner."""
+    corners = shape.nodes[: shape.corners]
+    return np.asarray((corners + corners.mean(axis=0)) / 2)
