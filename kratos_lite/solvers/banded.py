@@ -1,0 +1,230 @@
+"""Matrices of one sparsity pattern, factorised and solved in every time step of a small body.
+
+Nodes are renumbered once so that all entries lie near the diagonal; the place of every entry in the
+band is known from then on, and LAPACK factorises the band.  Where the band is so wide that a sparse
+factorisation takes less work, that one is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.errors import SolveError
+from kratos_lite.solvers import direct
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from kratos_lite.assembly import Pattern
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+BAND_LIMIT = 12.0
+"""Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
+BAND_NUMBERS = 50_000_000
+"""A band of more numbers than this (0.4 GB) is not made."""
+
+
+class Factors(Protocol):
+    """A factorised matrix A."""
+
+    def solve(self, b: Array) -> Array:
+        """Return x of A x = b, both (3n,) or (3n, k)."""
+
+
+class Factoriser:
+    """Factorises matrices (3n, 3n) of 3x3 node blocks that share a sparsity pattern.
+
+    Parameters
+    ----------
+    pattern : sparsity of the nodes.
+    symmetric : whether the matrices are symmetric positive definite; otherwise rows are exchanged.
+
+    Attributes
+    ----------
+    method, reason : ``band`` or ``sparse``, and why.
+    width : largest distance of an entry from the diagonal in the band.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> from kratos_lite.assembly import Pattern, assemble_stiffness
+    >>> model = kl.Model(kl.box((0.1, 0.1, 1.0), (1, 1, 9)), kl.Isotropic3D(E=1.0, nu=0.3))
+    >>> points, batches = model.mesh.points, model.batches()
+    >>> pattern = Pattern(len(points), [batch.nodes for batch in batches])
+    >>> A = assemble_stiffness(points, batches, pattern)
+    >>> add_scalar(A, np.full(len(points), 2.0), A.diagonal_blocks())
+    >>> b = np.arange(120.0)
+    >>> bool(np.allclose(A @ Factoriser(pattern).factorise(A).solve(b), b))
+    True
+    """
+
+    def __init__(self, pattern: Pattern, symmetric: bool = True) -> None:
+        self.symmetric = symmetric
+        rows = np.repeat(np.arange(pattern.n_nodes), np.diff(pattern.indptr))
+        self._nodes, nodal_width = _numbering(pattern, rows)
+        self.width = w = 3 * nodal_width + 2
+        self._height = w + 1 if symmetric else 3 * w + 1  # exchanged rows need room
+        self.method, self.reason = choose(3 * pattern.n_nodes, w, self._height)
+        if self.method == "band":
+            self._dofs = (3 * self._nodes[:, None] + np.arange(3)).ravel()
+            self._prepare(rows, pattern.indices)
+
+    def _prepare(self, rows: Ints, columns: NDArray[np.int32]) -> None:
+        """Note where the entries of a matrix go: column by column, as LAPACK wants a band."""
+        place = np.empty_like(self._nodes)
+        place[self._nodes] = np.arange(len(place))
+        axes = np.arange(3)
+        i = np.broadcast_to((3 * place[rows])[:, None, None] + axes[:, None], (len(rows), 3, 3)).ravel()
+        j = np.broadcast_to((3 * place[columns])[:, None, None] + axes, (len(rows), 3, 3)).ravel()
+        above = 0 if self.symmetric else 2 * self.width
+        to = j * self._height + above + i - j
+        kept = np.flatnonzero(i >= j) if self.symmetric else np.arange(len(i))
+        self._from = kept[np.argsort(to[kept])]
+        self._to = to[self._from]
+
+    def factorise(self, A: BlockMatrix) -> Factors:
+        """Return the factors of a matrix with the pattern.
+
+        Raises
+        ------
+        SolveError
+            If the matrix is singular, or not positive definite though it should be.
+        """
+        if self.method == "sparse":
+            return direct.factorise(A.scipy().tocsr(), symmetric=self.symmetric)
+        band = np.zeros(len(self._dofs) * self._height)
+        band[self._to] = A.data.ravel().take(self._from)
+        matrix = band.reshape(-1, self._height).T
+        return (Cholesky if self.symmetric else LU)(matrix, self.width, self._dofs)
+
+
+class Cholesky:
+    """The Cholesky factor of a symmetric band, (width + 1, n) by columns from the diagonal down."""
+
+    def __init__(self, band: Array, width: int, dofs: Ints) -> None:
+        from scipy.linalg.lapack import dpbtrf
+
+        self._dofs = dofs
+        self._factor, info = dpbtrf(band, lower=1, overwrite_ab=1)
+        if info:
+            node, axis = divmod(int(dofs[info - 1]), 3)
+            raise SolveError(
+                f"the matrix is not positive definite: the pivot of node row {node}, axis {'xyz'[axis]}, is "
+                "not > 0; the body has lost its stiffness or can still move; take a smaller step or hold it"
+            )
+
+    def solve(self, b: Array) -> Array:
+        """Return x of A x = b, both (3n,) or (3n, k)."""
+        from scipy.linalg.lapack import dpbtrs
+
+        x = np.empty(b.shape)
+        x[self._dofs] = dpbtrs(self._factor, b[self._dofs], lower=1, overwrite_b=1)[0]
+        return x
+
+
+class LU:
+    """The LU factors of a band with exchanges of rows, (3 width + 1, n) by columns."""
+
+    def __init__(self, band: Array, width: int, dofs: Ints) -> None:
+        from scipy.linalg.lapack import dgbtrf
+
+        self._dofs, self._width = dofs, width
+        self._factors, self._pivots, info = dgbtrf(band, width, width, overwrite_ab=1)
+        if info:
+            raise direct.singular()
+
+    def solve(self, b: Array) -> Array:
+        """Return x of A x = b, both (3n,) or (3n, k)."""
+        from scipy.linalg.lapack import dgbtrs
+
+        w, x = self._width, np.empty(b.shape)
+        x[self._dofs] = dgbtrs(self._factors, w, w, b[self._dofs], self._pivots, overwrite_b=1)[0]
+        return x
+
+
+def choose(n: int, width: int, height: int) -> tuple[str, str]:
+    """Return how to factorise n unknowns in a band of a width, stored in so many rows, and why.
+
+    >>> choose(567, 44, 45)[0], choose(30_000, 4000, 4001)[0]
+    ('band', 'sparse')
+    """
+    limit = int(BAND_LIMIT * np.sqrt(n))
+    if width > limit:
+        return "sparse", f"width {width} > {limit}: a sparse factorisation takes less work"
+    if n * height > BAND_NUMBERS:
+        return "sparse", f"{n * height} numbers > {BAND_NUMBERS}: a band takes too much memory"
+    return "band", f"width {width} ≤ {limit}: a band is fastest"
+
+
+def add_scalar(A: BlockMatrix, m: Array, at: Ints | None = None) -> None:
+    """Add numbers to the diagonals of blocks: A += m 1, in place.
+
+    Parameters
+    ----------
+    m : (nnz,), the data of a scalar matrix on the same pattern, or one number for each block of `at`.
+    at : blocks that take the numbers; `A.diagonal_blocks()` where m (n,) is a lumped mass.
+    """
+    diagonals = A.data.reshape(-1, 9)[:, ::4]
+    if at is None:
+        diagonals += m[:, None]
+    else:
+        diagonals[at] += m[:, None]
+
+
+# ---- numbering -------------------------------------------------------------------------------------
+
+
+def _numbering(pattern: Pattern, rows: Ints) -> tuple[Ints, int]:
+    """Return the nodes (n,) in the order with the least band, and its width in nodes."""
+
+    def width(order: Ints) -> int:
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        return int(np.abs(place[rows] - place[pattern.indices]).max(initial=0))
+
+    widths, orders = zip(*((width(order), order) for order in _orders(pattern)), strict=True)
+    best = int(np.argmin(widths))
+    return orders[best], widths[best]
+
+
+def _orders(pattern: Pattern) -> Iterator[Ints]:
+    """Yield orders of the nodes: as they are, reverse Cuthill–McKee, and layers from one end of the body."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    n = pattern.n_nodes
+    yield np.arange(n)
+    graph = csr_array((np.ones(len(pattern.indices)), pattern.indices, pattern.indptr), shape=(n, n))
+    order = reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
+    yield order
+    yield _layers(graph, order)
+
+
+def _layers(graph: csr_array, order: Ints) -> Ints:
+    """Return the nodes by their distance from the face farthest from the last one of an order.
+
+    Within a layer they follow the mean place of their neighbours in the layer before.  The first layers
+    of Cuthill–McKee, from one corner, are wider than those of a long body.
+    """
+    from scipy.sparse.csgraph import dijkstra
+
+    distance = dijkstra(graph, indices=order[-1], unweighted=True)
+    reached = np.isfinite(distance)
+    end = np.flatnonzero(distance == distance[reached].max())
+    layer = dijkstra(graph, indices=end, unweighted=True, min_only=True)
+    place = np.empty(len(order))
+    place[order] = np.arange(len(order))
+    layers = [np.flatnonzero(layer == step) for step in np.unique(layer)]
+    for before, nodes in zip([None, *layers], layers, strict=False):
+        if before is not None:
+            links = graph[nodes][:, before]
+            place[nodes] = links @ place[before] / np.maximum(links.sum(axis=1), 1)
+        first = 0 if before is None else place[before].max() + 1
+        place[nodes[np.argsort(place[nodes], kind="stable")]] = first + np.arange(len(nodes))
+    return np.argsort(place)
