@@ -10,6 +10,7 @@ Compiled kernels are taken where the element class leaves its geometry as it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,42 @@ from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
+from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MaterialError
+from kratos_lite.fields import GEOMETRY
+from kratos_lite.native import kernels
 
 Array = NDArray[np.float64]
 SAME_SHAPE = 1e-10
 """Elements whose edges differ by less than this share of their size have one frequency."""
+
+
+def _compiled(batch: Batch) -> Any:
+    """Return the kernels if they stand for the geometry of an element class, else None."""
+    if all(getattr(batch.element, name) is getattr(KinematicLinear, name) for name in GEOMETRY):
+        return kernels("lagrange")
+    return None
+
+
+def _floats(values: Any) -> Array:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def _placed(points: Array, batch: Batch) -> tuple[Any, ...]:
+    """Return points, nodes, dN and weights of a batch, as kernels take them."""
+    dN = _floats(tabulate(batch.element.shape, batch.rule)[1])
+    nodes = np.ascontiguousarray(batch.nodes, dtype=np.int32)
+    return _floats(points), nodes, dN, _floats(batch.rule.weights)
+
+
+def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
+    """Return displacements, increment and damping, as kernels take them."""
+    return _floats(q), None if dq is None else _floats(dq), damping
+
+
+def _law(batch: Batch) -> tuple[Any, ...]:
+    """Return C and prestress of a batch, as kernels take them."""
+    return _floats(batch.material.C), None if batch.prestress is None else _floats(batch.prestress)
 
 
 def internal_load(
@@ -51,6 +83,10 @@ def internal_load(
     """
     total = np.zeros_like(points)
     for batch in batches:
+        if module := _compiled(batch):
+            step = _displaced(q, dq, damping)
+            total += module.internal_load(*_placed(points, batch), *step, *_law(batch))
+            continue
         for chunk in batch.chunks():
             element, at = _moved(points, batch, chunk, q, dq, damping)
             add_nodal(total, batch.nodes[chunk], lagrange.internal_load(element, at))
@@ -86,16 +122,33 @@ def stiffness(
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     for group, batch in enumerate(batches):
-        k = batch.nodes.shape[1]
-        for window in batch.chunks(SCATTER_BYTES):
-            blocks = np.empty((window.stop - window.start, k, k, 3, 3))
-            for chunk in batch.chunks(within=window):
-                element, at = _moved(points, batch, chunk, q, dq, damping)
-                K = lagrange.stiffness_by_axis(element, batch.material.C, at)
-                place = slice(chunk.start - window.start, chunk.stop - window.start)
-                blocks[place] = K.transpose(0, 2, 4, 1, 3)
-            pattern.add(data, group, window, blocks)
+        if module := _compiled(batch):
+            step = _displaced(q, dq, damping)
+            rows = (pattern.indptr, pattern.indices)
+            module.add_stiffness(*_placed(points, batch), *step, *_law(batch), *rows, data)
+        else:
+            _add_stiffness(data, points, batch, pattern, group, (q, dq, damping))
     return BlockMatrix(data, pattern.indices, pattern.indptr)
+
+
+def _add_stiffness(
+    data: Array,
+    points: Array,
+    batch: Batch,
+    pattern: Pattern,
+    group: int,
+    step: tuple[Array, Array | None, float],
+) -> None:
+    """Add the stiffness of a batch in NumPy, in parts."""
+    k = batch.nodes.shape[1]
+    for window in batch.chunks(SCATTER_BYTES):
+        blocks = np.empty((window.stop - window.start, k, k, 3, 3))
+        for chunk in batch.chunks(within=window):
+            element, at = _moved(points, batch, chunk, *step)
+            K = lagrange.stiffness_by_axis(element, batch.material.C, at)
+            place = slice(chunk.start - window.start, chunk.stop - window.start)
+            blocks[place] = K.transpose(0, 2, 4, 1, 3)
+        pattern.add(data, group, window, blocks)
 
 
 def strain_energy(points: Array, batches: Sequence[Batch], q: Array) -> float:
@@ -112,14 +165,25 @@ def _totals(points: Array, batches: Sequence[Batch], q: Array) -> tuple[float, f
     """Return the strain energy and the largest strain."""
     energy, largest = 0.0, 0.0
     for batch in batches:
-        for chunk in batch.chunks():
-            element, displaced = batch.at(points, chunk), q[batch.nodes[chunk]]
-            initial = batch.initial_stress(chunk)
-            energy += float(lagrange.strain_energy(element, batch.material.C, displaced, initial).sum())
-            E = lagrange.green_strain(element, displaced)
-            E[..., 3:] /= np.sqrt(2)  # E:E counts the two tensor shears, each half the engineering shear
-            largest = max(largest, float(np.sqrt((E**2).sum(axis=-1)).max()))
+        module = _compiled(batch)
+        parts = (
+            [module.totals(*_placed(points, batch), _floats(q), *_law(batch))]
+            if module
+            else [_totals_of(points, batch, q, chunk) for chunk in batch.chunks()]
+        )
+        for share, strain in parts:
+            energy += share
+            largest = max(largest, strain)
     return energy, largest
+
+
+def _totals_of(points: Array, batch: Batch, q: Array, chunk: slice) -> tuple[float, float]:
+    element, displaced = batch.at(points, chunk), q[batch.nodes[chunk]]
+    initial = batch.initial_stress(chunk)
+    energy = lagrange.strain_energy(element, batch.material.C, displaced, initial).sum()
+    E = lagrange.green_strain(element, displaced)
+    E[..., 3:] /= np.sqrt(2)  # E:E counts the two tensor shears, each half the engineering shear
+    return float(energy), float(np.sqrt((E**2).sum(axis=-1)).max())
 
 
 def nodal_gradients(points: Array, batches: Sequence[Batch]) -> tuple[Array, float]:
