@@ -14,6 +14,7 @@ from kratos_lite.assembly import Pattern, assemble_scalar
 from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.banded import add_scalar
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -57,10 +58,16 @@ class Mass:
 
     def add_to(self, A: BlockMatrix) -> None:
         """Add the mass matrix to a matrix of blocks on the same pattern."""
-        places = A.diagonal_blocks() if self.lumped else slice(None)
-        m = self.nodal if self.lumped else self.scalar.data
-        for axis in range(3):
-            A.data[places, axis, axis] += m
+        if self.lumped:
+            add_scalar(A, self.nodal, self._diagonal)
+        else:
+            add_scalar(A, self.scalar.data)
+
+    @cached_property
+    def _diagonal(self) -> NDArray[np.int64]:
+        """Places of the diagonal blocks in the pattern."""
+        rows = np.repeat(np.arange(self.pattern.n_nodes), np.diff(self.pattern.indptr))
+        return np.flatnonzero(rows == self.pattern.indices)
 
     def matrix(self) -> csr_array[Any, Any]:
         """Return the mass matrix of all components, (3n, 3n) in kg."""
