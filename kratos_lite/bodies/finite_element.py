@@ -69,7 +69,7 @@ class FiniteElementBody(Deformable):
         lumped: bool = False,
         scheme: str | None = None,
         damping: float = 0.0,
-        tolerance: float = 1e-12,
+        tolerance: float = 1e-16,
     ) -> None:
         self.batches = elements_of(mesh, material)
         lost = mesh.node_ids[~mesh.used_nodes()]
