@@ -22,32 +22,41 @@ using kl::Rows;
 using kl::scatter;
 namespace py = pybind11;
 
-using Floats = const Array<double>&;
+using Floats = const py::array&;
 
 constexpr int64_t GRAIN = 1024;  // steps of a body in one task
+
+// The numbers of an array; casting each argument to Array<double> would take longer than the step of one body.
+const double* numbers(Floats array) {
+    static const py::handle floats = py::dtype::of<double>().release();
+    const auto* proxy = py::detail::array_proxy(array.ptr());
+    const bool fits = (proxy->flags & py::array::c_style) && (proxy->descr == floats.ptr() || Array<double>::check_(array));
+    if (!fits) throw py::type_error("arrays must be C-contiguous float64");
+    return reinterpret_cast<const double*>(proxy->data);
+}
 
 int64_t bodies(Floats q, int width, const char* what) {
     require(q.ndim() > 0 && q.shape(q.ndim() - 1) == width, what);
     return q.size() / width;
 }
 
-double* state(Array<double>& array, int64_t n, int width, const char* what) {
+double* state(Floats array, int64_t n, int width, const char* what) {
     require(array.size() == n * width, what);
-    return array.mutable_data();
+    require(array.writeable(), "a read-only array cannot be advanced in place");
+    return const_cast<double*>(numbers(array));
 }
 
 // For each body, or one for all.
 Rows rows(Floats array, int64_t n, int width, const char* what) {
     const int64_t size = array.size();
     require(size == n * width || size == width, what);
-    return {array.data(), size == width ? 0 : width, width};
+    return {numbers(array), size == width ? 0 : width, width};
 }
 
 double* optional_state(const py::object& array, int64_t n, const char* what) {
     if (array.is_none()) return nullptr;
-    require(Array<double>::check_(array), what);
-    auto values = py::reinterpret_borrow<Array<double>>(array);
-    return state(values, n, 1, what);
+    require(py::isinstance<py::array>(array), what);
+    return state(py::reinterpret_borrow<py::array>(array), n, 1, what);
 }
 
 // The first body that failed and its step, or -1 twice.
@@ -63,7 +72,7 @@ private:
     std::mutex mutex;
 };
 
-// The same group of bodies through all steps, while it is in the cache: f(group, first, count, step) for each.
+// Whether a body of a group failed in a step; the first one that did is noted.
 template <class Group>
 bool noted(const Group& g, int64_t first, int64_t step, Failure& failure) {
     for (int l = 0; l < g.count; ++l) {
@@ -74,7 +83,8 @@ bool noted(const Group& g, int64_t first, int64_t step, Failure& failure) {
     return false;
 }
 
-// f(first, count) for groups of bodies, on all threads where there are enough of them.
+// f(first, count) for groups of bodies, on all threads where there are enough of them.  A group goes through all
+// its steps while it is in the cache.
 template <class F>
 void groups(int64_t n, int64_t steps, const F& f) {
     const int64_t few = std::max<int64_t>(1, GRAIN / std::max<int64_t>(1, steps));
@@ -107,28 +117,28 @@ struct RigidBodies {
     }
 };
 
-void rigid_half(Array<double> q, Array<double> u, double h, Array<double> out) {
+void rigid_half(Floats q, Floats u, double h, Floats out) {
     const int64_t n = bodies(q, 12, "q must be (N, 12)");
-    const double* to_u = state(u, n, 6, "u must be (N, 6)");
+    const Rows configuration = rows(q, n, 12, "q must be (N, 12)");
+    const Rows velocity = rows(u, n, 6, "u must be (N, 6)");
     double* to = state(out, n, 12, "out must be (N, 12)");
-    const double* from = q.data();
     py::gil_scoped_release release;
     groups(n, 1, [&](int64_t first, int count) {
         RigidGroup g;
         g.h = h;
         g.count = count;
-        gather({from, 12, 12}, first, count, g.q);
-        gather({to_u, 6, 6}, first, count, g.u);
+        gather(configuration, first, count, g.q);
+        gather(velocity, first, count, g.u);
         kl::rigid_half(g);
         scatter(g.qh, 12, first, count, to);
     });
 }
 
-RigidBodies rigid_bodies(Array<double>& q, Array<double>& u, Floats inertia, Floats inverse, Floats mass, double h,
+RigidBodies rigid_bodies(Floats q, Floats u, Floats inertia, Floats inverse, Floats mass, double h,
                          int scheme, double tolerance) {
     const int64_t n = bodies(q, 12, "q must be (N, 12)");
     require(scheme >= kl::RIG_POS && scheme <= kl::RIG_IMP, "scheme must be 0, 1 or 2");
-    return {q.mutable_data(),
+    return {state(q, n, 12, "q must be (N, 12)"),
             state(u, n, 6, "u must be (N, 6)"),
             rows(inertia, n, 9, "inertia must be (N, 3, 3) or (3, 3)"),
             rows(inverse, n, 9, "inverse must be (N, 3, 3) or (3, 3)"),
@@ -138,11 +148,11 @@ RigidBodies rigid_bodies(Array<double>& q, Array<double>& u, Floats inertia, Flo
             scheme};
 }
 
-int64_t rigid_finish(Array<double> q, Array<double> u, Array<double> qh, Array<double> load, Array<double> inertia,
-                     Array<double> inverse, Array<double> mass, double h, int scheme, double tolerance) {
+int64_t rigid_finish(Floats q, Floats u, Floats qh, Floats load, Floats inertia,
+                     Floats inverse, Floats mass, double h, int scheme, double tolerance) {
     const RigidBodies all = rigid_bodies(q, u, inertia, inverse, mass, h, scheme, tolerance);
     const int64_t n = q.size() / 12;
-    const Rows middle{state(qh, n, 12, "qh must be (N, 12)"), 12, 12};
+    const Rows middle = rows(qh, n, 12, "qh must be (N, 12)");
     const Rows loads = rows(load, n, 6, "load must be (N, 6) or (6)");
     Failure failure;
     py::gil_scoped_release release;
@@ -158,10 +168,10 @@ int64_t rigid_finish(Array<double> q, Array<double> u, Array<double> qh, Array<d
     return failure.first.first;
 }
 
-std::pair<int64_t, int64_t> rigid_steps(Array<double> q, Array<double> u, Array<double> inertia, Array<double> inverse,
-                                        Array<double> mass, Array<double> acceleration, Array<double> spatial,
-                                        Array<double> convected, double h, int64_t steps, int scheme, double tolerance,
-                                        py::object work) {
+std::pair<int64_t, int64_t> rigid_steps(Floats q, Floats u, Floats inertia, Floats inverse,
+                                        Floats mass, Floats acceleration, Floats spatial,
+                                        Floats convected, double h, int64_t steps, int scheme, double tolerance,
+                                        const py::object& work) {
     const RigidBodies all = rigid_bodies(q, u, inertia, inverse, mass, h, scheme, tolerance);
     const int64_t n = q.size() / 12;
     const Rows a = rows(acceleration, n, 3, "acceleration must be (N, 3) or (3)");
@@ -215,11 +225,11 @@ struct PseudoBodies {
     }
 };
 
-PseudoBodies pseudo_bodies(Array<double>& q, Array<double>& u, Floats euler, Floats mass, Floats volume, Floats C,
+PseudoBodies pseudo_bodies(Floats q, Floats u, Floats euler, Floats mass, Floats volume, Floats C,
                            Floats damping, double h, int scheme, double tolerance) {
     const int64_t n = bodies(q, 12, "q must be (N, 12)");
     require(scheme >= kl::DEF_EXP && scheme <= kl::ENERGY_MOMENTUM, "scheme must be 0, 1 or 2");
-    return {q.mutable_data(),
+    return {state(q, n, 12, "q must be (N, 12)"),
             state(u, n, 12, "u must be (N, 12)"),
             rows(euler, n, 9, "euler must be (N, 3, 3) or (3, 3)"),
             rows(mass, n, 1, "mass must be (N) or one number"),
@@ -231,8 +241,8 @@ PseudoBodies pseudo_bodies(Array<double>& q, Array<double>& u, Floats euler, Flo
             scheme};
 }
 
-int64_t pseudo_finish(Array<double> q, Array<double> u, Array<double> load, Array<double> euler, Array<double> mass,
-                      Array<double> volume, Array<double> C, Array<double> damping, double h, int scheme,
+int64_t pseudo_finish(Floats q, Floats u, Floats load, Floats euler, Floats mass,
+                      Floats volume, Floats C, Floats damping, double h, int scheme,
                       double tolerance) {
     const PseudoBodies all = pseudo_bodies(q, u, euler, mass, volume, C, damping, h, scheme, tolerance);
     const int64_t n = q.size() / 12;
@@ -250,10 +260,10 @@ int64_t pseudo_finish(Array<double> q, Array<double> u, Array<double> load, Arra
     return failure.first.first;
 }
 
-std::pair<int64_t, int64_t> pseudo_steps(Array<double> q, Array<double> u, Array<double> euler, Array<double> mass,
-                                         Array<double> volume, Array<double> C, Array<double> damping,
-                                         Array<double> acceleration, Array<double> spatial, double h, int64_t steps,
-                                         int scheme, double tolerance, py::object work) {
+std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Floats mass,
+                                         Floats volume, Floats C, Floats damping,
+                                         Floats acceleration, Floats spatial, double h, int64_t steps,
+                                         int scheme, double tolerance, const py::object& work) {
     const PseudoBodies all = pseudo_bodies(q, u, euler, mass, volume, C, damping, h, scheme, tolerance);
     const int64_t n = q.size() / 12;
     const Rows a = rows(acceleration, n, 3, "acceleration must be (N, 3) or (3)");

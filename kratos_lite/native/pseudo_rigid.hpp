@@ -115,68 +115,51 @@ KL_INLINE void linear_step(const PseudoGroup& g, int at, const D* F, const D* U,
     }
 }
 
-// Where Newton's method starts: Fdot turns with the body, by the rotation of a mid-point step (Cayley transform).
-template <class D>
-KL_INLINE void turned(const D* F, const D* U, double h, D* change) {
-    D rate[9], w[3], hh;
-    const D transposed[9] = {F[0], F[3], F[6], F[1], F[4], F[7], F[2], F[5], F[8]};
-    for (int i = 0; i < 3; ++i) solve3(transposed, U + 3 * i, rate + 3 * i);  // rows of Fdot F^-1
-    w[0] = h / 4 * (rate[7] - rate[5]);
-    w[1] = h / 4 * (rate[2] - rate[6]);
-    w[2] = h / 4 * (rate[3] - rate[1]);
-    dot<3>(w, w, hh);
-    for (int j = 0; j < 3; ++j) {
-        const D column[3] = {U[j], U[3 + j], U[6 + j]};
-        D once[3], twice[3];
-        cross(w, column, once);
-        cross(w, once, twice);
-        for (int i = 0; i < 3; ++i) change[3 * i + j] = 2.0 / (1.0 + hh) * (once[i] + twice[i]);
-    }
-}
-
-// Newton's method for the change of Fdot that conserves energy and momentum: Simo & Tarnow, ZAMP 43 (1992).
-// The strain of the end is that of the start and an increment, so that stiff bodies do not lose digits.
+// The change of Fdot that conserves energy and momentum: Simo & Tarnow, ZAMP 43 (1992) 757-792.
+//
+// The strain of the end is that of the start and an increment, so that stiff bodies do not lose digits.  Newton's
+// method has the stress S as a second unknown, eliminated (Magisano, Leonetti & Garcea, CMAME 313 (2017) 986-1005):
+// its matrix takes S as linearized in the former iteration, not the stress of the present F, which in a stiff body
+// that turns is far off.
 template <class D>
 KL_INLINE void energy_momentum(const PseudoGroup& g, int at, const D* F, const D* U, const D* f, D* change, D& flaw) {
     const double h = g.h;
-    D E[6], S[6], euler[9], volume, eta;
+    D E[6], S[6], euler[9], volume, eta, initial, share;
     load<9>(g.euler, at, euler);
     load<1>(g.volume, at, &volume);
     load<1>(g.damping, at, &eta);
     green_strain(F, E);
     stress(g.C, at, E, S);
-    turned(F, U, h, change);
+    dot<9>(U, U, initial);
+    share = 0.5 + eta / h;  // of the increment of strain in the mean stress
+    for (int k = 0; k < 9; ++k) change[k] = D{};
     auto going = volume == volume;
     for (int step = 0; step < NEWTON_STEPS && any(going); ++step) {
-        D dF[9], Fm[9], end[9], e[6], P[9], r[9], A[81], block[9], dd, uu, former;
+        D dF[9], middle[9], end[9], e[6], de[6], P[9], r[9], A[81], block[9], moved, size;
         for (int k = 0; k < 9; ++k) {
             dF[k] = h * (U[k] + 0.5 * change[k]);
-            Fm[k] = F[k] + 0.5 * dF[k];
+            middle[k] = F[k] + 0.5 * dF[k];
             end[k] = F[k] + dF[k];
         }
-        strain_rate(Fm, dF, e);
-        for (int a = 0; a < 6; ++a) e[a] = E[a] + (0.5 + eta / h) * e[a];
-        D T[6];
-        stress(g.C, at, e, T);
-        first_stress(Fm, T, P);
-        for (int i = 0; i < 3; ++i) {
-            D Mu[3];
-            apply(euler, change + 3 * i, Mu);
-            for (int j = 0; j < 3; ++j) r[3 * i + j] = h * (f[3 * i + j] - volume * P[3 * i + j]) - Mu[j];
-        }
         row_block(euler, h * h / 4 * volume, S, block);
-        tangent(block, h * h / 2 * (0.5 + eta / h) * volume, Fm, g.C, at, end, A);
-        solve<9>(A, r);
-        D de[6];
-        strain_rate(end, r, de);
-        for (int a = 0; a < 6; ++a) e[a] += (0.5 + eta / h) * (h / 2) * de[a];
+        tangent(block, h * h / 2 * share * volume, middle, g.C, at, end, A);
+        strain_rate(middle, dF, e);
+        for (int a = 0; a < 6; ++a) e[a] = E[a] + share * e[a];
         stress(g.C, at, e, S);
-        for (int k = 0; k < 9; ++k) change[k] = going ? change[k] + r[k] : change[k];
-        for (int k = 0; k < 9; ++k) end[k] = U[k] + change[k];
-        dot<9>(r, r, dd);
-        dot<9>(end, end, uu);
-        dot<9>(U, U, former);
-        going &= !(dd <= g.tolerance * g.tolerance * (uu + former));
+        first_stress(middle, S, P);
+        for (int k = 0; k < 9; k += 3) apply(euler, change + k, r + k);
+        for (int k = 0; k < 9; ++k) r[k] = h * (f[k] - volume * P[k]) - r[k];
+        solve<9>(A, r);
+        strain_rate(end, r, de);
+        for (int a = 0; a < 6; ++a) e[a] += h / 2 * share * de[a];
+        stress(g.C, at, e, S);
+        for (int k = 0; k < 9; ++k) {
+            change[k] = going ? change[k] + r[k] : change[k];
+            end[k] = U[k] + change[k];
+        }
+        dot<9>(r, r, moved);
+        dot<9>(end, end, size);
+        going &= !(moved <= g.tolerance * g.tolerance * (size + initial));
     }
     flaw = going ? 1.0 : flaw;
 }
