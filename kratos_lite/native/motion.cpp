@@ -12,7 +12,6 @@
 
 namespace {
 
-using kl::Array;
 using kl::gather;
 using kl::LANES;
 using kl::PseudoGroup;
@@ -30,8 +29,8 @@ constexpr int64_t GRAIN = 1024;  // steps of a body in one task
 const double* numbers(Floats array) {
     static const py::handle floats = py::dtype::of<double>().release();
     const auto* proxy = py::detail::array_proxy(array.ptr());
-    const bool fits = (proxy->flags & py::array::c_style) && (proxy->descr == floats.ptr() || Array<double>::check_(array));
-    if (!fits) throw py::type_error("arrays must be C-contiguous float64");
+    const bool right = proxy->descr == floats.ptr() || py::isinstance<py::array_t<double>>(array);
+    if (!right || !(proxy->flags & py::array::c_style)) throw py::type_error("arrays must be C-contiguous float64");
     return reinterpret_cast<const double*>(proxy->data);
 }
 
@@ -293,19 +292,18 @@ std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Float
 
 PYBIND11_MODULE(_motion, m) {
     kl::common(m);
-    const auto a = [](const char* name) { return py::arg(name).noconvert(); };
-    m.def("rigid_half", &rigid_half, "out = q at mid-step", a("q"), a("u"), py::arg("h"), a("out"));
-    m.def("rigid_finish", &rigid_finish, "q and u at the end of the step; the first body that failed, or -1", a("q"),
-          a("u"), a("qh"), a("load"), a("inertia"), a("inverse"), a("mass"), py::arg("h"), py::arg("scheme"),
-          py::arg("tolerance"));
-    m.def("rigid_steps", &rigid_steps, "q and u after steps with constant loads; the first body that failed and its step",
-          a("q"), a("u"), a("inertia"), a("inverse"), a("mass"), a("acceleration"), a("spatial"), a("convected"),
-          py::arg("h"), py::arg("steps"), py::arg("scheme"), py::arg("tolerance"), py::arg("work") = py::none());
-    m.def("pseudo_finish", &pseudo_finish, "q and u at the end of the step; the first body that failed, or -1", a("q"),
-          a("u"), a("load"), a("euler"), a("mass"), a("volume"), a("C"), a("damping"), py::arg("h"), py::arg("scheme"),
-          py::arg("tolerance"));
-    m.def("pseudo_steps", &pseudo_steps,
-          "q and u after steps with constant loads; the first body that failed and its step", a("q"), a("u"),
-          a("euler"), a("mass"), a("volume"), a("C"), a("damping"), a("acceleration"), a("spatial"), py::arg("h"),
-          py::arg("steps"), py::arg("scheme"), py::arg("tolerance"), py::arg("work") = py::none());
+    using py::arg;
+    const char* one = "q and u at the end of the step; returns the first body that failed, or -1";
+    const char* many = "q and u after steps with constant loads; returns the first body that failed and its step";
+    m.def("rigid_half", &rigid_half, "out = q at mid-step", arg("q"), arg("u"), arg("h"), arg("out"));
+    m.def("rigid_finish", &rigid_finish, one, arg("q"), arg("u"), arg("qh"), arg("load"), arg("inertia"),
+          arg("inverse"), arg("mass"), arg("h"), arg("scheme"), arg("tolerance"));
+    m.def("rigid_steps", &rigid_steps, many, arg("q"), arg("u"), arg("inertia"), arg("inverse"), arg("mass"),
+          arg("acceleration"), arg("spatial"), arg("convected"), arg("h"), arg("steps"), arg("scheme"),
+          arg("tolerance"), arg("work") = py::none());
+    m.def("pseudo_finish", &pseudo_finish, one, arg("q"), arg("u"), arg("load"), arg("euler"), arg("mass"),
+          arg("volume"), arg("C"), arg("damping"), arg("h"), arg("scheme"), arg("tolerance"));
+    m.def("pseudo_steps", &pseudo_steps, many, arg("q"), arg("u"), arg("euler"), arg("mass"), arg("volume"), arg("C"),
+          arg("damping"), arg("acceleration"), arg("spatial"), arg("h"), arg("steps"), arg("scheme"),
+          arg("tolerance"), arg("work") = py::none());
 }
