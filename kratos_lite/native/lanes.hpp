@@ -69,8 +69,8 @@ KL_INLINE bool any(const M& mask) {
 
 template <class D>
 KL_INLINE void product(const D* A, const D* B, D* C) {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) C[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
+    for (int i = 0; i < 9; i += 3)
+        for (int j = 0; j < 3; ++j) C[i + j] = A[i] * B[j] + A[i + 1] * B[3 + j] + A[i + 2] * B[6 + j];
 }
 
 template <class D>

@@ -304,7 +304,7 @@ RUNS = [(run_rigid, scheme) for scheme in RIGID_SCHEMES] + [(run_pseudo, scheme)
 def test_compiled_steps_are_those_of_numpy(run, scheme, monkeypatch):
     found = run(scheme)
     monkeypatch.setattr(steps, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run(scheme), rtol=0, atol=2e-12)
+    np.testing.assert_allclose(found, run(scheme), rtol=0, atol=2e-13)
 
 
 @compiled
@@ -313,7 +313,7 @@ def test_compiled_steps_are_those_of_numpy_where_half_a_step_is_more_than_a_radi
     assert (np.linalg.norm(rigid_bodies(37)[1][:, :3], axis=1) * 0.25 / 2 > 1).any()
     found = run_rigid(scheme, count=1, h=0.25)
     monkeypatch.setattr(steps, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run_rigid(scheme, count=1, h=0.25), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found, run_rigid(scheme, count=1, h=0.25), rtol=0, atol=2e-13)
 
 
 @compiled
