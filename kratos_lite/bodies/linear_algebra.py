@@ -1,0 +1,36 @@
+"""Products and solutions of small systems, one or many through leading axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def first(failed: NDArray[np.bool_]) -> int:
+    """Return the first index, counted through all axes, that is true, or -1."""
+    return int(np.argmax(failed)) if failed.any() else -1
+
+
+def apply(A: Array, x: Array) -> Array:
+    """Return A x (..., n)."""
+    return np.asarray((A @ x[..., None])[..., 0])
+
+
+def transposed(A: Array, x: Array) -> Array:
+    """Return A^T x (..., n)."""
+    return apply(np.swapaxes(A, -1, -2), x)
+
+
+def length(x: Array) -> Array:
+    """Return |x| (...)."""
+    return np.asarray(np.sqrt((x * x).sum(axis=-1)))
+
+
+def solve(A: Array, b: Array) -> Array:
+    """Return x (..., n) of A x = b, not a number where A is singular."""
+    try:
+        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.full(b.shape, np.nan)

@@ -1,0 +1,110 @@
+"""One step of pseudo-rigid bodies in NumPy, the reference of the compiled kernel.
+
+Matrices F (9) are row-wise; B (6, 9) of F is the operator with B X = sym(F^T X) in Voigt order, with
+engineering shear: the force is B^T S, the stiffness B^T C B and S applied to each row.
+
+Sources: Zhang & Skeel, Appl. Numer. Math. 25 (1997) 297-302 (DEF_LIM); Simo & Tarnow, ZAMP 43 (1992) 757-792
+(ENERGY_MOMENTUM); Magisano, Leonetti & Garcea, Comput. Methods Appl. Mech. Eng. 313 (2017) 986-1005 (its
+Newton method).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
+from kratos_lite.voigt import PAIRS, tensor
+
+Array = NDArray[np.float64]
+
+NEWTON_STEPS = 50
+
+
+def pseudo_finish(
+    q: Array,
+    u: Array,
+    load: Array,
+    euler: Array,
+    mass: Array,
+    volume: Array,
+    C: Array,
+    damping: Array,
+    h: float,
+    scheme: str,
+    tolerance: float,
+) -> int:
+    """Return the first body whose step failed, or -1: `steps.pseudo_finish` in NumPy."""
+    F, U, f = q[..., :9], u[..., :9], load[..., :9]
+    V, eta = np.asarray(volume)[..., None, None], np.asarray(damping)[..., None, None]
+    going = np.zeros(q.shape[:-1], dtype=bool)
+    change = np.empty(u.shape)
+    with np.errstate(all="ignore"):
+        if scheme == "ENERGY_MOMENTUM":
+            change[..., :9], going = _energy_momentum(F, U, f, euler, V, C, eta, h, tolerance)
+        else:
+            change[..., :9] = _linear_step(F, U, f, euler, V, C, eta, h, scheme == "DEF_LIM")
+        change[..., 9:] = h * load[..., 9:] / np.asarray(mass)[..., None]
+        q += h * (u + change / 2)
+        u += change
+    return first(going | ~np.isfinite(u).all(axis=-1))
+
+
+def _linear_step(
+    F: Array, U: Array, f: Array, euler: Array, V: Array, C: Array, eta: Array, h: float, implicit: bool
+) -> Array:
+    """Return the change (..., 9) of the rate of F by the forces at mid-step, if `implicit` linearized."""
+    B = _operator(F + h / 2 * U)
+    S = apply(C, _green(F + h / 2 * U))
+    K = V * (_rows(tensor(S)) + np.swapaxes(B, -1, -2) @ C @ B)
+    A = _rows(euler)
+    if implicit:
+        A = A + (eta * (h / 2) + h * h / 4) * K
+    return solve(A, h * (f - V[..., 0] * transposed(B, S) - eta[..., 0] * apply(K, U)))
+
+
+def _energy_momentum(
+    F: Array, U: Array, f: Array, euler: Array, V: Array, C: Array, eta: Array, h: float, tolerance: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the change (..., 9) of the rate of F that conserves energy and momentum; where none was found.
+
+    The strain of the end is that of the start and an increment, so that stiff bodies do not lose digits.
+    Newton's method has the stress S as a second unknown, eliminated: its matrix takes S as linearized in the
+    former iteration.
+    """
+    E, M = _green(F), _rows(euler)
+    S, share = apply(C, E), 0.5 + eta / h
+    change = np.zeros(U.shape)
+    going = np.ones(U.shape[:-1], dtype=bool)
+    for _ in range(NEWTON_STEPS):
+        dF = h * (U + change / 2)
+        middle, end = _operator(F + dF / 2), _operator(F + dF)
+        A = M + h * h / 2 * V * (_rows(tensor(S)) / 2 + np.swapaxes(middle, -1, -2) @ C @ (share * end))
+        e = E + share[..., 0] * apply(middle, dF)
+        d = solve(A, h * (f - V[..., 0] * transposed(middle, apply(C, e))) - apply(M, change))
+        S = apply(C, e + h / 2 * share[..., 0] * apply(end, d))
+        change = np.where(going[..., None], change + d, change)
+        going = going & ~(length(d) <= tolerance * np.hypot(length(U), length(U + change)))
+        if not going.any():
+            break
+    return change, going
+
+
+def _operator(F: Array) -> Array:
+    """Return B (..., 6, 9) of F (..., 9): B X is the strain sym(F^T X), with engineering shear."""
+    B = np.zeros((*F.shape[:-1], 6, 3, 3))
+    columns = F.reshape(*F.shape[:-1], 3, 3)
+    for a, (i, j) in enumerate(PAIRS):
+        B[..., a, :, j] = columns[..., :, i]
+        B[..., a, :, i] = columns[..., :, j]
+    return B.reshape(*F.shape[:-1], 6, 9)
+
+
+def _green(F: Array) -> Array:
+    """Return the strain (F^T F - 1)/2 (..., 6) of F (..., 9)."""
+    return np.asarray((apply(_operator(F), F) - np.array([1.0, 1, 1, 0, 0, 0])) / 2)
+
+
+def _rows(A: Array) -> Array:
+    """Return the matrix (..., 9, 9) that applies A (..., 3, 3) to each row of a matrix (9)."""
+    return np.asarray(np.einsum("ik,...jl->...ijkl", np.eye(3), A).reshape(*A.shape[:-2], 9, 9))
