@@ -14,7 +14,7 @@ FLOORS = [
     {"errors"},
     {"native"},
     {"blockmatrix", "registry", "voigt", "arguments"},
-    {"rotations", "kirchhoff"},
+    {"rotations"},
     {"shapes", "quadrature"},
     {"elements", "materials", "mesh"},
     {"batches", "supports", "generate", "io.document", "io.text", "io.names", "io.output"},

@@ -258,7 +258,7 @@ class Body(ABC):
         return total
 
     def constant_loads(self) -> tuple[Array, Array, Array]:
-        """Return the constant loads: acceleration (..., 3), forces (..., dofs) fixed in space, and in the body."""
+        """Return the constant loads: acceleration (..., 3), forces (..., dofs) in space and in the body."""
         lead = self.q.shape[:-1]
         acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
         for load in self.loads:

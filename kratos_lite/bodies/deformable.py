@@ -1,4 +1,4 @@
-"""Deformable: what pseudo-rigid and finite-element bodies share: forces of deformation, and their tangent."""
+"""Deformable: what pseudo-rigid and finite-element bodies share."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Solve: TypeAlias = Callable[[Array], Array]
 class Deformable(Body):
     """A body whose configurations form a linear space: q + h u is one again.
 
-    `DEF_EXP`: explicit, momenta exact, energy bounded, steps up to `critical_step`.
-    `DEF_LIM`: linearly implicit; linear momentum exact, angular momentum to O(h⁴), not safe for a stiff
-    body that spins.  `ENERGY_MOMENTUM`: implicit; energy and both momenta exact whatever the step.
+    ``DEF_EXP``: explicit, momenta exact, energy bounded, steps up to `critical_step`.
+    ``DEF_LIM``: linearly implicit; linear momentum exact, angular momentum to O(h⁴), not safe for a stiff
+    body that spins.  ``ENERGY_MOMENTUM``: implicit; energy and both momenta exact whatever the step.
     """
 
     schemes: ClassVar[tuple[str, ...]] = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
@@ -30,27 +30,8 @@ class Deformable(Body):
         return "ENERGY_MOMENTUM"
 
     @abstractmethod
-    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the internal load over an increment dq, whose work is the change of internal energy.
-
-        `damping` is the ratio η/h, which adds the viscous stress.
-        """
-
-    @abstractmethod
-    def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u, the viscous load for η = 1."""
-
-    @abstractmethod
-    def mass_solver(self) -> Solve:
-        """Return what solves M x = b."""
-
-    @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c K(q)) x = b."""
-
-    @abstractmethod
-    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
+        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal load."""
 
     @abstractmethod
     def highest_frequency(self) -> float:

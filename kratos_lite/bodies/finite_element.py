@@ -195,7 +195,10 @@ class FiniteElementBody(Deformable):
         return self.form.load(self.q if q is None else q)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load of the energy–momentum method; see `Deformable`."""
+        """Return the load over an increment dq, whose work is the change of strain energy.
+
+        `damping` is the ratio η/h, which adds the viscous stress.
+        """
         return self.form.load_over(q, dq, damping)
 
     def internal_energy(self) -> float:
@@ -207,11 +210,11 @@ class FiniteElementBody(Deformable):
         return self.form.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u; see `Deformable`."""
+        """Return K(q) u, the viscous load for η = 1."""
         return self.form.damping_load(q, u)
 
     def mass_solver(self) -> Solve:
-        """Return what solves M x = b."""
+        """Return what solves M x = b, for motions that the form has."""
         return self.form.solver(self.q, 0.0) if isinstance(self.form, Modal) else self._mass.solve
 
     def solver(self, q: Array, c: float) -> Solve:
@@ -219,7 +222,7 @@ class FiniteElementBody(Deformable):
         return self.form.solver(q, c)
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b; see `Deformable`."""
+        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
         return self.form.increment_solver(q, dq, damping, c)
 
     def highest_frequency(self) -> float:
@@ -229,7 +232,7 @@ class FiniteElementBody(Deformable):
     def modes(self, count: int = 12) -> tuple[Array, Array]:
         """Return the lowest natural frequencies of the free undeformed body, and their shapes.
 
-        Frequencies are (count,) in rad/s, shapes (3n, count) with φ^T M φ = 1; the first six are the rigid motions.
+        Frequencies are (count,) in rad/s, shapes (3n, count) with φ^T M φ = 1; six are rigid motions.
         """
         return modes(self.form.K0.scipy().tocsr(), self._mass.matrix(), count)
 

@@ -101,11 +101,11 @@ class Form(ABC):
         return self.stiffness(q) @ u
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load of the energy–momentum method; see `Deformable.load_over`."""
+        """Return the load of the energy–momentum method; see `FiniteElementBody`."""
         raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return the solver of the energy–momentum method; see `Deformable`."""
+        """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
         raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
 
     def highest_frequency(self, q: Array) -> float:
@@ -140,12 +140,12 @@ class TotalLagrangian(Form):
         return self._factorised(self.stiffness(q), c)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load of the energy–momentum method; see `Deformable.load_over`."""
+        """Return the load of the energy–momentum method; see `FiniteElementBody`."""
         q, dq = q.reshape(-1, 3), dq.reshape(-1, 3)
         return finite_strain.internal_load(self.points, self.batches, q, dq, damping).ravel()
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return the solver of the energy–momentum method; see `Deformable`."""
+        """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
         q, dq = q.reshape(-1, 3), dq.reshape(-1, 3)
         D = finite_strain.stiffness(self.points, self.batches, self.pattern, q, dq, damping)
         return self._factorised(D, c, symmetric=False)

@@ -18,7 +18,8 @@ from kratos_lite.arguments import finite
 from kratos_lite.batches import add_nodal
 from kratos_lite.bodies.body import Body, elements_of, points_of, vector_of
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.rigid import RigidBody, rotation_of
+from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.bodies.series import Factor, function_of
 from kratos_lite.elements import surface_pressure
 from kratos_lite.errors import InputError, ModelError
@@ -202,7 +203,7 @@ class Torque(BodyLoad):
         """Return the load on a body; ModelError unless it is rigid."""
         if not isinstance(body, RigidBody):
             raise ModelError(
-                f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces: kl.Force at two points"
+                f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces at two points"
             )
         zero, t = np.zeros(3), self.torque
         fixed = np.broadcast_to(np.concatenate([t, zero]), body.u.shape)
@@ -210,7 +211,7 @@ class Torque(BodyLoad):
             return Bound(lambda q, u, time: fixed, factor, steady, convected=fixed)
 
         def generalised(q: Array, u: Array, time: float) -> Array:
-            T = (np.swapaxes(rotation_of(q), -1, -2) @ t[:, None])[..., 0]
+            T = (np.swapaxes(rotation(q), -1, -2) @ t[:, None])[..., 0]
             return np.concatenate([T, np.zeros_like(T)], axis=-1)
 
         return Bound(generalised, factor, steady, spatial=fixed)
@@ -340,7 +341,7 @@ class Callback(BodyLoad):
         def generalised(q: Array, u: Array, time: float) -> Array:
             out = np.asarray(self.function(q, u, time), dtype=float)
             if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
-                R = rotation_of(q)
+                R = rotation(q)
                 T = (np.swapaxes(R, -1, -2) @ out[..., 3:6, None])[..., 0] + out[..., 6:]
                 return np.concatenate([T, out[..., :3]], axis=-1)
             if out.shape != u.shape:

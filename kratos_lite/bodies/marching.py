@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
-from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.many import together
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
-from kratos_lite.bodies.schemes import SCHEMES
+from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.schemes import take_step
 from kratos_lite.bodies.state import State
 from kratos_lite.errors import InputError, SolveError
 
@@ -170,7 +169,7 @@ def _step(body: Body, h: float, parts: int) -> None:
     for part in range(parts):
         body.time = start + part * h
         before = body.u
-        load = SCHEMES[body.scheme](body, h)
+        load = take_step(body, h)
         body.external_work = body.external_work + h / 2 * ((before + body.u) * load).sum(axis=-1)
         if isinstance(body, FiniteElementBody):
             body.q, body.u = body.form.project(body.q, body.u)
@@ -185,12 +184,9 @@ def _check_still_stable(body: Deformable, h: float, count: int) -> None:
 
 def _advance_compiled(body: Body, h: float, count: int) -> bool:
     """Take steps with nothing but constant loads at once, without Python; return whether that is possible."""
-    if isinstance(body, Obstacle):
-        steps.drift(body, h * count)
-        return True
     if body.constraints or not all(load.is_constant for load in body.loads):
         return False
-    if isinstance(body, (RigidBody, PseudoRigidBody)):
-        steps.advance(body, h, count)
-        return True
-    return False
+    if not isinstance(body, (RigidBody, PseudoRigidBody)):
+        return False
+    body.coast(h, count)
+    return True

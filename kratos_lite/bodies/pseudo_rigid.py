@@ -10,15 +10,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite import kirchhoff
 from kratos_lite.arguments import finite
+from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.deformable import Deformable, Solve
+from kratos_lite.bodies.linear_algebra import apply, solve, transposed
+from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.rotations import axial, hat
+from kratos_lite.voigt import tensor
 
 Array = NDArray[np.float64]
 
@@ -62,7 +65,7 @@ class PseudoRigidBody(Deformable):
         characteristics: Characteristics | None = None,
         scheme: str | None = None,
         damping: float = 0.0,
-        tolerance: float = 1e-14,
+        tolerance: float = 1e-12,
     ) -> None:
         if isinstance(material, Mapping):
             if len(material) != 1:
@@ -150,68 +153,49 @@ class PseudoRigidBody(Deformable):
         rows = (gradient_of(v) @ self.characteristics.euler).reshape(*v.shape[:-1], 9)
         return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
 
-    # ---- deformation -----------------------------------------------------------------------------
-
-    @property
-    def _volume(self) -> Array:
-        return np.asarray(self.characteristics.volume)[..., None, None]
+    # ---- deformation ----------------------------------------------------------------------------
 
     def internal_load(self, q: Array | None = None) -> Array:
         """Return V P(F) row by row, and no force on the mass centre, (..., 12)."""
-        F = gradient_of(self.q if q is None else q)
-        return _generalised(self._volume * kirchhoff.piola(self.C, F))
-
-    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return V F_m S_a row by row; see `Deformable.load_over`."""
-        P = kirchhoff.piola(self.C, gradient_of(q), gradient_of(dq), damping)
-        return _generalised(self._volume * P)
+        F = (self.q if q is None else q)[..., :9]
+        out = np.zeros((*F.shape[:-1], 12))
+        V = np.asarray(self.characteristics.volume)[..., None]
+        out[..., :9] = V * transposed(strain_operator(F), apply(self.C, green_strain(F)))
+        return out
 
     def internal_energy(self) -> Array | float:
         """Return V ½ E : C : E, (...) in J."""
-        return np.asarray(self.characteristics.volume * kirchhoff.energy_density(self.C, self.deformation))
+        E = green_strain(self.q[..., :9])
+        return np.asarray(self.characteristics.volume * (E * apply(self.C, E)).sum(axis=-1) / 2)
 
     def stiffness(self, q: Array | None = None) -> Array:
         """Return V dP/dF (..., 9, 9), rows and columns as F in q."""
-        F = gradient_of(self.q if q is None else q)
-        return self._matrix(kirchhoff.piola_tangent(self.C, F))
-
-    def _matrix(self, tangent: Array) -> Array:
-        return np.asarray(self._volume * tangent.reshape(*tangent.shape[:-4], 9, 9))
-
-    def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u; see `Deformable`."""
-        rows = (self.stiffness(q) @ u[..., :9, None])[..., 0]
-        return np.concatenate([rows, np.zeros_like(u[..., 9:])], axis=-1)
+        F = (self.q if q is None else q)[..., :9]
+        B, V = strain_operator(F), np.asarray(self.characteristics.volume)[..., None, None]
+        stress = by_rows(tensor(apply(self.C, green_strain(F))))
+        return np.asarray(V * (stress + np.swapaxes(B, -1, -2) @ self.C @ B))
 
     def mass_matrix(self) -> Array:
         """Return the mass of Ḟ, diag(E0, E0, E0) (..., 9, 9) in kg m²."""
-        E0 = self.characteristics.euler
-        M = np.zeros((*E0.shape[:-2], 3, 3, 3, 3))
-        for i in range(3):
-            M[..., i, :, i, :] = E0
-        return M.reshape(*E0.shape[:-2], 9, 9)
-
-    def mass_solver(self) -> Solve:
-        """Return what solves M x = b."""
-        return self._solver(np.zeros((9, 9)))
+        return by_rows(self.characteristics.euler)
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
-        return self._solver(c * self.stiffness(q))
+        A, m = self.mass_matrix() + c * self.stiffness(q), self.mass[..., None]
+        return lambda b: np.concatenate([solve(A, b[..., :9]), b[..., 9:] / m], axis=-1)
 
-    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b; see `Deformable`."""
-        tangent = kirchhoff.piola_tangent(self.C, gradient_of(q), gradient_of(dq), damping)
-        return self._solver(c * self._matrix(tangent))
+    def coast(self, h: float, count: int) -> None:
+        """Take steps of h s under constant loads alone, all at once."""
+        acceleration, spatial, _ = self.constant_loads()
+        constant = (*self.step_constants(), acceleration, spatial)
+        steps.pseudo_steps(
+            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
+        )
 
-    def _solver(self, stiffness: Array) -> Solve:
-        A, m = self.mass_matrix() + stiffness, self.mass[..., None]
-
-        def solve(b: Array) -> Array:
-            rows = np.linalg.solve(A, b[..., :9, None])[..., 0]
-            return np.concatenate([rows, b[..., 9:] / m], axis=-1)
-
-        return solve
+    def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
+        """Return Euler tensor, mass, volume, C and damping, as `steps` take them."""
+        c = self.characteristics
+        return c.euler, c.mass, c.volume, self.C, self.damping
 
     def frequencies(self) -> Array:
         """Return the angular frequencies (..., 9) at the configuration in rad/s, ascending; 0 if ω² < 0."""
@@ -246,8 +230,3 @@ class PseudoRigidBody(Deformable):
 def gradient_of(q: Array) -> Array:
     """Return F (..., 3, 3) of pseudo-rigid configurations, or Ḟ of velocities, (..., 12)."""
     return q[..., :9].reshape(*q.shape[:-1], 3, 3)
-
-
-def _generalised(P: Array) -> Array:
-    """Return V P (..., 3, 3) as a generalised force (..., 12)."""
-    return np.concatenate([P.reshape(*P.shape[:-2], 9), np.zeros((*P.shape[:-2], 3))], axis=-1)

@@ -54,10 +54,10 @@ def _linear_step(
     F: Array, U: Array, f: Array, euler: Array, V: Array, C: Array, eta: Array, h: float, implicit: bool
 ) -> Array:
     """Return the change (..., 9) of the rate of F by the forces at mid-step, if `implicit` linearized."""
-    B = _operator(F + h / 2 * U)
-    S = apply(C, _green(F + h / 2 * U))
-    K = V * (_rows(tensor(S)) + np.swapaxes(B, -1, -2) @ C @ B)
-    A = _rows(euler)
+    B = strain_operator(F + h / 2 * U)
+    S = apply(C, green_strain(F + h / 2 * U))
+    K = V * (by_rows(tensor(S)) + np.swapaxes(B, -1, -2) @ C @ B)
+    A = by_rows(euler)
     if implicit:
         A = A + (eta * (h / 2) + h * h / 4) * K
     return solve(A, h * (f - V[..., 0] * transposed(B, S) - eta[..., 0] * apply(K, U)))
@@ -72,14 +72,14 @@ def _energy_momentum(
     Newton's method has the stress S as a second unknown, eliminated: its matrix takes S as linearized in the
     former iteration.
     """
-    E, M = _green(F), _rows(euler)
+    E, M = green_strain(F), by_rows(euler)
     S, share = apply(C, E), 0.5 + eta / h
     change = np.zeros(U.shape)
     going = np.ones(U.shape[:-1], dtype=bool)
     for _ in range(NEWTON_STEPS):
         dF = h * (U + change / 2)
-        middle, end = _operator(F + dF / 2), _operator(F + dF)
-        A = M + h * h / 2 * V * (_rows(tensor(S)) / 2 + np.swapaxes(middle, -1, -2) @ C @ (share * end))
+        middle, end = strain_operator(F + dF / 2), strain_operator(F + dF)
+        A = M + h * h / 2 * V * (by_rows(tensor(S)) / 2 + np.swapaxes(middle, -1, -2) @ C @ (share * end))
         e = E + share[..., 0] * apply(middle, dF)
         d = solve(A, h * (f - V[..., 0] * transposed(middle, apply(C, e))) - apply(M, change))
         S = apply(C, e + h / 2 * share[..., 0] * apply(end, d))
@@ -90,7 +90,7 @@ def _energy_momentum(
     return change, going
 
 
-def _operator(F: Array) -> Array:
+def strain_operator(F: Array) -> Array:
     """Return B (..., 6, 9) of F (..., 9): B X is the strain sym(F^T X), with engineering shear."""
     B = np.zeros((*F.shape[:-1], 6, 3, 3))
     columns = F.reshape(*F.shape[:-1], 3, 3)
@@ -100,11 +100,11 @@ def _operator(F: Array) -> Array:
     return B.reshape(*F.shape[:-1], 6, 9)
 
 
-def _green(F: Array) -> Array:
+def green_strain(F: Array) -> Array:
     """Return the strain (F^T F - 1)/2 (..., 6) of F (..., 9)."""
-    return np.asarray((apply(_operator(F), F) - np.array([1.0, 1, 1, 0, 0, 0])) / 2)
+    return np.asarray((apply(strain_operator(F), F) - np.array([1.0, 1, 1, 0, 0, 0])) / 2)
 
 
-def _rows(A: Array) -> Array:
+def by_rows(A: Array) -> Array:
     """Return the matrix (..., 9, 9) that applies A (..., 3, 3) to each row of a matrix (9)."""
     return np.asarray(np.einsum("ik,...jl->...ijkl", np.eye(3), A).reshape(*A.shape[:-2], 9, 9))

@@ -5,13 +5,16 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.arguments import finite
+from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body, Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
@@ -83,13 +86,13 @@ class RigidBody(Body):
     @property
     def rotation(self) -> Array:
         """Rotation Λ (..., 3, 3)."""
-        return rotation_of(self.q)
+        return rotation(self.q)
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
         """Return x = Λ (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
         q = self.q if q is None else q
         A, many = self._arms(X)
-        x = A @ np.swapaxes(rotation_of(q), -1, -2) + q[..., None, 9:]
+        x = A @ np.swapaxes(rotation(q), -1, -2) + q[..., None, 9:]
         return np.asarray(x if many else x[..., 0, :])
 
     def velocity(self, X: ArrayLike) -> Array:
@@ -109,7 +112,7 @@ class RigidBody(Body):
         q = finite(q, "a configuration")
         if q.shape != self.q.shape:
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
-        check_rotation(rotation_of(q), "the rotation of a configuration")
+        check_rotation(rotation(q), "the rotation of a configuration")
         self.q = q.copy()
 
     def turn(self, rotation: ArrayLike) -> None:
@@ -129,30 +132,45 @@ class RigidBody(Body):
 
     def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
         """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.rows`."""
-        return np.arange(6), np.hstack([-rotation_of(q) @ hat(X - self.center), np.eye(3)])
+        return np.arange(6), np.hstack([-rotation(q) @ hat(X - self.center), np.eye(3)])
 
     def push(self, X: Array, force: Array, q: Array) -> Array:
         """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.push`."""
         f = np.broadcast_to(force, (*q.shape[:-1], 3))
-        referential = (np.swapaxes(rotation_of(q), -1, -2) @ f[..., None])[..., 0]
+        referential = (np.swapaxes(rotation(q), -1, -2) @ f[..., None])[..., 0]
         return np.concatenate([np.cross(X - self.center, referential), f], axis=-1)
 
     def push_nodes(self, forces: Array, q: Array) -> Array:
         """Return the resultant torque and force of nodal forces; see `Body.push_nodes`."""
         assert self.mesh is not None
         A = self.mesh.points - self.center[..., None, :]
-        moments = np.swapaxes(A, -1, -2) @ (forces @ rotation_of(q))
+        moments = np.swapaxes(A, -1, -2) @ (forces @ rotation(q))
         resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
         return np.concatenate([2 * axial(np.swapaxes(moments, -1, -2)), resultant], axis=-1)
 
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return Λ times the vector; see `Body.convected`."""
-        return np.asarray(rotation_of(q) @ vector)
+        return np.asarray(rotation(q) @ vector)
 
     def times_mass(self, v: Array) -> Array:
         """Return J W and m v̄; see `Body.times_mass`."""
         spin = (self.characteristics.inertia @ v[..., :3, None])[..., 0]
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
+
+    def coast(self, h: float, count: int) -> None:
+        """Take steps of h s under constant loads alone, all at once."""
+        constant = (*self.step_constants(), *self.constant_loads())
+        steps.rigid_steps(
+            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
+        )
+
+    def step_constants(self) -> tuple[Array, Array, Array]:
+        """Return inertia, its inverse and mass, as `steps` take them."""
+        return self.characteristics.inertia, self._inverse, self.characteristics.mass
+
+    @cached_property
+    def _inverse(self) -> Array:
+        return np.asarray(np.linalg.inv(self.characteristics.inertia), dtype=float)
 
     # ---- momenta ---------------------------------------------------------------------------------
 
@@ -170,11 +188,6 @@ class RigidBody(Body):
         if about is None:
             return np.asarray(spin)
         return np.asarray(spin + np.cross(self.q[..., 9:] - finite(about, "a point"), self.linear_momentum()))
-
-
-def rotation_of(q: Array) -> Array:
-    """Return the rotation (..., 3, 3) of rigid configurations (..., 12)."""
-    return np.swapaxes(q[..., :9].reshape(*q.shape[:-1], 3, 3), -1, -2)
 
 
 class Obstacle(RigidBody):
@@ -205,6 +218,11 @@ class Obstacle(RigidBody):
     def mass(self) -> Array:
         """Return 0: an obstacle carries no mass."""
         return np.zeros_like(self.characteristics.mass)
+
+    def coast(self, h: float, count: int) -> None:
+        """Move on with the velocity as it is; see `RigidBody.coast`."""
+        for _ in range(count):
+            self.q[...] = steps.rigid_half(self.q, self.u, 2 * h)
 
     def times_mass(self, v: Array) -> Array:
         """Return zeros."""

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.deformable import Deformable, Solve
+from kratos_lite.bodies.deformable import Solve
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.errors import SolveError
 
@@ -36,32 +38,45 @@ def rigid_step(body: RigidBody, h: float) -> Array:
     """Advance a rigid body by h s; return the generalised load at the middle."""
     qh = steps.rigid_half(body.q, body.u, h)
     load = body.external_load(qh, body.time + h / 2)
-    c = body.characteristics
 
     def advance(extra: Array) -> tuple[Array, Array]:
         q, u = body.q.copy(), body.u.copy()
-        steps.rigid_finish(q, u, qh, load + extra, c.inertia, c.mass, h, body.scheme, body.tolerance)
+        steps.rigid_finish(q, u, qh, load + extra, *body.step_constants(), h, body.scheme, body.tolerance)
         return q, u
 
     def apart(b: Array) -> Array:
-        spin = np.linalg.solve(c.inertia, b[:3])
-        return np.concatenate([spin, b[3:] / c.mass])
+        _, inverse, mass = body.step_constants()
+        return np.concatenate([inverse @ b[:3], b[3:] / mass])
 
-    return _finish(body, h, qh, load, advance, apart)
+    return _finish(body, h, qh, load, advance, lambda: apart)
 
 
-def explicit_step(body: Deformable, h: float) -> Array:
+def pseudo_rigid_step(body: PseudoRigidBody, h: float) -> Array:
+    """Advance a pseudo-rigid body by h s; return the generalised load at the middle."""
+    qh = body.q + h / 2 * body.u
+    load = body.external_load(qh, body.time + h / 2)
+    c = 0.0 if body.scheme == "DEF_EXP" else body.damping * h / 2 + h * h / 4
+
+    def advance(extra: Array) -> tuple[Array, Array]:
+        q, u = body.q.copy(), body.u.copy()
+        steps.pseudo_finish(q, u, load + extra, *body.step_constants(), h, body.scheme, body.tolerance)
+        return q, u
+
+    return _finish(body, h, qh, load, advance, lambda: body.solver(qh, c))
+
+
+def explicit_step(body: FiniteElementBody, h: float) -> Array:
     """Advance by ``DEF_EXP``: the kick takes the mass matrix alone; return the load at the middle."""
     return _kick(body, h, lambda qh: body.mass_solver())
 
 
-def linearly_implicit_step(body: Deformable, h: float) -> Array:
+def linearly_implicit_step(body: FiniteElementBody, h: float) -> Array:
     """Advance by ``DEF_LIM``: M + (η h/2 + h²/4) K at the middle; return the load there."""
     c = body.damping * h / 2 + h * h / 4
     return _kick(body, h, lambda qh: body.solver(qh, c))
 
 
-def _kick(body: Deformable, h: float, solver: Callable[[Array], Solve]) -> Array:
+def _kick(body: FiniteElementBody, h: float, solver: Callable[[Array], Solve]) -> Array:
     qh = body.q + h / 2 * body.u
     load = body.external_load(qh, body.time + h / 2)
     force = load - body.internal_load(qh)
@@ -73,10 +88,10 @@ def _kick(body: Deformable, h: float, solver: Callable[[Array], Solve]) -> Array
         u = body.u + h * solve(force + extra)
         return qh + h / 2 * u, u
 
-    return _finish(body, h, qh, load, advance, solve)
+    return _finish(body, h, qh, load, advance, lambda: solve)
 
 
-def energy_momentum_step(body: Deformable, h: float) -> Array:
+def energy_momentum_step(body: FiniteElementBody, h: float) -> Array:
     """Advance by ``ENERGY_MOMENTUM``; return the external load at the middle.
 
     M (u⁺ - u) / h + f(q, dq) = f_ext at q + dq/2, with dq = h/2 (u + u⁺).
@@ -90,10 +105,10 @@ def energy_momentum_step(body: Deformable, h: float) -> Array:
         u = _balanced(body, h, extra, first, loads)
         return body.q + h / 2 * (body.u + u), u
 
-    return _finish(body, h, middle, loads[0], advance, first, loads)
+    return _finish(body, h, middle, loads[0], advance, lambda: first, loads)
 
 
-def _balanced(body: Deformable, h: float, extra: Array, solve: Solve, loads: list[Array]) -> Array:
+def _balanced(body: FiniteElementBody, h: float, extra: Array, solve: Solve, loads: list[Array]) -> Array:
     """Return the velocity at the end of a step, by Newton with factors kept for as long as they do."""
     q, u, ratio, time = body.q, body.u, body.damping / h, body.time + h / 2
     v, last = u.copy(), np.inf
@@ -126,7 +141,7 @@ def _finish(
     qh: Array,
     load: Array,
     advance: Advance,
-    solve: Solve,
+    solver: Callable[[], Solve],
     loads: list[Array] | None = None,
 ) -> Array:
     """Take the step, with the reactions of the constraints; return load and reactions at the middle."""
@@ -136,9 +151,9 @@ def _finish(
     for constraint in body.constraints:
         constraint.begin(body, h)
     H = np.concatenate([constraint.rows(body, qh) for constraint in body.constraints])
-    response = h * (
-        H @ solve(np.ascontiguousarray(H.T)) if body.dofs > 12 else H @ np.stack([solve(r) for r in H], 1)
-    )
+    solve = solver()
+    columns = solve(H.T) if body.dofs > 12 else np.stack([solve(row) for row in H], axis=1)
+    response = h * H @ columns
     inverse = np.linalg.pinv(response, rcond=1e-12, hermitian=True)
     multipliers, last, q, u = np.zeros(len(H)), np.inf, body.q, body.u
     for _ in range(NEWTON_MAX):
@@ -169,12 +184,18 @@ def _unmet(body: Body, h: float) -> str:
     )
 
 
-SCHEMES: dict[str, Callable[..., Array]] = {
-    "RIG_POS": rigid_step,
-    "RIG_NEG": rigid_step,
-    "RIG_IMP": rigid_step,
+def take_step(body: Body, h: float) -> Array:
+    """Advance a body by h s with its scheme; return the load on it, reactions included, at the middle."""
+    if isinstance(body, RigidBody):
+        return rigid_step(body, h)
+    if isinstance(body, PseudoRigidBody):
+        return pseudo_rigid_step(body, h)
+    assert isinstance(body, FiniteElementBody)
+    return FINITE_ELEMENT_SCHEMES[body.scheme](body, h)
+
+
+FINITE_ELEMENT_SCHEMES: dict[str, Callable[[FiniteElementBody, float], Array]] = {
     "DEF_EXP": explicit_step,
     "DEF_LIM": linearly_implicit_step,
     "ENERGY_MOMENTUM": energy_momentum_step,
 }
-"""One step of each scheme: takes a body and h, moves the body, returns the load on it at the middle."""
