@@ -42,7 +42,7 @@ def cell_boxes(points: Floats, block: Block) -> tuple[Floats, Floats]:
 
 
 def _deviations(shape: type[Shape], X: Floats) -> Floats:
-    """Return how far the nodes beyond the corners of X (m, n, 3) lie from the straight cell, (m, n - c, 3)."""
+    """Return how far the nodes beyond the corners of X (m, n, 3) lie off the straight cell, (m, n - c, 3)."""
     straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ X[:, : shape.corners]
     return np.asarray(X[:, shape.corners :] - straight)
 
