@@ -34,12 +34,30 @@ def cell_boxes(points: Floats, block: Block) -> tuple[Floats, Floats]:
     corners = X[:, : shape.corners]
     low, high = corners.min(axis=1), corners.max(axis=1)
     if len(shape.nodes) > shape.corners:
-        straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ corners
-        bulge = BULGE * np.abs(X[:, shape.corners :] - straight).max(axis=1)
+        bulge = BULGE * np.abs(_deviations(shape, X)).max(axis=1)
         low, high = low - bulge, high + bulge
     size = (high - low).max(axis=1, keepdims=True)
     margin = 1e-8 * size + 8 * np.finfo(float).eps * np.maximum(np.abs(low), np.abs(high))
     return low - margin, high + margin
+
+
+def _deviations(shape: type[Shape], X: Floats) -> Floats:
+    """Return how far the nodes beyond the corners of X (m, n, 3) lie off the straight cell, (m, n - c, 3)."""
+    straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ X[:, : shape.corners]
+    return np.asarray(X[:, shape.corners :] - straight)
+
+
+def curvature(shape: type[Shape], X: Floats) -> Floats:
+    """Return how far the nodes of cells X (m, n, 3) lie from the straight cell, (m,), as share of an edge.
+
+    It is measured in reference coordinates, so stretching a cell does not change it; 0 for linear shapes.
+    """
+    if len(shape.nodes) == shape.corners:
+        return np.zeros(len(X))
+    corners, edge = shape.nodes[: shape.corners], 2.0 if shape.cell == "hexahedron" else 1.0
+    J = np.swapaxes(X[:, : shape.corners], 1, 2) @ LINEAR[shape.cell].dN(corners.mean(axis=0))
+    there = np.linalg.pinv(J) @ np.swapaxes(_deviations(shape, X), 1, 2)
+    return np.asarray(np.abs(there).max(axis=(1, 2)) / edge)
 
 
 class BoxTree:

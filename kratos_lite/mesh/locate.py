@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Floats, Ints, with_rows
-from kratos_lite.mesh.boxes import BoxTree, cell_boxes, is_solid
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.nearest import nearest_element
 from kratos_lite.shapes import Shape, inverse_map
 from kratos_lite.shapes.inverse import outside_by
@@ -28,6 +28,13 @@ POINTS_AT_ONCE = 2**14
 """Points that are searched for together, so that candidates take little memory."""
 NEAR_EDGE = 1e-6
 """Points this near the boundary of their cell, in reference coordinates, may lie in another as well."""
+CURVED = 0.1
+"""Curvature above which Newton from the middle of a cell may reach another xi; measured from 0.12 up.
+
+Beside the apex of a pyramid, where the Jacobian has no limit, any curvature suffices.
+"""
+STARTS = 4
+"""Points near nodes of such a cell, those nearest to the point, from which Newton starts again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,29 +227,43 @@ class _Search:
         self._try(x, at[lower][order], row[lower][order], found, xi)
         return found, xi
 
-    def _try(
-        self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats, start: Floats | None = None
-    ) -> None:
+    def _try(self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats) -> None:
         """Write row and xi of those points x[at] that lie in the elements in `rows`."""
         numbers = self.block_of(rows)
         hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
         for number, block in enumerate(self.mesh.blocks):
             mine = np.flatnonzero(numbers == number)
             if len(mine) and block.shape is not None:
-                X = self.mesh.points[block.nodes[rows[mine] - self.starts[number]]]
-                inverse = inverse_map(block.shape, X, x[at[mine]], start=start)
+                inverse = inverse_map(block.shape, self._nodes(number, rows[mine]), x[at[mine]])
                 hits[mine], where[mine] = inverse.inside, inverse.xi
         found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
+    def _nodes(self, number: int, rows: Ints) -> Floats:
+        """Return the nodes (m, k, 3) of elements of a block."""
+        return np.asarray(self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]])
+
     def _retry(self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats) -> None:
-        """Try curved cells again from near their corners; from the middle Newton may reach another xi."""
+        """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
         numbers = self.block_of(rows)
         for number, block in enumerate(self.mesh.blocks):
-            if block.shape is None or block.shape.degree < 2:
+            mine = np.flatnonzero(numbers == number)
+            if not len(mine) or block.shape is None or len(block.shape.nodes) == block.shape.corners:
                 continue
-            for start in _near_corners(block.shape):
-                left = (numbers == number) & (found[at] < 0)
-                self._try(x, at[left], rows[left], found, xi, start)
+            pyramid = block.shape.cell == "pyramid"
+            curved = curvature(block.shape, self._nodes(number, rows[mine])) > (0 if pyramid else CURVED)
+            mine = mine[curved]
+            starts = _starts(block.shape)
+            images = block.shape.N(starts) @ self._nodes(number, rows[mine])
+            order = ((images - x[at[mine], None]) ** 2).sum(axis=2).argsort(axis=1)
+            for start in order.T[: len(starts) if pyramid else STARTS]:
+                left = found[at[mine]] < 0
+                pairs = mine[left]
+                X = self._nodes(number, rows[pairs])
+                inverse = inverse_map(
+                    block.shape, X, x[at[pairs]], max_iterations=15, start=starts[start[left]]
+                )
+                hits = pairs[inverse.inside]
+                found[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
 
     def _near_edge(self, found: Ints, xi: Floats) -> Mask:
         """Return which points lie so near the boundary of their cell that others may contain them too."""
@@ -255,7 +276,7 @@ class _Search:
         return near
 
 
-def _near_corners(shape: type[Shape]) -> Floats:
-    """Return the points (c, 3) in the middle between the centroid and each corner."""
-    corners = shape.nodes[: shape.corners]
-    return np.asarray((corners + corners.mean(axis=0)) / 2)
+def _starts(shape: type[Shape]) -> Floats:
+    """Return points (k, 3) on the way from the centroid to each node."""
+    middle = shape.nodes[: shape.corners].mean(axis=0)
+    return np.asarray(middle + 0.8 * (shape.nodes - middle))

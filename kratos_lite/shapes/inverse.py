@@ -62,7 +62,7 @@ def inverse_map(
     points : (..., 3) float, m; one point per cell, or broadcast against them.
     tolerance : size of the last step, in reference coordinates, at which Newton stops.
     max_iterations : steps after which a point counts as not converged.
-    start : (3,) float, reference coordinates at which Newton starts instead of the centroid.
+    start : (..., 3) float, reference coordinates at which Newton starts instead of the centroid.
 
     Returns
     -------
@@ -87,7 +87,10 @@ def inverse_map(
     batch = np.broadcast_shapes(X.shape[:-2], p.shape[:-1])
     X = np.broadcast_to(X, (*batch, *X.shape[-2:])).reshape(-1, *X.shape[-2:])
     p = np.broadcast_to(p, (*batch, 3)).reshape(-1, 3)
-    first = shape.nodes[: shape.corners].mean(axis=0) if start is None else np.asarray(start, dtype=float)
+    first = np.broadcast_to(
+        shape.nodes[: shape.corners].mean(axis=0) if start is None else np.asarray(start, dtype=float),
+        (*batch, 3),
+    ).reshape(-1, 3)
     middle = X[:, : shape.corners].mean(axis=1)  # taken off, so that no digits are lost far from the origin
     cells = X - middle[:, None]
     xi, converged, steps = _newton(shape, cells, p - middle, first, tolerance, max_iterations)
@@ -104,9 +107,9 @@ def _newton(
 ) -> tuple[Array, NDArray[np.bool_], int]:
     """Return xi (m, 3), whether Newton found it (m,), and the steps taken, for X (m, n, 3) and p (m, 3)."""
     small = 4e-15 * np.maximum(np.abs(X).max(axis=(1, 2)), np.abs(p).max(axis=1))
-    xi = np.tile(start, (len(p), 1))
+    xi = start.copy()
     converged = np.zeros(len(p), dtype=bool)
-    miss = p - shape.N(start) @ X
+    miss = p - (shape.N(xi)[:, None, :] @ X)[:, 0]
     steps = 0
     active = np.arange(len(p))
     while len(active) and steps < max_iterations:
