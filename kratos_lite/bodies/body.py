@@ -140,6 +140,11 @@ class Body(ABC):
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return what a vector (3,) fixed in the body at X points at in space, (..., 3)."""
 
+    def find(self, X: Array) -> None:
+        """Raise MeshError unless points X (3,) or (m, 3) all lie in the undeformed body."""
+        if self.mesh is not None:
+            self.mesh.locate(X).require()
+
     @abstractmethod
     def times_mass(self, v: Array) -> Array:
         """Return the mass matrix times v (..., dofs)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.bodies.body import Body, points_of, vector_of
-from kratos_lite.bodies.loads import inside, one_point
+from kratos_lite.bodies.loads import one_point
 from kratos_lite.bodies.series import Factor, function_of, integral_of
 from kratos_lite.errors import InputError, ModelError
 
@@ -52,7 +52,7 @@ class Constraint(ABC):
             raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
         if self._body is not None and self._body is not body:
             raise ModelError("this constraint holds another body already; make one for each body")
-        inside(body, self.points)
+        body.find(self.points)
         self._body, self._start = body, body.position(self.points)
 
     def begin(self, body: Body, h: float) -> None:  # noqa: B027 - most have nothing to prepare

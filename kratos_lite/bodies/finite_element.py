@@ -150,12 +150,18 @@ class FiniteElementBody(Deformable):
         v = vector_of(linear, "a velocity") + np.cross(vector_of(angular, "an angular velocity"), arms)
         self.u = v.ravel()
 
+    def find(self, X: Array) -> None:
+        """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
+        points = np.atleast_2d(X)
+        located = self.mesh.locate(points).require()
+        for i, point in enumerate(points):
+            self._known[point.tobytes()] = located.nodes_and_weights(i)
+
     def _at(self, X: Array) -> tuple[NDArray[np.int64], Array]:
         """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
-        key = X.tobytes()
-        if key not in self._known:
-            self._known[key] = self.mesh.locate(X[None]).require().nodes_and_weights()
-        return self._known[key]
+        if X.tobytes() not in self._known:
+            self.find(X)
+        return self._known[X.tobytes()]
 
     # ---- forces ----------------------------------------------------------------------------------
 

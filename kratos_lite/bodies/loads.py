@@ -170,7 +170,7 @@ class Force(BodyLoad):
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, self.force
-        inside(body, X)
+        body.find(X)
         if self.frame == "convected":
             fixed = body.push(X, f, _upright(body)) if isinstance(body, RigidBody) else None
             return Bound(
@@ -289,7 +289,7 @@ class Spring(BodyLoad):
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, anchor = self.point, self.anchor
-        inside(body, X)
+        body.find(X)
         L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
 
         def generalised(q: Array, u: Array, time: float) -> Array:
@@ -362,12 +362,6 @@ def one_point(X: ArrayLike) -> Array:
     if point.ndim != 1:
         raise InputError(f"one point (3,) is needed; got shape {point.shape}")
     return point
-
-
-def inside(body: Body, X: Array) -> None:
-    """Raise MeshError if points X are not all of the body."""
-    if body.mesh is not None:
-        body.mesh.locate(np.atleast_2d(X)).require()
 
 
 def _upright(body: Body) -> Array:
