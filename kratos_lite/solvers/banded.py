@@ -94,7 +94,8 @@ class Factoriser:
         Raises
         ------
         SolveError
-            If the matrix is singular, or not positive definite though it should be.
+            If the matrix is singular, or not positive definite though it should be; a sparse
+            factorisation may notice singular ones alone.
         """
         if self.method == "sparse":
             return direct.factorise(A.scipy().tocsr(), symmetric=self.symmetric)
