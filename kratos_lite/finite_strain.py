@@ -1,8 +1,9 @@
 """Large displacements: internal load, stiffness, energy and highest frequency of batches of elements.
 
-Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where S0 is the prestress of a batch;
-the formulas are in `elements.total_lagrangian`.  It holds for large rotations with small strains; under
-strong compression the law loses its stiffness (a confined bar at a stretch of 1/√3).
+Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where C is that of the material and
+S0 the prestress of a batch; the formulas are in `elements.total_lagrangian`.  It holds for large
+rotations with small strains; under strong compression the law loses its stiffness (a confined bar at a
+stretch of 1/√3).
 
 Compiled kernels are taken where the element class leaves its geometry as it is.
 """

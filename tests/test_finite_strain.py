@@ -256,6 +256,17 @@ def test_highest_frequencies_of_the_reference_cells():
     assert finite_strain.highest_frequency(points, batches, lumped=True) == pytest.approx(2.5**0.5, rel=1e-12)
 
 
+def test_critical_step_of_a_spinning_box():
+    """2/ω of the box 0.4 x 0.6 x 1 m in one element, and a bound of it in eight."""
+    material, critical = Isotropic3D(1e6, 0.3, 1000.0), {1: 0.010115, 2: 0.0053560}
+    steps = {}
+    for n in critical:
+        model = kl.Model(kl.box((0.4, 0.6, 1.0), (n, n, n)), material)
+        steps[n] = 2 / finite_strain.highest_frequency(model.mesh.points, model.batches(), lumped=True)
+    assert steps[1] == pytest.approx(critical[1], rel=5e-5)
+    assert 0.9 * critical[2] < steps[2] <= critical[2]
+
+
 def test_boxes_need_one_eigenproblem():
     model = kl.Model(kl.box((0.1, 0.1, 1.0), (2, 2, 20)), UNIT)
     points, (batch,) = model.mesh.points, model.batches()

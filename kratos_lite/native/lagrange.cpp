@@ -107,7 +107,8 @@ Array<double> internal_load(Floats points, Rows nodes, Floats dN, Floats weights
 }
 
 // Energy and largest |E|; sums of GRAIN elements are added in order.
-py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats q, Floats C, py::object prestress) {
+py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats q, Floats C,
+                 py::object prestress) {
     Displaced w = displaced(points, nodes, dN, weights, q, py::none(), 0, C, prestress);
     double energy = 0, largest = 0;
     {
@@ -127,8 +128,8 @@ py::tuple totals(Floats points, Rows nodes, Floats dN, Floats weights, Floats q,
     return py::make_tuple(energy, std::sqrt(largest));
 }
 
-void add_groups(const Displaced& w, const kl::Connectivity& mesh, const kl::Graph& graph, const kl::Shares& shares,
-                int64_t share, double* data) {
+void add_groups(const Displaced& w, const kl::Connectivity& mesh, const kl::Graph& graph,
+                const kl::Shares& shares, int64_t share, double* data) {
     const int V = kl::lanes();
     const int64_t pairs = static_cast<int64_t>(V) * w.k * w.k;  // of a group
     const int64_t block = std::max<int64_t>(8, kl::BLOCK_PAIRS / pairs);
@@ -148,8 +149,9 @@ void add_groups(const Displaced& w, const kl::Connectivity& mesh, const kl::Grap
     }
 }
 
-void add_stiffness(Floats points, Rows nodes, Floats dN, Floats weights, Floats q, py::object dq, double damping,
-                   Floats C, py::object prestress, Rows indptr, Rows indices, Array<double> data) {
+void add_stiffness(Floats points, Rows nodes, Floats dN, Floats weights, Floats q, py::object dq,
+                   double damping, Floats C, py::object prestress, Rows indptr, Rows indices,
+                   Array<double> data) {
     const Displaced w = displaced(points, nodes, dN, weights, q, dq, damping, C, prestress);
     require(indptr.size() == points.shape(0) + 1, "the pattern must have a row for each point");
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
@@ -171,11 +173,11 @@ PYBIND11_MODULE(_lagrange, m) {
     const auto dN = py::arg("dN").noconvert(), weights = py::arg("weights").noconvert();
     const auto q = py::arg("q").noconvert(), C = py::arg("C").noconvert();
     const auto dq = py::arg("dq"), damping = py::arg("damping"), prestress = py::arg("prestress");
-    m.def("internal_load", &internal_load, "∫ P grad N dV, (n, 3)", points, nodes, dN, weights, q, dq, damping, C,
-          prestress);
+    m.def("internal_load", &internal_load, "∫ P grad N dV, (n, 3)", points, nodes, dN, weights, q, dq, damping,
+          C, prestress);
     m.def("totals", &totals, "∫ (½ E:C:E + S0:E) dV and the largest |E|", points, nodes, dN, weights, q, C,
           prestress);
-    m.def("add_stiffness", &add_stiffness, "Add the derivative of the load to the blocks of a matrix", points, nodes,
-          dN, weights, q, dq, damping, C, prestress, py::arg("indptr").noconvert(),
+    m.def("add_stiffness", &add_stiffness, "Add the derivative of the load to the blocks of a matrix", points,
+          nodes, dN, weights, q, dq, damping, C, prestress, py::arg("indptr").noconvert(),
           py::arg("indices").noconvert(), py::arg("data").noconvert());
 }

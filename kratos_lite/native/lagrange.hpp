@@ -66,8 +66,8 @@ KL_INLINE void elastic(const Law& law, const vec<double, V>* E, vec<double, V>* 
 
 // dq_i/dX_j
 template <int V>
-KL_INLINE void gradient(const Gauss& w, const vec<double, V>* q, int point, const vec<double, V> (&inverse)[3][3],
-                        vec<double, V> (&H)[3][3]) {
+KL_INLINE void gradient(const Gauss& w, const vec<double, V>* q, int point,
+                        const vec<double, V> (&inverse)[3][3], vec<double, V> (&H)[3][3]) {
     vec<double, V> R[3][3];
     reference_gradient<V>(q, w.dN + 3 * static_cast<int64_t>(w.k) * point, w.k, R);
     for (int i = 0; i < 3; ++i)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-BAND_LIMIT = 12.0
+BAND_LIMIT = 16.0
 """Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
 BAND_NUMBERS = 50_000_000
 """A band of more numbers than this (0.4 GB) is not made."""
