@@ -22,8 +22,10 @@ Ints = NDArray[np.int64]
 INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
 NEWTON_MAX = 25
-CONVERGED = 1e-12
-"""Last Newton step, as a share of the displacement."""
+CONVERGED = 1e-9
+"""Last Newton step, as a share of the displacement; the error left is its square."""
+ROUND_OFF = 4e-15
+"""Newton step, as a share of the size of the body, that is nothing but rounding."""
 UNBALANCED = 1e-8
 """Share of the loads that may be left over."""
 
@@ -86,21 +88,29 @@ def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
 def _increment(body: Deformable, start: Array, share: float, progress: Progress | None) -> int:
     """Find the equilibrium under a share of the loads; return the number of iterations."""
-    initial = _gap(body, start)
+    initial, noise = _gap(body, start), ROUND_OFF * _extent(body)
     for iteration in range(1, NEWTON_MAX + 1):
         load = share * body.external_load(body.q)
         gap = _gap(body, body.q) - (1 - share) * initial
         step, multipliers = _newton(body, load - body.internal_load(body.q), gap)
-        body.q = body.q + step
-        if not np.isfinite(body.q).all():
+        largest = float(np.abs(step).max())
+        if not np.isfinite(largest):
             break
-        size = max(float(np.abs(body.q - start).max()), 1e-300)
-        if np.abs(step).max() <= CONVERGED * size or not size > 1e-300:
+        if largest > noise:  # less would not make it better
+            body.q = body.q + step
+        if largest <= max(noise, CONVERGED * float(np.abs(body.q - start).max())):
             _balance(body, share, multipliers)
             if progress:
                 progress("equilibrium", share)
             return iteration
     raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {share:.0%} of the load")
+
+
+def _extent(body: Deformable) -> float:
+    """Return the size of what displacements are added to: coordinates in m, or the 1 of F."""
+    if isinstance(body, FiniteElementBody):
+        return float(np.ptp(body.points, axis=0).max())
+    return 1.0
 
 
 def _gap(body: Deformable, q: Array) -> Array:
