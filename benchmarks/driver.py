@@ -152,6 +152,8 @@ class Driver:
 
     def stem(self, run: Run) -> Path:
         """Return the path of the scene without ending; it is written once, large ones by another process."""
+        if run.task == "march":  # a motion makes its bodies itself
+            return self.folder / run.scene
         if run.scene.endswith(".mdpa"):
             return Path(run.scene.removesuffix(".mdpa"))
         if run.place not in self.stems:
@@ -243,13 +245,13 @@ class Driver:
             return row | {"failed": failed}
         phases = dict.fromkeys(name for answer in answers for name in answer["phases"])
         median = {name: statistics.median(a["phases"].get(name, 0.0) for a in answers) for name in phases}
-        row["phases"] = {name: round(seconds, 6) for name, seconds in median.items()}
+        row["phases"] = {name: float(f"{seconds:.4g}") for name, seconds in median.items()}
         row["process"] = round(statistics.median(a["process"] for a in answers), 6)
         row["spread"] = [round(pick(a["process"] for a in answers), 6) for pick in (min, max)]
         row["work"] = round(sum(s for name, s in median.items() if name not in OVERHEAD), 6)
         row["peak"] = int(statistics.median(a["peak"] for a in answers))
         row["runs"] = len(answers)
-        for word in ("unknowns", "iterations", "residual", "solver", "version", "errors"):
+        for word in ("unknowns", "iterations", "residual", "solver", "version", "errors", "drift"):
             if answers[0].get(word) not in (None, "", {}):
                 row[word] = answers[0][word]
         return row

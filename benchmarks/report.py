@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.curves import cheapest, starts, time_to_error
+from benchmarks.motion import MOTIONS
 from benchmarks.tables import OURS, THEIRS, Row, ratio, seconds, table
 
 UNLIKE = 1e-4
@@ -186,6 +187,38 @@ def failures(rows: Iterable[Row]) -> str:
     return table(["scene", "program", "what happened"], body)
 
 
+def motions(rows: Sequence[Row]) -> str:
+    """Return seconds per step of bodies in motion beside those of Solfec-1.0, and what drifts."""
+    body = []
+    for (name, _, _), found in by_place(rows).items():
+        ours, motion = found.get(OURS), MOTIONS.get(name)
+        if ours is None or motion is None:
+            continue
+        step, theirs = ours["phases"]["step"], motion.solfec
+        numpy = found.get("kratos_lite NumPy", {}).get("phases", {}).get("step")
+        body.append(
+            [
+                motion.what,
+                micro(step),
+                micro(numpy),
+                " … ".join(dict.fromkeys(micro(s) for s in theirs)),
+                ratio(step, theirs[0]) if theirs else "",
+                *("" if np.isnan(drift) else f"{drift:.0e}" for drift in ours["drift"].values()),
+            ]
+        )
+    head = ["what", "µs", "NumPy µs", "Solfec-1.0 µs", "ratio", "drift of energy", "of angular momentum"]
+    return table(head, body)
+
+
+def micro(seconds: float | None) -> str:
+    """Return seconds as microseconds in three digits.
+
+    >>> micro(1.234e-6), micro(0.00045)
+    ('1.23', '450')
+    """
+    return "" if seconds is None else f"{float(f'{1e6 * seconds:.3g}'):g}"
+
+
 SECTIONS = {
     "goal": ("From `.mdpa` to a result file, whole processes", goals),
     "case": ("Real scenes, whole processes", goals),
@@ -195,6 +228,7 @@ SECTIONS = {
     "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read",), process=True)),
     "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
     "skips": ("What need not be computed", skips),
+    "motion": ("Bodies in motion: time of one step of one body", motions),
 }
 """Title and table of each group of rows."""
 NOTES = {
@@ -209,6 +243,9 @@ NOTES = {
     "within the matrix; `again` is the shortest of further times.",
     "parse": "Seconds, in brackets kratos_lite / program.",
     "cube1": "Seconds, in brackets kratos_lite / program; `import numpy` is a process that does that alone.",
+    "motion": "Solfec-1.0 was timed apart, on a machine like this (see `benchmarks/motion.py`); goals: "
+    "at most its time for finite-element bodies, and 1 µs for one of many. Drifts are relative, over all "
+    "steps of the run; energy is counted without the work of loads.",
     "skips": "Whole processes; the ratio is to the plain row of the same scene.",
 }
 

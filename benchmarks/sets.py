@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.driver import Run
+from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import KINDS
 
@@ -136,6 +137,16 @@ def parse_runs(programs: Sequence[str], sizes: Sequence[int] = (20, 50)) -> list
     """Return reading a `.mdpa` file: kratos_lite, Kratos and meshio."""
     chosen = [p for p in ("kratos_lite", "kratos_lite NumPy", "Kratos", "meshio") if p in programs]
     return [Run("parse", program, "block", "8N", n, "parse") for n in sizes for program in chosen]
+
+
+def motion_runs(programs: Sequence[str]) -> list[Run]:
+    """Return bodies in motion: seconds per step."""
+    chosen = [p for p in FROM_FILES[:2] if p in programs]
+    return [
+        Run("motion", program, name, "", 0, "march", (("motion", name),))
+        for name in MOTIONS
+        for program in chosen
+    ]
 
 
 def cube1_runs(programs: Sequence[str]) -> list[Run]:

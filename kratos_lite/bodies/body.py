@@ -87,6 +87,7 @@ class Body(ABC):
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
+        self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
         self.scheme = scheme or self.default_scheme()
         self.damping = self._checked_damping(damping)
 
@@ -242,6 +243,7 @@ class Body(ABC):
         from kratos_lite.bodies.loads import bind
 
         self.loads.append(bind(load, self, factor))
+        self._constant = None
 
     def constrain(self, constraint: Constraint) -> None:
         """Hold the body: a fixed point or direction, a prescribed motion, a rigid link.
@@ -264,6 +266,8 @@ class Body(ABC):
 
     def constant_loads(self) -> tuple[Array, Array, Array]:
         """Return the constant loads: acceleration (..., 3), forces (..., dofs) in space and in the body."""
+        if self._constant is not None and self._constant[0] == len(self.loads):
+            return self._constant[1]
         lead = self.q.shape[:-1]
         acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
         for load in self.loads:
@@ -274,7 +278,8 @@ class Body(ABC):
                 spatial += factor * load.spatial
             if load.convected is not None:
                 convected += factor * load.convected
-        return acceleration, spatial, convected
+        self._constant = len(self.loads), (acceleration, spatial, convected)
+        return self._constant[1]
 
     # ---- energies --------------------------------------------------------------------------------
 

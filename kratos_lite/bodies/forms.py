@@ -171,10 +171,13 @@ class Corotational(Form):
         self._gradients = np.ascontiguousarray(gradients.T / volume)
         self._Z = points - mass.nodal @ points / mass.nodal.sum()
         self._solver: tuple[float, Solve] | None = None
+        self._turned = np.full(points.size, np.nan), np.eye(3)
 
     def rotation(self, q: Array) -> Array:
         """Return R (3, 3), the polar rotation of the mean deformation gradient."""
-        return polar(np.eye(3) + (self._gradients @ q.reshape(-1, 3)).T)
+        if not np.array_equal(q, self._turned[0]):  # a step asks several times for the same one
+            self._turned = q.copy(), polar(np.eye(3) + (self._gradients @ q.reshape(-1, 3)).T)
+        return self._turned[1]
 
     def local(self, q: Array, R: Array) -> Array:
         """Return R^T d (n, 3) in m: the displacement that strains the body, seen from it."""

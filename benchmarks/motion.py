@@ -1,0 +1,196 @@
+"""Bodies in motion: seconds per step, beside the figures of Solfec-1.0.
+
+Solfec-1.0 (C, gcc 12 -O3, serial) was timed apart on a machine like that of the results kept; it needs
+Python 2.7 and a build of its own, so it does not take turns with us.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+MANY = 10_000
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A body, or many, and how it marches.
+
+    Attributes
+    ----------
+    what : in words.
+    make : gives the body, or a list of bodies, from the library.
+    dt, steps, every : as `march` takes them.
+    bodies : number of bodies, by which the time is divided.
+    solfec : seconds per step of Solfec-1.0, from and to.
+    """
+
+    what: str
+    make: Callable[[Any], Any]
+    dt: float
+    steps: int
+    every: int = 1
+    bodies: int = 1
+    solfec: tuple[float, ...] = field(default=())
+
+
+def top(kl: Any) -> Any:
+    """Return the free asymmetric top."""
+    body = kl.RigidBody(characteristics=kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0])))
+    body.u[:3] = 8.0, 0.02, 0.0
+    return body
+
+
+def heavy_top(scheme: str) -> Callable[[Any], Any]:
+    """Return the heavy top, its torque a Python function."""
+
+    def make(kl: Any) -> Any:
+        top = kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0]))
+        body = kl.RigidBody(characteristics=top, scheme=scheme)
+        body.u[:3] = 0.0, 0.0, 50.0
+        body.turn([[1, 0, 0], [0, np.cos(0.05), -np.sin(0.05)], [0, np.sin(0.05), np.cos(0.05)]])
+        body.add(kl.Callback(lambda q, u, t: np.array([0, 0, 0, -20 * q[7], 20 * q[6], 0, 0, 0, 0.0])))
+        return body
+
+    return make
+
+
+def soft_box(scheme: str) -> Callable[[Any], Any]:
+    """Return the spinning pseudo-rigid box."""
+
+    def make(kl: Any) -> Any:
+        box = kl.Characteristics.box((0.4, 0.6, 1.0), 1000.0)
+        soft = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
+        body = kl.PseudoRigidBody(characteristics=box, material=soft, scheme=scheme)
+        body.set_velocity(angular=(0.05, 10.0, 0.05))
+        return body
+
+    return make
+
+
+def bar(form: str, scheme: str, lumped: bool = True) -> Callable[[Any], Any]:
+    """Return the rotating bar of 2 x 2 x 20 hexahedra, 567 degrees of freedom."""
+
+    def make(kl: Any) -> Any:
+        rubber = kl.Isotropic3D(E=2e6, nu=0.26, density=7800.0)
+        mesh = kl.box((0.1, 0.1, 1.0), (2, 2, 20))
+        body = kl.FiniteElementBody(mesh, rubber, form=form, scheme=scheme, lumped=lumped)
+        body.set_velocity(angular=(1.0, 0.0, 0.0))
+        return body
+
+    return make
+
+
+def many(make: Callable[[Any], Any]) -> Callable[[Any], Sequence[Any]]:
+    """Return ten thousand bodies."""
+    return lambda kl: [make(kl) for _ in range(MANY)]
+
+
+MOTIONS = {
+    "rigid": Motion("rigid body, free, a state every step", top, 1e-3, 5000, solfec=(7e-6, 9e-6)),
+    "rigid_chunk": Motion(
+        "the same, a state every 1000 steps", top, 1e-3, 200_000, 1000, solfec=(7e-6, 9e-6)
+    ),
+    "rigid_callback": Motion(
+        "rigid heavy top, RIG_NEG, torque by a Python function",
+        heavy_top("RIG_NEG"),
+        1e-3,
+        5000,
+        solfec=(7e-6, 9e-6),
+    ),
+    "rigid_implicit": Motion(
+        "rigid heavy top, RIG_IMP, torque by a Python function",
+        heavy_top("RIG_IMP"),
+        1e-3,
+        5000,
+        solfec=(12e-6, 12e-6),
+    ),
+    "pseudo_lim": Motion(
+        "pseudo-rigid box, DEF_LIM, a state every step",
+        soft_box("DEF_LIM"),
+        1e-3,
+        5000,
+        solfec=(4.8e-6, 4.8e-6),
+    ),
+    "pseudo_lim_chunk": Motion(
+        "the same, a state every 1000 steps",
+        soft_box("DEF_LIM"),
+        1e-3,
+        200_000,
+        1000,
+        solfec=(4.8e-6, 4.8e-6),
+    ),
+    "pseudo_exp_chunk": Motion(
+        "pseudo-rigid box, DEF_EXP, a state every 1000 steps",
+        soft_box("DEF_EXP"),
+        1e-3,
+        200_000,
+        1000,
+        solfec=(57e-6, 57e-6),
+    ),
+    "pseudo_em_chunk": Motion(
+        "pseudo-rigid box, ENERGY_MOMENTUM, a state every 1000 steps",
+        soft_box("ENERGY_MOMENTUM"),
+        1e-3,
+        100_000,
+        1000,
+    ),
+    "bar_tl": Motion(
+        "bar of 567 dofs, TL, DEF_LIM", bar("TL", "DEF_LIM"), 1 / 256, 256, solfec=(2.0e-3, 2.2e-3)
+    ),
+    "bar_bc": Motion(
+        "bar of 567 dofs, BC, DEF_LIM", bar("BC", "DEF_LIM"), 1 / 256, 512, solfec=(0.31e-3, 0.45e-3)
+    ),
+    "bar_exp": Motion(
+        "bar of 567 dofs, TL, DEF_EXP", bar("TL", "DEF_EXP"), 1e-3, 512, solfec=(0.99e-3, 0.99e-3)
+    ),
+    "bar_em": Motion("bar of 567 dofs, TL, ENERGY_MOMENTUM", bar("TL", "ENERGY_MOMENTUM"), 1 / 256, 256),
+    "bar_consistent": Motion(
+        "bar of 567 dofs, TL, DEF_LIM, consistent mass", bar("TL", "DEF_LIM", lumped=False), 1 / 256, 256
+    ),
+    "many_rigid": Motion("10,000 rigid bodies, RIG_NEG, a state every step", many(top), 1e-3, 100, 1, MANY),
+    "many_rigid_chunk": Motion(
+        "10,000 rigid bodies, a state every 100 steps", many(top), 1e-3, 500, 100, MANY
+    ),
+    "many_pseudo": Motion(
+        "10,000 pseudo-rigid boxes, DEF_LIM, a state every 100 steps",
+        many(soft_box("DEF_LIM")),
+        1e-3,
+        200,
+        100,
+        MANY,
+    ),
+}
+"""Every motion that is timed, by its name."""
+SLOW = 50
+"""Of the steps, those that NumPy alone is given."""
+
+
+def measured(kl: Any, name: str, share: int = 1) -> dict[str, float]:
+    """March a motion; return seconds per step and body, and the relative drift of energy and momentum."""
+    motion = MOTIONS[name]
+    body = motion.make(kl)
+    steps = max(motion.every if share == 1 else 2, motion.steps // share)
+    for _ in kl.march(body, motion.dt, 2):  # whatever is made once is made here
+        pass
+    one = body[0] if isinstance(body, list) else body
+    energy, momentum = own_energy(one), one.angular_momentum()
+    start = perf_counter()
+    for _ in kl.march(body, motion.dt, steps, every=min(motion.every, steps)):
+        pass
+    seconds = (perf_counter() - start) / steps / motion.bodies
+    turned = np.linalg.norm(one.angular_momentum() - momentum) / np.linalg.norm(momentum)
+    return {
+        "step": seconds,
+        "energy": abs(own_energy(one) / energy - 1),
+        "momentum": float(turned) if not one.loads else float("nan"),
+    }
+
+
+def own_energy(body: Any) -> float:
+    """Return kinetic and strain energy without what loads have put in."""
+    return float(body.kinetic_energy() + body.internal_energy() - body.external_work)
