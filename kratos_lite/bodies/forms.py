@@ -266,9 +266,18 @@ class Modal(Corotational):
         return float(self.omega[-1])
 
     def project(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """Return q and u without what the modes, turned by R(q), do not span."""
+        """Return q and u without what the modes, turned by R(q), do not span; both momenta stay."""
         R, v = self._seen(q, u)
-        d = self.shapes @ (self._dual @ self.local(q, R).ravel())
-        v = self.shapes @ (self._dual @ v)
-        moved = (self._Z + d.reshape(-1, 3)) @ R.T - self._Z
-        return moved.ravel(), np.asarray(v.reshape(-1, 3) @ R.T).ravel()
+        d = self.local(q, R).ravel()
+        before = self._spin(d, v)
+        d, v = self.shapes @ (self._dual @ d), self.shapes @ (self._dual @ v)
+        x, Z = self._Z + d.reshape(-1, 3), self._Z
+        product = x.T @ self.mass.times(Z).reshape(-1, 3)
+        inertia = np.trace(product) * np.eye(3) - product.T
+        lost = np.linalg.solve(inertia, before - self._spin(d, v))  # what modes of another rotation lack
+        v = v.reshape(-1, 3) + np.cross(lost, Z)
+        return (x @ R.T - Z).ravel(), np.asarray(v @ R.T).ravel()
+
+    def _spin(self, d: Array, v: Array) -> Array:
+        """Return the angular momentum (3,) about the mass centre, seen from the body."""
+        return np.asarray(np.cross(self._Z + d.reshape(-1, 3), self.mass.times(v).reshape(-1, 3)).sum(axis=0))

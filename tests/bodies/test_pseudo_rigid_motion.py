@@ -1,0 +1,309 @@
+"""Pseudo-rigid bodies: vibration, free rotation, and what each scheme conserves.
+
+Reference values: closed forms, and the equations of motion solved with 12 digits.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+SCHEMES = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")
+each_scheme = pytest.mark.parametrize("scheme", SCHEMES)
+SPIN = (0.05, 10, 0.05)
+MOMENTUM = np.array([1.36, 232, 0.52])
+"""Angular momentum of the box under this spin."""
+OMEGA_B, OMEGA_S = 346.41016151377545, 192.15378456610458
+"""Breathing and shear frequency of the cube."""
+F_AT_1 = {
+    1e6: np.array(
+        [
+            [-0.81307595, 0.41860102, -0.4074419],
+            [0.39640065, 0.90491398, 0.13949238],
+            [0.42665822, -0.04667751, -0.90981535],
+        ]
+    ),
+    1e8: np.array(
+        [
+            [-0.74512831, 0.42921427, -0.51047487],
+            [0.41583249, 0.8973293, 0.14753263],
+            [0.52132217, -0.10230523, -0.84731672],
+        ]
+    ),
+}
+"""Deformation gradient of the freely rotating box after 1 s, to 8 digits."""
+
+
+def cube(scheme, damping=0.0):
+    mesh = kl.box((0.5, 0.5, 0.5), origin=(-0.25, -0.25, -0.25))
+    material = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
+    return kl.PseudoRigidBody(mesh, material, scheme=scheme, damping=damping)
+
+
+def deformed(body, F):
+    q = body.q.copy()
+    q[:9] = np.ravel(F)
+    body.place(q)
+    return body
+
+
+def end(body, dt, steps):
+    for _ in kl.march(body, dt, steps, every=steps):
+        pass
+    return body
+
+
+def seen_frequency(values, h):
+    """Return the frequency of an undamped oscillation about 0 from three values: exact for a discrete one."""
+    values = np.asarray(values)
+    ratio = (values[2:] + values[:-2]) @ values[1:-1] / (2 * values[1:-1] @ values[1:-1])
+    return np.arccos(ratio) / h
+
+
+# ---- vibration -------------------------------------------------------------------------------------
+
+
+def test_frequencies_of_a_cube():
+    omega = cube("DEF_EXP").frequencies()
+    assert np.abs(omega[:3]).max() < 1e-3
+    np.testing.assert_allclose(omega[3:8], OMEGA_S, rtol=1e-12)
+    assert omega[8] == pytest.approx(OMEGA_B, rel=1e-12)
+    assert 2 * np.pi / OMEGA_B == pytest.approx(0.0181379936, rel=1e-8)
+
+
+def test_frequencies_of_a_box(brick):
+    body = brick(kl.PseudoRigidBody)
+    squares = (11342.4435, 17435.8974, 33360.0426, 33461.5385, 41666.6667, 117284.6934)
+    np.testing.assert_allclose(body.frequencies()[3:] ** 2, squares, rtol=1e-8)
+    assert body.critical_step() == pytest.approx(5.8399526683e-3, rel=1e-9)
+    lam, mu, V, E0 = 1e6 * 0.3 / 1.3 / 0.4, 1e6 / 2.6, 0.24, np.array([3.2, 7.2, 20.0])
+    shear = [V * mu * (1 / E0[i] + 1 / E0[j]) for i, j in ((1, 2), (0, 2), (0, 1))]
+    normal = np.linalg.eigvals(V * (lam * np.ones((3, 3)) + 2 * mu * np.eye(3)) / E0)
+    np.testing.assert_allclose(body.frequencies()[3:] ** 2, np.sort([*shear, *normal]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("omega", "shape", "entry", "error"),
+    [(OMEGA_B, np.eye(3), 0, 3e-6), (OMEGA_S, np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]), 1, 3e-7)],
+    ids=["breathing", "shear"],
+)
+@each_scheme
+def test_small_vibrations_are_cosines(scheme, omega, shape, entry, error):
+    body, size = deformed(cube(scheme), np.eye(3) + 1e-6 * shape), 1e-6
+    periods, each = 5, 600
+    h = 2 * np.pi / omega / each
+    states = list(kl.march(body, h, periods * each, every=10))
+    seen = np.array([state.q[entry] for state in states]) - np.eye(3).ravel()[entry]
+    t = np.array([state.time for state in states])
+    sine = np.sin(omega * h / 2) if scheme == "DEF_EXP" else np.tan(omega * h / 2)
+    assert abs(sine / (omega * h / 2) - 1) < 1e-4  # what the step itself adds
+    drifted = 2 * np.pi * periods * (omega * h) ** 2 / 12
+    assert np.abs(seen / size - np.cos(omega * t)).max() < error + drifted
+
+
+@pytest.mark.parametrize("omega_h", [0.2, 0.8, 1.6])
+@each_scheme
+def test_the_frequency_of_small_vibrations_is_that_of_the_step(scheme, omega_h):
+    amplitude = 1e-7
+    body = deformed(cube(scheme), (1 + amplitude) * np.eye(3))
+    h = omega_h / OMEGA_B
+    seen = [amplitude] + [state.q[0] - 1 for state in kl.march(body, h, 40)]
+    inverse = np.arcsin if scheme == "DEF_EXP" else np.arctan
+    assert seen_frequency(seen, h) == pytest.approx(2 / h * inverse(omega_h / 2), rel=1e-6)
+
+
+@each_scheme
+def test_period_and_turning_point_of_large_breathing(scheme):
+    body = deformed(cube(scheme), 1.1 * np.eye(3))
+    period, lowest = 0.0182917027, np.sqrt(2 - 1.1**2)
+    assert lowest == pytest.approx(0.8888194417, rel=1e-10)
+    each, rates, sizes = 400, [0.0], [1.1]
+    h = period / each
+    for state in kl.march(body, h, each + 5):
+        rates.append(state.u[0])
+        sizes.append(state.q[0])
+    i = int(np.argmin(sizes))
+    assert min(sizes) == pytest.approx(lowest, rel=2e-4)
+    assert i / each == pytest.approx(0.5, abs=0.01)
+    (last,) = (k for k in range(i + 10, len(rates) - 1) if rates[k] >= 0 > rates[k + 1])
+    crossing = h * (last + rates[last] / (rates[last] - rates[last + 1]))
+    assert crossing == pytest.approx(period, rel=1e-4)
+    shape = body.deformation
+    np.testing.assert_allclose(shape, shape[0, 0] * np.eye(3), atol=1e-12)
+
+
+def test_the_period_of_large_breathing_converges_with_the_second_power_of_the_step(shared):
+    ref = json.loads((shared / "refs/bodies/c_prb_vibration.json").read_text())["breathing_nonlinear"]
+    at, size = ref["t"][40], ref["F11"][40]
+    for scheme in SCHEMES:
+        errors = [
+            abs(end(deformed(cube(scheme), 1.1 * np.eye(3)), at / n, n).deformation[0, 0] - size)
+            for n in (200, 400)
+        ]
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.15)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_damping_takes_a_half_omega_squared_times_eta(scheme):
+    eta = 2e-4
+    body = deformed(cube(scheme, damping=eta), (1 + 1e-7) * np.eye(3))
+    rate, h = eta * OMEGA_B**2 / 2, 5e-6
+    steps = round(4 * np.pi / np.sqrt(OMEGA_B**2 - rate**2) / h)
+    end(body, h, steps)
+    assert (body.q[0] - 1) / 1e-7 == pytest.approx(np.exp(-rate * h * steps), rel=2e-3)
+
+
+# ---- free rotation ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scheme", "E", "steps", "error", "gain", "moment"),
+    [
+        ("DEF_EXP", 1e6, 1000, 1.68799e-3, 4.833e-5, 0.0),
+        ("DEF_LIM", 1e6, 1000, 2.19968e-3, 4.807e-5, 3.574e-8),
+        ("DEF_EXP", 1e6, 8000, 1.30725e-5, 7.567e-7, 0.0),
+        ("DEF_LIM", 1e6, 8000, 2.40804e-5, 7.480e-7, 8.77e-12),
+        ("ENERGY_MOMENTUM", 1e6, 1000, 2.16e-3, 0.0, 0.0),
+        ("ENERGY_MOMENTUM", 1e6, 4000, 8.05e-5, 0.0, 0.0),
+        ("DEF_EXP", 1e8, 4000, 1.74584e-4, 3.021e-6, 0.0),
+        ("DEF_LIM", 1e8, 1000, 5.32291e-4, 7.453e-5, 3.835e-6),
+    ],
+)
+def test_errors_of_a_box_that_rotates_freely(scheme, E, steps, error, gain, moment, brick, drift, compiled):
+    if steps > 1000 and not compiled:
+        pytest.skip("so many steps need the compiled kernels")
+    body = brick(kl.PseudoRigidBody, E, scheme=scheme)
+    body.set_velocity(angular=SPIN)
+    assert body.kinetic_energy() == pytest.approx(1160.047, rel=1e-13)
+    np.testing.assert_allclose(body.angular_momentum(), MOMENTUM, rtol=1e-12)
+    energies, momenta = [], []
+    for _ in kl.march(body, 1 / steps, steps, every=max(1, steps // 1000)):
+        energies.append(float(body.energy()))
+        momenta.append(drift(MOMENTUM, body.angular_momentum()))
+    assert np.linalg.norm(body.deformation - F_AT_1[E]) == pytest.approx(error, rel=0.05, abs=1e-7)
+    changes = np.abs(np.array(energies) / 1160.047 - 1).max()
+    assert changes < (1.05 * gain if gain else 1e-13)
+    assert changes > 0.5 * gain
+    assert max(momenta) < (1.05 * moment + 1e-14 if moment else 1e-13)
+    np.testing.assert_allclose(body.linear_momentum(), 0, atol=1e-12)
+
+
+@each_scheme
+def test_errors_fall_with_the_second_power_of_the_step(scheme, brick):
+    def at_a_tenth(steps):
+        body = brick(kl.PseudoRigidBody, scheme=scheme)
+        body.set_velocity(angular=SPIN)
+        return end(body, 0.1 / steps, steps).deformation
+
+    fine = at_a_tenth(1600)
+    errors = [np.linalg.norm(at_a_tenth(steps) - fine) for steps in (200, 400)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(np.log2((1 - 1 / 64) / (1 / 4 - 1 / 64)), abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("E", "stretches", "apart"), [(1e6, (0.99346, 1.01531), 1.0), (1e8, (0.999937, 1.000159), 0.0053)]
+)
+def test_stretches_and_nearness_to_the_rigid_body(E, stretches, apart, brick, compiled):
+    if not compiled:
+        pytest.skip("so many steps need the compiled kernels")
+    soft = brick(kl.PseudoRigidBody, E)
+    rigid = brick(kl.RigidBody, E, scheme="RIG_IMP")
+    low, high, far = 1.0, 1.0, 0.0
+    for body in (soft, rigid):
+        body.set_velocity(angular=SPIN)
+    steps = 10_000
+    for one, _ in zip(
+        kl.march(soft, 1 / steps, steps, every=10), kl.march(rigid, 1 / steps, steps, every=10), strict=True
+    ):
+        U, s, Vt = np.linalg.svd(one.q[:9].reshape(3, 3))
+        low, high = min(low, s.min()), max(high, s.max())
+        far = max(far, np.abs(U @ Vt - rigid.rotation).max())
+    assert low == pytest.approx(stretches[0], abs=2e-3 * (1 - stretches[0]) + 1e-5)
+    assert high == pytest.approx(stretches[1], abs=2e-3 * (stretches[1] - 1) + 1e-5)
+    assert far < 1.2 * apart
+
+
+# ---- large steps -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("E", "h", "steps"), [(1e6, 5e-2, 15), (1e8, 2e-2, 97), (2e11, 1e-3, 50)])
+def test_steps_that_blow_the_linearly_implicit_scheme_up(E, h, steps, brick, caplog):
+    """What the warning is about: without damping the energy grows without bound."""
+    body = brick(kl.PseudoRigidBody, E, scheme="DEF_LIM")
+    body.set_velocity(angular=SPIN)
+    highest = 0.0
+    try:
+        for _ in kl.march(body, h, 4 * steps):
+            highest = max(highest, float(body.energy()))
+            if highest > 5 * 1160:
+                break
+    except kl.SolveError:  # no longer finite
+        highest = np.inf
+    assert highest > 5 * 1160
+    assert "may gain energy without bound" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("E", "h"),
+    [
+        (1e6, 1e-3),
+        (1e6, 5e-3),
+        (1e6, 2e-2),
+        (1e6, 5e-2),
+        (1e8, 5e-3),
+        (1e8, 2e-2),
+        (2e11, 1e-4),
+        (2e11, 1e-3),
+    ],
+)
+def test_energy_and_momenta_stay_whatever_the_step(E, h, brick, drift):
+    body = brick(kl.PseudoRigidBody, E)
+    body.set_velocity((1, 2, 3), SPIN)
+    start, p = float(body.energy()), body.linear_momentum()
+    worst = [0.0, 0.0]
+    for _ in kl.march(body, h, 60):
+        worst[0] = max(worst[0], abs(float(body.energy()) / start - 1))
+        worst[1] = max(worst[1], drift(MOMENTUM, body.angular_momentum()))
+    assert worst[0] < 2e-12
+    assert worst[1] < 1e-12
+    np.testing.assert_allclose(body.linear_momentum(), p, rtol=1e-13)
+
+
+def test_a_stiff_spinning_box_for_a_hundred_thousand_steps(brick, drift, compiled):
+    body = brick(kl.PseudoRigidBody, 2e11)
+    body.set_velocity(angular=SPIN)
+    start, worst = float(body.energy()), [0.0, 0.0]
+    for _ in kl.march(body, 1e-3, 100_000 if compiled else 400, every=100):
+        worst[0] = max(worst[0], abs(float(body.energy()) / start - 1))
+        worst[1] = max(worst[1], drift(MOMENTUM, body.angular_momentum()))
+    assert worst[0] < 1e-10
+    assert worst[1] < 1e-10
+    assert body.deformation.T @ body.deformation == pytest.approx(np.eye(3), abs=1e-4)
+
+
+@pytest.mark.parametrize("h", [1e-3, 2e-2])
+def test_damping_dissipates_and_leaves_the_angular_momentum(h, brick, drift):
+    body = brick(kl.PseudoRigidBody, damping=1e-3)
+    body.set_velocity(angular=SPIN)
+    energies = [float(body.energy())]
+    for _ in kl.march(body, h, 60):
+        energies.append(float(body.energy()))
+        assert drift(MOMENTUM, body.angular_momentum()) < 1e-13
+    assert (np.diff(energies) < 1e-9).all()
+    assert energies[-1] < 1160.0
+
+
+def test_a_rotated_start_gives_the_rotated_motion(brick):
+    """Nothing depends on how the axes of space lie."""
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    for scheme in SCHEMES:
+        one, other = brick(kl.PseudoRigidBody, scheme=scheme), brick(kl.PseudoRigidBody, scheme=scheme)
+        one.set_velocity((1, 2, 3), SPIN)
+        deformed(other, turn)
+        other.set_velocity(turn @ (1, 2, 3), turn @ SPIN)
+        end(one, 2e-3, 50)
+        end(other, 2e-3, 50)
+        np.testing.assert_allclose(other.deformation, turn @ one.deformation, atol=1e-12)
+        np.testing.assert_allclose(other.mass_center(), turn @ one.mass_center(), atol=1e-12)

@@ -1,0 +1,317 @@
+"""Rigid tops: free, tumbling about the intermediate axis, heavy and nutating.
+
+Reference values: the equations of motion solved with 12 digits; Jacobi's elliptic functions for the periods.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.rotations import exp
+
+SCHEMES = ("RIG_POS", "RIG_NEG", "RIG_IMP")
+EXACT = ("RIG_NEG", "RIG_IMP")
+each_scheme = pytest.mark.parametrize("scheme", SCHEMES)
+
+FREE_AT_1 = np.array(
+    [
+        [-0.9997933439831747, 0.02025752864553756, -0.0017034846756190068],
+        [-0.008836223646996058, -0.5085081331683603, -0.8610118464070836],
+        [-0.018308207955001106, -0.8608188607568308, 0.5085820469566709],
+    ]
+)
+"""Rotation of the free top after 1 s."""
+
+
+def top(J, W, scheme, rotation=None):
+    body = kl.RigidBody(
+        characteristics=kl.Characteristics(mass=1.0, inertia=np.diag(np.array(J, dtype=float))), scheme=scheme
+    )
+    if rotation is not None:
+        body.turn(rotation)
+    body.u[:3] = W
+    return body
+
+
+def free(scheme):
+    return top((5, 10, 1), (8, 0.02, 0), scheme)
+
+
+def heavy(scheme, W=50.0, angle=0.05):
+    """Return a symmetric top under its weight, and its energy as a function of a state."""
+    body = top((5, 5, 1), (0, 0, W), scheme, exp([angle, 0, 0]))
+    body.add(kl.Callback(lambda q, u, t: np.r_[0, 0, 0, -20 * q[7], 20 * q[6], 0, 0, 0, 0]))
+    return body, lambda state: float((state.u[:3] ** 2 @ [5, 5, 1]) / 2 + 20 * state.q[8])
+
+
+def end(body, dt, steps):
+    for _ in kl.march(body, dt, steps, every=steps):
+        pass
+    return body
+
+
+def gains(body, dt, steps, energy=None):
+    """Return relative changes of the energy over a motion, at every tenth step."""
+    energy = energy or (lambda state: float((state.u[:3] ** 2 @ body.characteristics.inertia.diagonal()) / 2))
+    start = energy(kl.State.of(body))
+    return np.array([energy(state) for state in kl.march(body, dt, steps, every=10)]) - start
+
+
+# ---- free top --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scheme", "error", "gain"),
+    [("RIG_POS", 1.0558e-2, 7.755e-4), ("RIG_NEG", 3.3565e-2, -7.736e-4), ("RIG_IMP", 2.6796e-3, -5.306e-7)],
+)
+def test_errors_of_the_free_top_after_one_second(scheme, error, gain, drift):
+    body = free(scheme)
+    E, pi = body.energy(), body.angular_momentum()
+    assert E == pytest.approx(160.002, rel=1e-15)
+    end(body, 0.01, 100)
+    assert np.linalg.norm(body.rotation - FREE_AT_1) == pytest.approx(error, rel=0.01)
+    assert body.energy() / E - 1 == pytest.approx(gain, rel=0.01)
+    if scheme in EXACT:
+        assert drift(pi, body.angular_momentum()) < 1e-12
+    else:
+        assert drift(pi, body.angular_momentum()) == pytest.approx(7.206e-3, rel=0.01)
+    assert np.abs(body.rotation.T @ body.rotation - np.eye(3)).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("scheme", "coarse", "fine"),
+    [
+        ("RIG_POS", 2.5882e-3, 6.4306e-4),
+        ("RIG_NEG", 4.3239e-3, 5.7171e-4),
+        ("RIG_IMP", 6.7033e-4, 1.6761e-4),
+    ],
+)
+def test_orders_of_convergence(scheme, coarse, fine):
+    errors = [
+        np.linalg.norm(end(free(scheme), 1 / steps, steps).rotation - FREE_AT_1) for steps in (200, 400)
+    ]
+    np.testing.assert_allclose(errors, (coarse, fine), rtol=0.01)
+    order = np.log2(errors[0] / errors[1])
+    assert 1.95 < order < (3.0 if scheme == "RIG_NEG" else 2.05)
+
+
+@pytest.mark.parametrize(("scheme", "sign"), [("RIG_POS", 1), ("RIG_NEG", -1)])
+def test_the_energy_drifts_with_the_third_power_of_the_step_and_the_sign_that_gives_the_name(scheme, sign):
+    coarse, fine = gains(free(scheme), 0.01, 100), gains(free(scheme), 0.005, 200)[1::2]
+    assert (sign * coarse > 0).all()
+    assert (sign * fine > 0).all()
+    assert coarse[-1] / fine[-1] == pytest.approx(8, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "h", "at_end"),
+    [("RIG_POS", 0.01, 1.2586e-2), ("RIG_NEG", 0.01, -2.6140e-2), ("RIG_NEG", 0.05, -0.499994)],
+)
+def test_energy_of_the_free_top_after_twenty_seconds(scheme, h, at_end):
+    body = free(scheme)
+    end(body, h, round(20 / h))
+    assert body.energy() / 160.002 - 1 == pytest.approx(at_end, rel=0.02)
+
+
+def test_the_implicit_scheme_keeps_the_energy_over_twenty_seconds():
+    body = free("RIG_IMP")
+    change = gains(body, 0.01, 2000) / 160.002
+    assert abs(change[-1]) < 1e-6
+    assert change.min() == pytest.approx(-1.595e-3, rel=0.05)
+    assert change.max() < 1e-12
+
+
+def test_the_implicit_scheme_retraces_its_way():
+    body = free("RIG_IMP")
+    q = body.q.copy()
+    end(body, 0.01, 100)
+    body.u = -body.u
+    end(body, 0.01, 100)
+    np.testing.assert_allclose(body.q, q, atol=1e-10)
+    np.testing.assert_allclose(body.u[:3], (-8, -0.02, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", EXACT)
+def test_the_spatial_momentum_of_the_free_top_stays_for_twenty_seconds(scheme, drift):
+    body = free(scheme)
+    end(body, 0.01, 2000)
+    assert drift(np.array([40, 0.2, 0]), body.angular_momentum()) < 1e-12
+
+
+def test_the_whole_reference_motion_of_the_free_top(shared):
+    ref = json.loads((shared / "refs/bodies/a_torque_free_top.json").read_text())
+    body = free("RIG_IMP")
+    states = list(kl.march(body, 1e-3, 1000, every=100))
+    for i, state in enumerate(states, 1):
+        R = state.q[:9].reshape(3, 3).T
+        assert np.linalg.norm(R - ref["Lambda"][i]) < 1.5e-4
+        np.testing.assert_allclose(state.u[:3], ref["W"][i], atol=6e-4)
+
+
+@each_scheme
+def test_a_top_turns_over_at_the_times_of_jacobi(scheme):
+    body = top((1, 2, 3), (1e-3, 2, 1e-3), scheme)
+    E, pi = body.energy(), body.angular_momentum()
+    assert E == pytest.approx(4.000002, rel=1e-15)
+    np.testing.assert_allclose(pi, (1e-3, 4, 3e-3), rtol=1e-15)
+    h, times, last = 0.02, [], body.u[1]
+    for state in kl.march(body, h, 1200):
+        if last * state.u[1] < 0:
+            times.append(state.time - h * state.u[1] / (state.u[1] - last))
+        last = state.u[1]
+    assert times[0] == pytest.approx(8.05358, abs=0.005)
+    if scheme == "RIG_IMP":  # the others leave the separatrix: the energy of theirs is another
+        np.testing.assert_allclose(times, (8.05358, 23.01950), atol=0.01)
+        assert np.diff(times)[0] == pytest.approx(29.93199027029713 / 2, abs=0.01)
+        assert body.energy() == pytest.approx(E, rel=1e-4)
+    if scheme in EXACT:
+        np.testing.assert_allclose(body.angular_momentum(), pi, atol=4e-12)
+
+
+# ---- heavy top -------------------------------------------------------------------------------------
+
+TABLE = {
+    ("RIG_POS", 0.001): (1.9931e-6, 0.0, 2.0719e-6),
+    ("RIG_POS", 0.003): (3.3964e-5, 0.0, 3.4351e-5),
+    ("RIG_POS", 0.009): (7.4212e-4, 0.0, 7.4212e-4),
+    ("RIG_NEG", 0.001): (-2.8085e-6, -2.9379e-6, 0.0),
+    ("RIG_NEG", 0.003): (-4.4610e-5, -4.5400e-5, 0.0),
+    ("RIG_NEG", 0.009): (-9.2999e-4, -9.2999e-4, 0.0),
+    ("RIG_IMP", 0.001): (-1.7471e-6, -1.8879e-6, 2.1e-10),
+    ("RIG_IMP", 0.003): (-1.5957e-5, -1.7013e-5, 3.1e-11),
+    ("RIG_IMP", 0.009): (-1.5411e-4, -1.5487e-4, 0.0),
+}
+"""H - H0 of the heavy top over 10 s: at the end, lowest, highest."""
+
+
+@pytest.mark.parametrize("h", [0.001, 0.003, 0.009])
+@each_scheme
+def test_energy_of_the_heavy_top(scheme, h, compiled):
+    if h < 0.009 and not compiled:
+        pytest.skip("so many steps need the compiled kernels")
+    body, energy = heavy(scheme)
+    assert energy(kl.State.of(body)) == pytest.approx(1269.97500520790, rel=1e-13)
+    vertical = body.angular_momentum()[2]
+    change = gains(body, h, int(10 / h), energy)
+    last, low, high = TABLE[scheme, h]
+    room = 1e-9  # rounding of H over ten thousand steps
+    assert 1.05 * low - room < change.min()
+    assert change.max() < 1.05 * high + room
+    assert change[-1] == pytest.approx(last, rel=0.05, abs=room)
+    assert body.u[2] == pytest.approx(50, rel=1e-5)
+    if scheme in EXACT:
+        assert abs(body.angular_momentum()[2] / vertical - 1) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("scheme", "error"), [("RIG_POS", 2.1240517e-4), ("RIG_NEG", 1.1136200e-4), ("RIG_IMP", 1.1426867e-4)]
+)
+def test_the_axis_of_the_heavy_top_after_one_second(scheme, error):
+    axis = np.array([0.021541104974233692, -0.05001033548338187, 0.9985163729961212])
+    errors = []
+    for steps in (100, 200):
+        body, _ = heavy(scheme)
+        errors.append(np.linalg.norm(end(body, 1 / steps, steps).rotation[:, 2] - axis))
+    assert errors[0] == pytest.approx(error, rel=0.05)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.06)
+
+
+def test_the_heavy_top_nods_and_turns_as_theory_says():
+    body, _ = heavy("RIG_IMP")
+    h = 0.002
+    states = list(kl.march(body, h, 700))
+    axes = np.array([state.q[6:9] for state in states])
+    theta = np.arccos(axes[:, 2])
+    assert theta.min() == pytest.approx(0.05, abs=2e-6)
+    assert theta.max() == pytest.approx(0.0545516901, abs=1e-5)
+    times = h * (1 + np.arange(len(theta)))
+    first, second = (
+        vertex(times, theta, int(np.argmin(theta + 1e3 * (abs(times - t) > 0.2)))) for t in (0.6855, 1.371)
+    )
+    assert second - first == pytest.approx(0.6854584973, abs=2e-4)
+    assert first == pytest.approx(0.6854584973, abs=2e-4)
+    turn = np.unwrap(np.arctan2(axes[:, 1], axes[:, 0]))
+    rate = (np.interp(second, times, turn) - np.interp(first, times, turn)) / (second - first)
+    assert rate == pytest.approx(0.4173960790, rel=2e-3)
+
+
+def vertex(times, values, i):
+    """Return the time of the extremum of the parabola through three values about i."""
+    a, b, c = values[i - 1 : i + 2]
+    return times[i] + (times[1] - times[0]) * (a - c) / (2 * (a - 2 * b + c))
+
+
+def test_the_nutating_top_follows_the_reference():
+    body, energy = heavy("RIG_IMP", 25.0, 0.5)
+    vertical = body.angular_momentum()[2]
+    assert energy(kl.State.of(body)) == pytest.approx(330.0516512378, rel=1e-12)
+    assert vertical == pytest.approx(21.939564047259317, rel=1e-13)
+    states = list(kl.march(body, 2e-3, 1000))
+    theta = np.arccos([state.q[8] for state in states])
+    assert theta.min() > 0.5 - 1e-5
+    assert theta.max() == pytest.approx(0.7576379147, abs=1e-4)
+    times = np.array([state.time for state in states])
+    back = vertex(times, theta, 500 + int(np.argmin(theta[500:])))
+    assert back == pytest.approx(1.7588577458, abs=5e-4)
+    turn = np.unwrap([np.arctan2(state.q[7], state.q[6]) for state in states])
+    assert np.interp(back, times, turn) + np.pi / 2 == pytest.approx(1.6278179866, abs=2e-3)
+    for i, axis in (
+        (249, (0.15791794991218852, -0.5956223877807012, 0.7875886567682137)),
+        (499, (0.5736588805109092, -0.3641838734285794, 0.7336794907488755)),
+    ):
+        np.testing.assert_allclose(states[i].q[6:9], axis, atol=2e-4)
+    assert abs(body.angular_momentum()[2] / vertical - 1) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "W", "angle"), [("b_heavy_top", 50.0, 0.05), ("b2_nutating_top", 25.0, 0.5)]
+)
+def test_the_whole_reference_motion_of_the_heavy_tops(shared, name, W, angle, compiled):
+    if not compiled:
+        pytest.skip("so many steps need the compiled kernels")
+    ref = json.loads((shared / f"refs/bodies/{name}.json").read_text())
+    body, _ = heavy("RIG_IMP", W, angle)
+    for i, state in enumerate(kl.march(body, 1e-3, 10_000, every=500), 1):
+        assert state.time == pytest.approx(ref["t"][i], rel=1e-12)
+        np.testing.assert_allclose(state.q[6:9], np.array(ref["Lambda"][i])[:, 2], atol=1e-4 * (1 + i / 4))
+
+
+# ---- torques ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", EXACT)
+def test_a_constant_torque_in_space_adds_to_the_momentum_exactly(scheme):
+    body = free(scheme)
+    body.add(kl.Torque((3.0, -2.0, 5.0)))
+    end(body, 0.01, 50)
+    np.testing.assert_allclose(body.angular_momentum(), (41.5, -0.8, 2.5), rtol=1e-12, atol=1e-12)
+
+
+@each_scheme
+def test_a_torque_about_a_principal_axis_spins_the_body_up(scheme):
+    body = top((5, 10, 1), (0, 0, 0), scheme)
+    body.add(kl.Torque((0, 3.0, 0), frame="convected"), kl.TimeSeries([0, 1], [0, 2]))
+    end(body, 0.01, 100)
+    np.testing.assert_allclose(body.u[:3], (0, 0.3, 0), rtol=1e-13, atol=1e-15)
+    assert body.external_work == pytest.approx(body.kinetic_energy(), rel=1e-12)
+    angle = np.arctan2(body.rotation[0, 2], body.rotation[0, 0])
+    assert angle == pytest.approx(0.1, rel=1e-4)  # W = 0.3 t²
+
+
+@each_scheme
+def test_a_tower_of_callbacks_in_nine_or_six_numbers_is_the_same(scheme):
+    nine, _ = heavy(scheme, 25.0, 0.5)
+    six, _ = heavy(scheme, 25.0, 0.5)
+    six.loads.clear()
+
+    def referential(q, u, t):
+        R = q[:9].reshape(3, 3).T
+        return np.r_[R.T @ (-20 * np.cross(q[6:9], [0, 0, 1])), 0, 0, 0]
+
+    six.add(kl.Callback(referential))
+    end(nine, 0.01, 20)
+    end(six, 0.01, 20)
+    np.testing.assert_allclose(nine.q, six.q, atol=1e-13)
+    np.testing.assert_allclose(nine.u, six.u, atol=1e-12)
