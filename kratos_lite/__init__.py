@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     )
     from kratos_lite.generate import annulus, box
     from kratos_lite.io.files import read, write
+    from kratos_lite.io.trajectory import Series, trajectory_picture
     from kratos_lite.loads import BodyForce, Gravity, LineLoad, NodalForces, PointLoad, Pressure, Traction
     from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
     from kratos_lite.mesh import Block, Mesh, Part
@@ -84,6 +85,7 @@ _HOME = {
     "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
     "kratos_lite.generate": "annulus box",
     "kratos_lite.io.files": "read write",
+    "kratos_lite.io.trajectory": "Series trajectory_picture",
     "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Traction",
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",
@@ -138,6 +140,7 @@ __all__ = [
     "Result",
     "RigidBody",
     "RigidLink",
+    "Series",
     "SetAcceleration",
     "SetDisplacement",
     "SetVelocity",
@@ -157,6 +160,7 @@ __all__ = [
     "march",
     "picture",
     "read",
+    "trajectory_picture",
     "write",
 ]
 

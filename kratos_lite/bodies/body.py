@@ -116,6 +116,15 @@ class Body(ABC):
         """
 
     @abstractmethod
+    def turn(self, rotation: ArrayLike) -> None:
+        """Turn the undeformed body about its mass centre, which stays where it is.
+
+        Parameters
+        ----------
+        rotation : Λ (3, 3) or (..., 3, 3); `kratos_lite.rotations.exp` makes one of a rotation vector.
+        """
+
+    @abstractmethod
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Let the body move as a rigid one: linear velocity of its mass centre, and spatial angular velocity.
 

@@ -21,6 +21,7 @@ from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.modes import modes
+from kratos_lite.rotations import check_rotation
 
 Array = NDArray[np.float64]
 
@@ -143,6 +144,11 @@ class FiniteElementBody(Deformable):
                     element = self.mesh.element_ids[batch.rows[chunk][int(np.argmin(lowest))]]
                     raise InputError(f"these displacements turn element {element} inside out: det J ≤ 0")
         self.q = q.ravel().copy()
+
+    def turn(self, rotation: ArrayLike) -> None:
+        """Set q = (Λ - 1)(X - X̄) and leave the mass centre where it is; see `Body.turn`."""
+        arms = self.points - self._shares @ self.points
+        self.q = (arms @ check_rotation(rotation).T - arms + self._shares @ self.displacement).ravel()
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""

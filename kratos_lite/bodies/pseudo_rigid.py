@@ -20,7 +20,7 @@ from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.rotations import axial, hat
+from kratos_lite.rotations import axial, check_rotation, hat
 from kratos_lite.voigt import tensor
 
 Array = NDArray[np.float64]
@@ -117,6 +117,13 @@ class PseudoRigidBody(Deformable):
                 f"a deformation gradient needs det F > 0; got {lowest:g}: it turns the body over"
             )
         self.q = q.copy()
+
+    def turn(self, rotation: ArrayLike) -> None:
+        """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
+        R = check_rotation(rotation)
+        q = self.q.copy()
+        q[..., :9] = R.reshape(*R.shape[:-2], 9)
+        self.q = q
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""

@@ -116,7 +116,7 @@ class RigidBody(Body):
         self.q = q.copy()
 
     def turn(self, rotation: ArrayLike) -> None:
-        """Set the rotation Λ (3, 3) or (..., 3, 3) and leave the mass centre where it is."""
+        """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
         R = check_rotation(rotation)
         q = self.q.copy()
         q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)

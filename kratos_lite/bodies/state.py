@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,3 +81,17 @@ class State:
         except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
             raise InputError(f"{path}: not a state that State.save wrote ({error})") from None
         return cls(kind, values["q"], values["u"], time, step, values["external_work"])
+
+
+@contextmanager
+def at(body: Body, state: State) -> Iterator[None]:
+    """Let a body be in a state for a while."""
+    if state.time == body.time and np.array_equal(state.q, body.q) and np.array_equal(state.u, body.u):
+        yield
+        return
+    kept = State.of(body)
+    state.put_into(body)
+    try:
+        yield
+    finally:
+        kept.put_into(body)

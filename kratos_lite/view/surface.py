@@ -1,4 +1,4 @@
-"""Pictures: a body in isometric view, deformed and coloured, and reference cells with node numbers."""
+"""Pictures of bodies: the surface in isometric view, deformed and coloured."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.io.output import write_whole
+from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Floats, Mesh
 from kratos_lite.shapes import Shape
+from kratos_lite.view.canvas import colour_bar, colours_of, lines, new_figure, polygons, save_figure
 
 ISOMETRIC: Floats = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
 """Rows: right, up and towards the viewer."""
-OBLIQUE: Floats = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
-"""As `ISOMETRIC`, for cells: no two corners of a cube fall on one another."""
 PLAIN = (0.62, 0.72, 0.84)
 """Colour of a body without values."""
 LIGHT: Floats = np.array([0.35, -0.65, 0.67])
@@ -71,7 +69,7 @@ def picture(
     >>> mesh = Mesh(Hexahedron8.nodes, [cube])
     >>> picture(getfixture("tmp_path") / "cube.png", mesh, values=mesh.points[:, 0], title="x", unit="m")
     """
-    figure, axes = _figure(size)
+    figure, axes = new_figure(size)
     if not mesh.boundary:
         raise InputError("there is nothing to draw: the mesh has no element of a known shape")
     X = mesh.points
@@ -79,7 +77,7 @@ def picture(
         u = _numbers("displacement", displacement, (mesh.n_nodes, 3))
         scale = _exaggeration(X, u) if scale is None else scale
         title = f"{title}\ndeformation × {scale:g}".strip()
-        axes.add_collection(_outline(mesh))
+        lines(axes, _outline(mesh))
         X = X + scale * u
     field = None if values is None else _numbers("values", values, (mesh.n_nodes,))
     colours = _paint(axes, mesh.boundary, X, field)
@@ -87,107 +85,9 @@ def picture(
     if colours is not None:
         if unit is None:
             unit = next((unit for word, unit in UNITS.items() if word in title.upper()), "")
-        _bar(figure, axes, colours, unit)
+        colour_bar(figure, axes, colours, unit)
     axes.set_title(title, fontsize=11)
-    _save(path, figure)
-
-
-def element_picture(path: str | Path, shape: type[Shape], points: ArrayLike | None = None) -> None:
-    """Draw a reference cell with its node numbers (from 0), and Gauss points as crosses.
-
-    Parameters
-    ----------
-    path : picture to write; .png, .pdf or .svg.
-    shape : the cell.
-    points : (g, d) reference coordinates to mark.
-
-    Raises
-    ------
-    InputError
-        `points` has the wrong shape, or the file cannot be written.
-    KratosLiteError
-        matplotlib is missing.
-
-    Examples
-    --------
-    >>> from kratos_lite.shapes import Wedge15
-    >>> element_picture(getfixture("tmp_path") / "wedge.png", Wedge15)
-    """
-    figure, axes = _figure((5, 5))
-    d = shape.nodes.shape[1]
-    view = OBLIQUE if d == 3 else np.eye(3)
-
-    def flat(x: Floats) -> Floats:
-        return np.pad(x, ((0, 0), (0, 3 - d))) @ view[:2].T
-
-    X = flat(shape.nodes)
-    hidden = _hidden_edges(shape)
-    for edge in shape.edges or (() if d == 0 else ((0, 1),)):
-        style = {"ls": (0, (4, 3)), "color": "0.6"} if frozenset(edge) in hidden else {"color": "0.15"}
-        axes.plot(*X[list(edge)].T, lw=1.5, zorder=1, **style)
-    for a, x in enumerate(X):
-        corner = a < shape.corners
-        box = {"boxstyle": "circle,pad=0.28", "fc": "#23538f" if corner else "white", "ec": "#23538f"}
-        axes.text(
-            *x, a, ha="center", va="center", size=9, color="w" if corner else "#23538f", bbox=box, zorder=3
-        )
-    if points is not None:
-        G = np.asarray(points, dtype=float)
-        if G.ndim != 2 or G.shape[1] != d:
-            raise InputError(f"points must have shape (g, {d}) for {shape.__name__}; got {G.shape}")
-        axes.plot(*flat(G).T, "x", color="#c8442b", ms=8, mew=2, zorder=2)
-    _triad(axes, X, flat(np.eye(d)))
-    axes.set_title(shape.__name__, fontsize=11)
-    axes.autoscale_view()
-    _save(path, figure)
-
-
-def _triad(axes: Any, X: Floats, directions: Floats) -> None:
-    """Draw the reference axes below and to the left of a cell."""
-    length = 0.2 * np.ptp(X, axis=0).max()
-    low = X.min(axis=0) - 1.2 * length
-    for axis, name in zip(directions, "rst", strict=False):
-        arrow = {"arrowstyle": "-|>", "color": "0.3", "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", low + length * axis, low, arrowprops=arrow, annotation_clip=False)
-        axes.text(*(low + 1.25 * length * axis), name, ha="center", va="center", style="italic", color="0.3")
-
-
-def _canvas() -> Any:
-    """Return the canvas class that draws without a screen."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-    except ImportError as error:
-        raise KratosLiteError("pictures need matplotlib: pip install kratos-lite[view]") from error
-    return FigureCanvasAgg
-
-
-def _figure(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
-    canvas = _canvas()
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, dpi=150, layout="constrained")
-    canvas(figure)
-    axes = figure.add_subplot()
-    axes.set_aspect("equal")
-    axes.axis("off")
-    return figure, axes
-
-
-def check_picture_target(path: str | Path) -> str:
-    """Return the format of a picture; InputError for one that cannot be written."""
-    kind = Path(path).suffix[1:].lower() or "png"
-    known = _canvas().get_supported_filetypes()
-    if kind not in known:
-        raise InputError(
-            f"{path}: pictures cannot be written as .{kind}; known are {' '.join(sorted(known))}"
-        )
-    return kind
-
-
-def _save(path: str | Path, figure: Any) -> None:
-    kind = check_picture_target(path)
-    write_whole(path, lambda file: figure.savefig(file, format=kind, bbox_inches="tight", pad_inches=0.1))
+    save_figure(path, figure)
 
 
 def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Floats:
@@ -227,11 +127,11 @@ def _facets(cell: str, n: int) -> tuple[Floats, NDArray[np.intp]]:
 def _rim(shape: type[Shape], n: int) -> Floats:
     """Return the pieces of the edges of a reference face, (edges · n, 2, 2)."""
     t = np.linspace(0, 1, n + 1)[:, None]
-    lines = [(1 - t) * shape.nodes[a] + t * shape.nodes[b] for a, b in shape.edges]
-    return np.array([pair for line in lines for pair in pairwise(line)])
+    pieces = [(1 - t) * shape.nodes[a] + t * shape.nodes[b] for a, b in shape.edges]
+    return np.array([pair for line in pieces for pair in pairwise(line)])
 
 
-def _visible(block: Block, X: Floats, field: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats]:
+def visible(block: Block, X: Floats, field: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Return of the facets that face the viewer: corners, light, value; and the edges of their faces."""
     assert block.shape is not None
     xi, corners = _facets(block.shape.cell, n)
@@ -247,60 +147,38 @@ def _visible(block: Block, X: Floats, field: Floats, n: int) -> tuple[Floats, Fl
     return P[front], light, value, rim.reshape(-1, 2, 3)
 
 
-def _colours(value: Floats) -> tuple[Any, Floats]:
-    """Return the scale of the colour bar and the colour of each value."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    low, high = (float(value.min()), float(value.max())) if len(value) else (0.0, 1.0)
-    if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant is shown in the middle of the scale
-        half = 0.5 * max(abs(low), abs(high)) or 1.0
-        low, high = low - half, high + half
-    shown = ScalarMappable(Normalize(low, high), colormaps["viridis"])
-    return shown, np.asarray(shown.to_rgba(value))
-
-
-def _bar(figure: Any, axes: Any, colours: Any, unit: str) -> None:
-    """Draw the colour bar with one prefix for all its numbers."""
-    from matplotlib.ticker import EngFormatter, FuncFormatter
-
-    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colours.get_clim()))) / 3), -24, 24))
-    shown = FuncFormatter(lambda value, _: f"{value / 10.0**power:g}")
-    bar = figure.colorbar(colours, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
-    prefix = EngFormatter.ENG_PREFIXES[power]
-    bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
-    bar.outline.set_visible(False)
-
-
 def _paint(axes: Any, boundary: list[Block], X: Floats, field: Floats | None) -> Any:
     """Draw facets and element edges from back to front; return what the colour bar shows."""
-    from matplotlib.collections import PolyCollection
-
-    count = sum(map(len, boundary))
-    n = int(np.clip(np.sqrt(MANY / count), 1, 16))
-    drawn = [_visible(block, X, np.zeros(len(X)) if field is None else field, n) for block in boundary]
+    n, edged = fineness(sum(map(len, boundary)))
+    drawn = [visible(block, X, np.zeros(len(X)) if field is None else field, n) for block in boundary]
     P, light, value, E = (np.concatenate(arrays) for arrays in zip(*drawn, strict=True))
-    shown, colours = (None, np.tile([*PLAIN, 1], (len(P), 1))) if field is None else _colours(value)
+    shown, colours = (None, np.tile([*PLAIN, 1], (len(P), 1))) if field is None else colours_of(value)
     colours[:, :3] *= light[:, None]
-    E = E[: len(E) if count < MANY else 0, [0, 1, 1, 0]]
+    draw(axes, P, colours, E if edged else E[:0])
+    return shown
+
+
+def fineness(count: int) -> tuple[int, bool]:
+    """Return into how many parts an edge of each of so many faces is cut, and whether edges are drawn."""
+    return int(np.clip(np.sqrt(MANY / max(count, 1)), 1, 16)), count < MANY
+
+
+def draw(axes: Any, P: Floats, colours: Floats, E: Floats, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)) -> None:
+    """Draw facets (m, 4, 3) in colours (m, 4) and edges (k, 2, 3) in ink from back to front."""
+    E = E[:, [0, 1, 1, 0]]
     near = P @ ISOMETRIC[2]
     # An edge lies on top of the facets beside it, however these lean.
     above = (near.max(axis=1) - near.mean(axis=1)).max() if len(P) else 0.0
     order = np.argsort(
         np.concatenate([near.mean(axis=1), E.mean(axis=1) @ ISOMETRIC[2] + above]), kind="stable"
     )
-    ink = np.vstack([colours, np.tile([0.1, 0.1, 0.15, 0.55], (len(E), 1))])[order]
+    both = np.vstack([colours, np.tile(ink, (len(E), 1))])[order]
     widths = np.repeat([0.4, 0.5], [len(P), len(E)])[order]
-    flat: Any = np.concatenate([P, E])[order] @ ISOMETRIC[:2].T
-    axes.add_collection(PolyCollection(flat, facecolors=ink, edgecolors=ink, linewidths=widths, zorder=2))
-    return shown
+    polygons(axes, np.concatenate([P, E])[order] @ ISOMETRIC[:2].T, both, widths)
 
 
-def _outline(mesh: Mesh) -> Any:
-    """Return the sharp edges of the undeformed body as thin lines."""
-    from matplotlib.collections import LineCollection
-
+def _outline(mesh: Mesh) -> Floats:
+    """Return the sharp edges of the undeformed body, (m, 2, 2) in the picture."""
     pairs, normals = [], []
     for block in mesh.boundary:
         assert block.shape is not None
@@ -315,8 +193,7 @@ def _outline(mesh: Mesh) -> Any:
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).
     sharp = (counts == 2) & (np.linalg.norm(mean, axis=1) < 2 * np.cos(np.radians(15)))
-    lines = mesh.points[unique[sharp]] @ ISOMETRIC[:2].T
-    return LineCollection(lines, colors="0.55", linewidths=0.8, zorder=1)
+    return np.asarray(mesh.points[unique[sharp]] @ ISOMETRIC[:2].T)
 
 
 def _rulers(axes: Any, X: Floats, moved: Floats) -> None:
@@ -336,15 +213,3 @@ def _rulers(axes: Any, X: Floats, moved: Floats) -> None:
         axes.text(
             *(line.mean(axis=0) + 0.3 * away * np.array(side)), text, ha=ha, va=va, size=9, color="0.25"
         )
-
-
-def _hidden_edges(shape: type[Shape]) -> set[frozenset[int]]:
-    """Return the edges that touch no face turned to the viewer."""
-    sides: dict[frozenset[int], bool] = {}
-    for face in shape.faces:
-        corners = [a for a in face if a < shape.corners]
-        X = shape.nodes[corners]
-        seen = bool(np.cross(X[1] - X[0], X[2] - X[0]) @ OBLIQUE[2] > 0)
-        for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-            sides[frozenset((a, b))] = sides.get(frozenset((a, b)), False) or seen
-    return {edge for edge, seen in sides.items() if not seen}

@@ -1,0 +1,244 @@
+"""Trajectories: the states of a body as files for ParaView, as tables and as pictures."""
+
+from __future__ import annotations
+
+import io
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.bodies import Body, State
+from kratos_lite.bodies.state import at
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.io.output import write_whole
+from kratos_lite.io.vtu import check_mode, write_pvd, write_vtu
+
+Array = NDArray[np.float64]
+COLUMNS = (
+    "time [s]",
+    "kinetic energy [J]",
+    "internal energy [J]",
+    "potential energy [J]",
+    "energy [J]",
+    "external work [J]",
+    *(f"mass centre {axis} [m]" for axis in "xyz"),
+    *(f"linear momentum {axis} [kg m/s]" for axis in "xyz"),
+    *(f"angular momentum {axis} [kg m2/s]" for axis in "xyz"),
+)
+"""Columns of a table: energy is the sum of the three before it, angular momentum about the mass centre."""
+SHOWN = 6
+"""Positions in a picture."""
+
+
+def row_of(body: Body, state: State) -> Array:
+    """Return the row of a state in a table, by `COLUMNS`."""
+    with at(body, state):
+        energies = [
+            float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
+        ]
+        vectors = (body.mass_center(), body.linear_momentum(), body.angular_momentum())
+        work = float(state.external_work)
+        return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
+
+
+class _Writer(ABC):
+    """One kind of file of a series."""
+
+    def __init__(self, path: Path, body: Body, mode: str) -> None:
+        self.path, self.body, self.mode = path, body, mode
+
+    @abstractmethod
+    def add(self, state: State) -> None:
+        """Take one state."""
+
+    @abstractmethod
+    def write(self) -> None:
+        """Write what all states together make, as a whole or not at all."""
+
+
+class _Frames(_Writer):
+    """Meshes, one for each state, and their index."""
+
+    def __init__(self, path: Path, body: Body, mode: str) -> None:
+        super().__init__(path, body, mode)
+        check_mode(mode)
+        _check_single(body, path)
+        if body.mesh is None:
+            raise ModelError(f"{path}: this body has no mesh to be shown; write .csv or .npz")
+        self.frames: list[tuple[float, str]] = []
+
+    def add(self, state: State) -> None:
+        mesh, body = self.body.mesh, self.body
+        assert mesh is not None
+        name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
+        with at(body, state):
+            moved = body.position(mesh.points) - mesh.points
+            data = {"DISPLACEMENT": moved, "VELOCITY": body.velocity(mesh.points)}
+        write_vtu(self.path.with_name(name), mesh, {**data, "NODE_ID": mesh.node_ids}, mode=self.mode)
+        self.frames.append((state.time, name))
+
+    def write(self) -> None:
+        write_pvd(self.path, self.frames)
+
+
+class _Table(_Writer):
+    """Energies, momenta and the mass centre as text, one line for each state."""
+
+    def __init__(self, path: Path, body: Body, mode: str) -> None:
+        super().__init__(path, body, mode)
+        _check_single(body, path)
+        self.rows: list[Array] = []
+
+    def add(self, state: State) -> None:
+        self.rows.append(row_of(self.body, state))
+
+    def write(self) -> None:
+        lines = [",".join(COLUMNS), *(",".join(map(repr, row.tolist())) for row in self.rows)]
+        write_whole(self.path, ("\n".join(lines) + "\n").encode())
+
+
+class _Arrays(_Writer):
+    """Configurations and velocities as arrays, one row for each state."""
+
+    def __init__(self, path: Path, body: Body, mode: str) -> None:
+        super().__init__(path, body, mode)
+        self.states: list[State] = []
+
+    def add(self, state: State) -> None:
+        self.states.append(state)
+
+    def write(self) -> None:
+        names = ("time", "step", "q", "u", "external_work")
+        arrays = {name: np.array([getattr(state, name) for state in self.states]) for name in names}
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, kind=np.array(self.body.kind), **arrays)
+        write_whole(self.path, buffer.getvalue())
+
+
+def _check_single(body: Body, path: Path) -> None:
+    if body.q.ndim > 1:
+        raise ModelError(f"{path}: only a single body can be written so; for many bodies write .npz")
+
+
+class Series:
+    """The states of a march as files; what they are is said by the ending of the path.
+
+    - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
+      DISPLACEMENT (m) and VELOCITY (m/s) on its nodes.
+    - ``.csv``: a table with a line for each state: time, energies, mass centre, momenta (`COLUMNS`).
+    - ``.npz``: arrays ``time``, ``step``, ``q``, ``u``, ``external_work`` with a row for each state.
+
+    Every file is written as a whole or not at all.  Index, table and arrays come at the end, also when the
+    loop ends early or by an error: then they hold the states up to there.
+
+    Parameters
+    ----------
+    path : the file to write.
+    body : the body whose states come; many at once only as ``.npz``.
+    mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
+
+    Raises
+    ------
+    InputError
+        The ending is none of these, or a file cannot be written.
+    ModelError
+        The body has no mesh, or is many bodies.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    >>> folder = getfixture("tmp_path")
+    >>> with Series(folder / "spin.pvd", body) as series:
+    ...     series.add()
+    ...     for state in kl.march(body, dt=0.01, steps=20, every=10):
+    ...         series.add(state)
+    >>> sorted(path.name for path in folder.iterdir())
+    ['spin.pvd', 'spin_00000.vtu', 'spin_00001.vtu', 'spin_00002.vtu']
+    """
+
+    kinds: ClassVar[dict[str, type[_Writer]]] = {".pvd": _Frames, ".csv": _Table, ".npz": _Arrays}
+
+    def __init__(self, path: str | Path, body: Body, *, mode: str = "binary") -> None:
+        check_ending(path)
+        self.body, self.count = body, 0
+        self._writer = self.kinds[Path(path).suffix.lower()](Path(path), body, mode)
+
+    def add(self, state: State | None = None) -> None:
+        """Take a state, or the body as it is if none is given."""
+        self._writer.add(State.of(self.body) if state is None else state)
+        self.count += 1
+
+    def close(self) -> None:
+        """Write what is written at the end; nothing if there is no state."""
+        if self.count:
+            self._writer.write()
+
+    def __enter__(self) -> Series:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def check_ending(path: str | Path) -> None:
+    """Raise InputError for a path whose ending is none of a series."""
+    if Path(path).suffix.lower() not in Series.kinds:
+        raise InputError(f"{path}: a series of states is written as {', '.join(Series.kinds)}")
+
+
+def trajectory_picture(
+    path: str | Path, body: Body, states: Iterable[State], *, shown: int = SHOWN, title: str = ""
+) -> None:
+    """Draw a body along its path, and its energies against time beneath.
+
+    Parameters
+    ----------
+    path : picture to write; .png, .pdf or .svg.
+    body : a single body with a mesh.
+    states : in the order of time.
+    shown : how many positions are drawn, evenly spread over the states; the later the stronger.
+    title : above the picture.
+
+    Raises
+    ------
+    InputError
+        There are no states, or the file cannot be written.
+    ModelError
+        The body has no mesh, or is many bodies.
+    KratosLiteError
+        matplotlib is missing.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    >>> body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
+    >>> trajectory_picture(getfixture("tmp_path") / "spin.png", body, kl.march(body, 0.01, 100, every=10))
+    """
+    from kratos_lite.view import motion_picture
+
+    _check_single(body, Path(path))
+    if body.mesh is None:
+        raise ModelError(f"{path}: this body has no mesh to be drawn")
+    rows, kept = [], []
+    for state in states:
+        rows.append(row_of(body, state))
+        kept.append(state.q)
+    if not kept:
+        raise InputError(f"{path}: there is no state to draw")
+    table = np.array(rows)
+    chosen = np.unique(np.linspace(0, len(kept) - 1, max(shown, 1)).round().astype(int))
+    positions = [body.position(body.mesh.points, kept[i]) for i in chosen]
+    names = ("kinetic", "internal", "potential", "sum")
+    curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
+    motion_picture(
+        path, body.mesh, positions, table[:, 6:9], table[:, 0], curves, title=title, unit="energy in J"
+    )

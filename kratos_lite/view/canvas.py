@@ -1,0 +1,113 @@
+"""Canvas: all that needs matplotlib; figures without a screen, polygons, lines and colour bars."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.output import write_whole
+from kratos_lite.mesh import Floats
+
+
+def _canvas() -> Any:
+    """Return the canvas class that draws without a screen."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+    except ImportError as error:
+        raise KratosLiteError("pictures need matplotlib: pip install kratos-lite[view]") from error
+    return FigureCanvasAgg
+
+
+def _empty(size: tuple[float, float]) -> Any:
+    """Return a figure that needs no screen."""
+    canvas = _canvas()
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=150, layout="constrained")
+    canvas(figure)
+    return figure
+
+
+def _without_frame(axes: Any) -> Any:
+    axes.set_aspect("equal")
+    axes.axis("off")
+    return axes
+
+
+def new_figure(size: tuple[float, float]) -> tuple[Any, Any]:
+    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
+    figure = _empty(size)
+    return figure, _without_frame(figure.add_subplot())
+
+
+def new_figure_with_curves(size: tuple[float, float]) -> tuple[Any, Any, Any]:
+    """Return a figure with axes as those of `new_figure`, and beneath them axes for curves."""
+    figure = _empty(size)
+    upper, lower = figure.subplots(2, 1, height_ratios=[3, 1])
+    lower.spines[["top", "right"]].set_visible(False)
+    lower.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True)
+    return figure, _without_frame(upper), lower
+
+
+def check_picture_target(path: str | Path) -> str:
+    """Return the format of a picture; InputError for one that cannot be written."""
+    kind = Path(path).suffix[1:].lower() or "png"
+    known = _canvas().get_supported_filetypes()
+    if kind not in known:
+        raise InputError(
+            f"{path}: pictures cannot be written as .{kind}; known are {' '.join(sorted(known))}"
+        )
+    return kind
+
+
+def save_figure(path: str | Path, figure: Any) -> None:
+    """Write a figure, as a whole or not at all."""
+    kind = check_picture_target(path)
+    write_whole(path, lambda file: figure.savefig(file, format=kind, bbox_inches="tight", pad_inches=0.1))
+
+
+def colours_of(value: Floats) -> tuple[Any, Floats]:
+    """Return the scale of the colour bar and the colour of each value."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    low, high = (float(value.min()), float(value.max())) if len(value) else (0.0, 1.0)
+    if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant is shown in the middle of the scale
+        half = 0.5 * max(abs(low), abs(high)) or 1.0
+        low, high = low - half, high + half
+    shown = ScalarMappable(Normalize(low, high), colormaps["viridis"])
+    return shown, np.asarray(shown.to_rgba(value))
+
+
+def colour_bar(figure: Any, axes: Any, colours: Any, unit: str) -> None:
+    """Draw the colour bar with one prefix for all its numbers."""
+    from matplotlib.ticker import EngFormatter, FuncFormatter
+
+    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colours.get_clim()))) / 3), -24, 24))
+    shown = FuncFormatter(lambda value, _: f"{value / 10.0**power:g}")
+    bar = figure.colorbar(colours, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
+    prefix = EngFormatter.ENG_PREFIXES[power]
+    bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
+    bar.outline.set_visible(False)
+
+
+def polygons(axes: Any, corners: Floats, colours: Floats, widths: Floats) -> None:
+    """Draw flat polygons (m, k, 2) in their order, each edged in its own colour (m, 4)."""
+    from matplotlib.collections import PolyCollection
+
+    flat: Any = corners
+    axes.add_collection(
+        PolyCollection(flat, facecolors=colours, edgecolors=colours, linewidths=widths, zorder=2)
+    )
+
+
+def lines(axes: Any, ends: Floats, colour: str = "0.55", width: float = 0.8) -> None:
+    """Draw thin lines (m, 2, 2) behind everything else."""
+    from matplotlib.collections import LineCollection
+
+    pieces: Any = ends
+    axes.add_collection(LineCollection(pieces, colors=colour, linewidths=width, zorder=1))
