@@ -159,7 +159,8 @@ class TotalLagrangian(Form):
 class Corotational(Form):
     """Small strains seen from one rotation R of the body, that of its mean deformation gradient.
 
-    f = R K0 R^T d with d = (Z + q) - R Z, Z = X - X̄; K0 is constant, and so are the factors of M + c K0.
+    f = R K0 R^T d with d = (Z + q) - R Z, Z = X less a point amid the body; K0 is constant, and so are the
+    factors of M + c K0.
     """
 
     name = "BC"
@@ -169,7 +170,7 @@ class Corotational(Form):
         super().__init__(points, batches, mass)
         gradients, volume = finite_strain.nodal_gradients(points, batches)
         self._gradients = np.ascontiguousarray(gradients.T / volume)
-        self._Z = points - mass.nodal @ points / mass.nodal.sum()
+        self._Z = points - points.mean(axis=0)
         self._solver: tuple[float, Solve] | None = None
         self._turned = np.full(points.size, np.nan), np.eye(3)
 
@@ -244,6 +245,7 @@ class Modal(Corotational):
         super().__init__(points, batches, mass)
         if count < 6:
             raise InputError(f"modes must be at least 6, for the rigid motions are modes too; got {count}")
+        self._Z = points - mass.nodal @ points / mass.nodal.sum()  # momenta are about the mass centre
         self.omega, self.shapes = modes(self.K0.scipy().tocsr(), mass.matrix(), count)
         self._squares = np.where(np.arange(count) < 6, 0.0, self.omega**2)
         self._dual = np.ascontiguousarray(np.stack([mass.times(shape) for shape in self.shapes.T]))

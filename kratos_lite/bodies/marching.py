@@ -170,7 +170,7 @@ def _step(body: Body, h: float, parts: int) -> None:
         body.time = start + part * h
         before = body.u
         load = take_step(body, h)
-        body.external_work = body.external_work + h / 2 * ((before + body.u) * load).sum(axis=-1)
+        body.external_work += h / 2 * ((before + body.u) * load).sum(axis=-1)
         if isinstance(body, FiniteElementBody):
             body.q, body.u = body.form.project(body.q, body.u)
     body.time = start

@@ -25,25 +25,35 @@ Array = NDArray[np.float64]
 class Mass:
     """The mass matrix of elements: consistent, or lumped at the nodes.
 
+    It is built when it is first asked for: a body at rest needs none.
+
     Attributes
     ----------
-    scalar : (n, n) sparse in kg; a diagonal for lumped mass.
-    nodal : (n,) kg, its row sums.
+    lumped : whether the mass stands in the nodes.
     pattern : the sparsity of matrices on the nodes.
     """
 
     def __init__(self, points: Array, batches: Sequence[Batch], pattern: Pattern, lumped: bool) -> None:
+        self._points, self._batches = points, batches
+        self.lumped, self.pattern = lumped, pattern
+
+    @cached_property
+    def scalar(self) -> csr_array[Any, Any]:
+        """Mass for each pair of nodes, (n, n) sparse in kg; a diagonal for lumped mass."""
         from scipy.sparse import diags_array
 
-        self.lumped, self.pattern = lumped, pattern
-        self.scalar: csr_array[Any, Any]
-        self.nodal: Array
-        if lumped:
-            self.nodal = fields.lumped_mass(points, batches)
-            self.scalar = diags_array(self.nodal, format="csr")
-            return
-        self.scalar = assemble_scalar(points, batches, pattern, lambda e, m: e.scalar_mass(m.density))
-        self.nodal = self.scalar @ np.ones(len(points))
+        if self.lumped:
+            return diags_array(self.nodal, format="csr")
+        return assemble_scalar(
+            self._points, self._batches, self.pattern, lambda element, m: element.scalar_mass(m.density)
+        )
+
+    @cached_property
+    def nodal(self) -> Array:
+        """Row sums (n,) in kg."""
+        if self.lumped:
+            return fields.lumped_mass(self._points, self._batches)
+        return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:
         """Return M v of nodal vectors (3n,)."""

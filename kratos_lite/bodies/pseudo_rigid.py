@@ -116,14 +116,12 @@ class PseudoRigidBody(Deformable):
             raise InputError(
                 f"a deformation gradient needs det F > 0; got {lowest:g}: it turns the body over"
             )
-        self.q = q.copy()
+        self.q[...] = q
 
     def turn(self, rotation: ArrayLike) -> None:
         """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
         R = check_rotation(rotation)
-        q = self.q.copy()
-        q[..., :9] = R.reshape(*R.shape[:-2], 9)
-        self.q = q
+        self.q[..., :9] = R.reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""

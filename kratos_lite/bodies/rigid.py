@@ -113,14 +113,12 @@ class RigidBody(Body):
         if q.shape != self.q.shape:
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
         check_rotation(rotation(q), "the rotation of a configuration")
-        self.q = q.copy()
+        self.q[...] = q
 
     def turn(self, rotation: ArrayLike) -> None:
         """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
         R = check_rotation(rotation)
-        q = self.q.copy()
-        q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
-        self.q = q
+        self.q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""

@@ -60,8 +60,9 @@ class State:
                 f"this is the state of a {self.kind} body with q {self.q.shape}; "
                 f"it does not fit a {body.kind} one with q {body.q.shape}"
             )
-        body.q, body.u = self.q.copy(), self.u.copy()
-        body.time, body.step, body.external_work = self.time, self.step, self.external_work.copy()
+        body.q[...], body.u[...] = self.q, self.u  # bodies that advance together share these arrays
+        body.time, body.step = self.time, self.step
+        body.external_work[...] = self.external_work
 
     def save(self, path: str | Path) -> None:
         """Write the state to an .npz file, as a whole or not at all."""
