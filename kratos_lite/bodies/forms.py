@@ -26,9 +26,18 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.modes import modes
 from kratos_lite.registry import Registry
 from kratos_lite.rotations import polar
+from kratos_lite.solvers import Equations
 from kratos_lite.solvers.banded import Factoriser
+from kratos_lite.supports import Reduction
 
 Array = NDArray[np.float64]
+
+FACTORISED_MAX = 4000
+"""Up to this many displacements a matrix for each step is factorised."""
+FACTORISED_ONCE_MAX = 30_000
+"""Up to this many a matrix for all steps is."""
+RESIDUAL = 1e-13
+"""Relative residual at which an iteration stops: momentum is as exact."""
 
 FORMS: Registry[type[Form]] = Registry("form of a finite-element body")
 """Every form by its class name and by its `name`."""
@@ -73,12 +82,31 @@ class Form(ABC):
         """Stiffness matrix (3n, 3n) of small strains in N/m."""
         return assemble_stiffness(self.points, self.batches, self.pattern)
 
-    def _factorised(self, K: BlockMatrix, c: float, symmetric: bool = True) -> Solve:
-        """Return what solves (M + c K) x = b."""
+    @property
+    def is_large(self) -> bool:
+        """Whether it takes less time to iterate with multigrid than to factorise a matrix for each step."""
+        return self.points.size > FACTORISED_MAX
+
+    def _factorised(self, K: BlockMatrix, c: float, symmetric: bool = True, iterate: bool = False) -> Solve:
+        """Return what solves (M + c K) x = b, made ready by a factorisation or by multigrid."""
         A = BlockMatrix(c * K.data, K.indices, K.indptr)
         self.mass.add_to(A)
+        if iterate:
+            return self._iterated(A)
         factoriser = self._factoriser if symmetric else self._factoriser_unsymmetric
         return factoriser.factorise(A).solve
+
+    def _iterated(self, A: BlockMatrix) -> Solve:
+        """Return what solves A x = b by conjugate gradients with multigrid."""
+        every = Reduction(np.arange(self.points.size), np.zeros(self.points.size))
+        equations = Equations(A, every, self.points, "amg", "a matrix for each step")
+
+        def solve(b: Array) -> Array:
+            columns = b.reshape(len(b), -1).T
+            x = [equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
+            return np.stack(x, axis=1).reshape(b.shape)
+
+        return solve
 
     @abstractmethod
     def load(self, q: Array) -> Array:
@@ -137,7 +165,7 @@ class TotalLagrangian(Form):
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
-        return self._factorised(self.stiffness(q), c)
+        return self._factorised(self.stiffness(q), c, iterate=self.is_large)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `FiniteElementBody`."""
@@ -146,6 +174,8 @@ class TotalLagrangian(Form):
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
+        if self.is_large:  # its symmetric part will do: that of the tangent at the middle
+            return self.solver(q + dq / 2, c / 2 * (1 + 2 * damping))
         q, dq = q.reshape(-1, 3), dq.reshape(-1, 3)
         D = finite_strain.stiffness(self.points, self.batches, self.pattern, q, dq, damping)
         return self._factorised(D, c, symmetric=False)
@@ -228,7 +258,7 @@ class Corotational(Form):
         return rotated
 
     def _inverse(self, c: float) -> Solve:
-        return self._factorised(self.K0, c)
+        return self._factorised(self.K0, c, iterate=self.points.size > FACTORISED_ONCE_MAX)
 
 
 class Modal(Corotational):

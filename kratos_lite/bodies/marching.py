@@ -53,7 +53,8 @@ def march(
     dt : step in s, > 0.
     steps : number of steps.
     every : a state is yielded after so many steps, and after the last.
-    substeps : steps into which each is divided, or ``"auto"``: as many as ``DEF_EXP`` needs to be stable.
+    substeps : steps into which each is divided, or ``"auto"``: as many as ``DEF_EXP`` needs to be stable;
+        each state tells how many.
     until : function of a state; the march ends when it is true.
     progress : called with ``"march"`` and the share done, 0 … 1, whenever a state is yielded.
 
@@ -102,7 +103,7 @@ def _states(
         done += chunk
         if progress:
             progress("march", done / count)
-        state = State.of(body)
+        state = State.of(body, parts)
         yield state
         if until and until(state):
             return

@@ -30,6 +30,7 @@ class State:
     time : s.
     step : number of steps taken.
     external_work : J.
+    substeps : parts into which steps were divided to come here.
 
     Examples
     --------
@@ -46,12 +47,13 @@ class State:
     time: float
     step: int
     external_work: Array
+    substeps: int = 1
 
     @classmethod
-    def of(cls, body: Body) -> State:
+    def of(cls, body: Body, substeps: int = 1) -> State:
         """Return the state of a body."""
         work = np.array(body.external_work)
-        return cls(body.kind, body.q.copy(), body.u.copy(), body.time, body.step, work)
+        return cls(body.kind, body.q.copy(), body.u.copy(), body.time, body.step, work, substeps)
 
     def put_into(self, body: Body) -> None:
         """Let a body go on from this state; InputError if it is of another kind or size."""

@@ -1,0 +1,76 @@
+"""How finite-element bodies solve: large ones iterate, what is not needed is not made."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.bodies import forms
+
+RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
+
+
+def spinning(form, scheme, damping=0.0):
+    body = kl.FiniteElementBody(
+        kl.box((0.4, 0.6, 1.0), (2, 3, 4)), RUBBER, form=form, scheme=scheme, damping=damping
+    )
+    body.set_velocity((1.0, 2.0, 3.0), (2.0, 10.0, 1.0))
+    return body
+
+
+@pytest.mark.parametrize(
+    ("form", "scheme", "damping"),
+    [
+        ("TL", "DEF_LIM", 1e-3),
+        ("TL", "ENERGY_MOMENTUM", 0.0),
+        ("TL", "ENERGY_MOMENTUM", 1e-3),
+        ("BC", "DEF_LIM", 0.0),
+    ],
+)
+def test_large_bodies_iterate_and_move_alike(form, scheme, damping, monkeypatch):
+    factorised = spinning(form, scheme, damping)
+    list(kl.march(factorised, 5e-3, 10))
+    monkeypatch.setattr(forms, "FACTORISED_MAX", 10)
+    monkeypatch.setattr(forms, "FACTORISED_ONCE_MAX", 10)
+    made = []
+    iterated = forms.Form._iterated
+    monkeypatch.setattr(forms.Form, "_iterated", lambda self, A: made.append(A) or iterated(self, A))
+    large = spinning(form, scheme, damping)
+    list(kl.march(large, 5e-3, 10))
+    assert made
+    np.testing.assert_allclose(large.q, factorised.q, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(large.u, factorised.u, rtol=0, atol=1e-9)
+
+
+def test_constant_matrices_are_factorised_once(monkeypatch):
+    made = []
+    factorise = forms.Factoriser.factorise
+    monkeypatch.setattr(forms.Factoriser, "factorise", lambda self, A: made.append(A) or factorise(self, A))
+    for form, count in (("BC", 1), ("TL", 7)):
+        made.clear()
+        list(kl.march(spinning(form, "DEF_LIM"), 1e-3, 7))
+        assert len(made) == count
+
+
+def test_a_body_at_rest_builds_no_mass_matrix():
+    mesh = kl.box(cells=(2, 1, 1))
+    body = kl.FiniteElementBody(mesh, RUBBER)
+    body.constrain(kl.FixPoint(mesh.points[mesh.nodes("x-")]))
+    body.add(kl.Traction("x+", (1e3, 0, 0)))
+    kl.equilibrium(body)
+    assert not {"scalar", "nodal"} & set(vars(body._mass))
+    body.kinetic_energy()
+    assert "scalar" in vars(body._mass)
+
+
+@pytest.mark.parametrize("kind", [kl.RigidBody, kl.PseudoRigidBody])
+def test_nothing_is_integrated_over_the_volume_after_setup(kind, monkeypatch):
+    body = kind(kl.box(), RUBBER)
+    body.set_velocity(angular=(0, 1, 0))
+    body.add(kl.Gravity((0, 0, -9.81)))
+
+    def refuse(*_):
+        raise AssertionError("the volume is integrated again")
+
+    monkeypatch.setattr(kl.KinematicLinear, "_jacobian", refuse)
+    monkeypatch.setattr(kl.Characteristics, "of", refuse)
+    assert len(list(kl.march(body, 1e-3, 5))) == 5
