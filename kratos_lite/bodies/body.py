@@ -63,6 +63,7 @@ class Body(ABC):
 
     kind: ClassVar[str]
     schemes: ClassVar[tuple[str, ...]] = ()
+    rows_are_constant: ClassVar[bool] = False
     dofs: int
     tolerance: float
 
@@ -102,7 +103,7 @@ class Body(ABC):
         """Return where material points X (m, 3) or (3,) are, as (..., m, 3) or (..., 3) in m."""
 
     @abstractmethod
-    def velocity(self, X: ArrayLike) -> Array:
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return the velocity of material points X, shaped as by `position`, in m/s."""
 
     @abstractmethod
@@ -136,7 +137,10 @@ class Body(ABC):
 
     @abstractmethod
     def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return dofs (k,) and H (3, k) with velocity(X) = H u[dofs], for one point X (3,) of one body."""
+        """Return dofs (k,) and H (3, k) with velocity(X) = H u[dofs], for one point X (3,) of one body.
+
+        Where `rows_are_constant` they do not depend on q.
+        """
 
     @abstractmethod
     def push(self, X: Array, force: Array, q: Array) -> Array:

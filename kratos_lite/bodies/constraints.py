@@ -28,15 +28,18 @@ class Constraint(ABC):
     ----------
     points : (m, 3) m, in the undeformed body.
     positional : whether it is about positions, so that it also holds a body at rest.
+    turning : whether its directions change as the body moves.
     reactions : (m, 3) N, mean force on the points over the last step.
     """
 
     positional = True
+    turning = False
 
     def __init__(self, points: ArrayLike) -> None:
         self.points = np.atleast_2d(points_of(points))
         self.reactions = np.zeros_like(self.points)
         self._body: Body | None = None
+        self._rows: Array | None = None
 
     def bind(self, body: Body) -> None:
         """Take hold of a body where it is now.
@@ -83,10 +86,14 @@ class Constraint(ABC):
         return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
 
     def rows(self, body: Body, q: Array) -> Array:
-        """Return H (m r, dofs) as a full matrix."""
+        """Return H (m r, dofs) as a full matrix; it is kept where it is always the same."""
+        if self._rows is not None:
+            return self._rows
         row, dof, value = self.entries(body, q)
         H = np.zeros((self.count, body.dofs))
         H[row, dof] = value
+        if body.rows_are_constant and not self.turning:
+            self._rows = H
         return H
 
     @property
@@ -96,11 +103,8 @@ class Constraint(ABC):
 
     def gaps(self, body: Body, q: Array, u: Array, time: float, h: float) -> Array:
         """Return the gaps (m r,) at the end of a step in m/s."""
-        v = np.empty_like(self.points)
-        for i, X in enumerate(self.points):
-            dofs, matrix = body.rows(X, q)
-            v[i] = matrix @ u[dofs]
-        return self.gap(body.position(self.points, q), v, time, h).ravel()
+        x, v = body.position(self.points, q), body.velocity(self.points, q, u)
+        return self.gap(x, v, time, h).ravel()
 
     def react(self, body: Body, q: Array, multipliers: Array) -> None:
         """Note the reactions of multipliers (m r,)."""
@@ -243,6 +247,8 @@ class RigidLink(Constraint):
 
     The length is the distance at the time when the constraint is made.
     """
+
+    turning = True
 
     def __init__(self, point: ArrayLike, anchor: ArrayLike) -> None:
         super().__init__(one_point(point))

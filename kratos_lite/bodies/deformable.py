@@ -23,6 +23,7 @@ class Deformable(Body):
     body that spins.  ``ENERGY_MOMENTUM``: implicit; energy and both momenta exact whatever the step.
     """
 
+    rows_are_constant = True
     schemes: ClassVar[tuple[str, ...]] = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
 
     def default_scheme(self) -> str:

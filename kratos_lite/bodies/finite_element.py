@@ -19,11 +19,13 @@ from kratos_lite.bodies.forms import FORMS, Form, Modal
 from kratos_lite.bodies.mass import Mass
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Located, Mesh
 from kratos_lite.modes import modes
 from kratos_lite.rotations import check_rotation
 
 Array = NDArray[np.float64]
+LOCATED_MAX = 64
+"""Sets of points whose places in the mesh a body keeps."""
 
 
 class FiniteElementBody(Deformable):
@@ -85,6 +87,7 @@ class FiniteElementBody(Deformable):
         self._mass = Mass(mesh.points, self.batches, pattern, lumped)
         self.form = self._form(form, modes)
         self.schemes = self.form.schemes  # type: ignore[misc]
+        self._located: dict[bytes, Located] = {}
         self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
         super().__init__(
             mesh, material, characteristics, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
@@ -120,16 +123,15 @@ class FiniteElementBody(Deformable):
         q = (self.q if q is None else q).reshape(-1, 3)
         return self.points + q if X is self.points else points_of(X) + self._interpolated(X, q)
 
-    def velocity(self, X: ArrayLike) -> Array:
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return v = Σ N_a u_a of points X (m, 3) or (3,) in m/s."""
-        return self._interpolated(X, self.u.reshape(-1, 3))
+        return self._interpolated(X, (self.u if u is None else u).reshape(-1, 3))
 
     def _interpolated(self, X: ArrayLike, nodal: Array) -> Array:
         if X is self.points:
             return nodal.copy()
         points = points_of(X)
-        located = self.mesh.locate(np.atleast_2d(points)).require()
-        return np.asarray(located.interpolate(nodal).reshape(points.shape))
+        return np.asarray(self._locate(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
 
     def place(self, q: ArrayLike) -> None:
         """Set the displacements (3n,) or (n, 3); see `Body.place`."""
@@ -159,9 +161,18 @@ class FiniteElementBody(Deformable):
     def find(self, X: Array) -> None:
         """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
         points = np.atleast_2d(X)
-        located = self.mesh.locate(points).require()
+        located = self._locate(points)
         for i, point in enumerate(points):
             self._known[point.tobytes()] = located.nodes_and_weights(i)
+
+    def _locate(self, points: Array) -> Located:
+        """Return where points (m, 3) lie in the mesh; the last sets asked for are kept."""
+        key = points.tobytes()
+        if key not in self._located:
+            if len(self._located) >= LOCATED_MAX:
+                self._located.pop(next(iter(self._located)))
+            self._located[key] = self.mesh.locate(points).require()
+        return self._located[key]
 
     def _at(self, X: Array) -> tuple[NDArray[np.int64], Array]:
         """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
@@ -189,7 +200,7 @@ class FiniteElementBody(Deformable):
 
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `Body.convected`."""
-        located = self.mesh.locate(X[None]).require()
+        located = self._locate(X[None])
         block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
         assert block.shape is not None
         dN = block.shape.dN(located.xi[0])

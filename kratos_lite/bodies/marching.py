@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from math import ceil
 
 import numpy as np
@@ -20,6 +21,7 @@ from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.bodies.schemes import take_step
 from kratos_lite.bodies.state import State
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.solvers.blas import one_thread
 
 Array = NDArray[np.float64]
 
@@ -150,11 +152,12 @@ def _check_stable(h: float, critical: float) -> None:
 def _advance(body: Body, h: float, count: int, parts: int) -> None:
     """Take `count` steps of h s, each in so many parts."""
     compiled = _advance_compiled(body, h / parts, count * parts)
-    for _ in range(count):
-        if not compiled:
-            _step(body, h / parts, parts)
-        body.time += h  # one after the other, so that a restart comes to the same times
-        body.step += 1
+    with one_thread() if isinstance(body, FiniteElementBody) else nullcontext():
+        for _ in range(count):
+            if not compiled:
+                _step(body, h / parts, parts)
+            body.time += h  # one after the other, so that a restart comes to the same times
+            body.step += 1
     if body.scheme == "DEF_EXP" and isinstance(body, Deformable):
         _check_still_stable(body, h / parts, count)
     if not compiled and not np.isfinite(body.u).all():

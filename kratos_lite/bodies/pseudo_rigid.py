@@ -14,7 +14,7 @@ from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.linear_algebra import apply, solve, transposed
+from kratos_lite.bodies.linear_algebra import apply, transposed
 from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError
@@ -96,9 +96,9 @@ class PseudoRigidBody(Deformable):
         """Return x = F (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
         return self._moved(X, self.q if q is None else q)
 
-    def velocity(self, X: ArrayLike) -> Array:
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
-        return self._moved(X, self.u)
+        return self._moved(X, self.u if u is None else u)
 
     def _moved(self, X: ArrayLike, q: Array) -> Array:
         points = points_of(X)
@@ -185,9 +185,9 @@ class PseudoRigidBody(Deformable):
         return by_rows(self.characteristics.euler)
 
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c K(q)) x = b."""
-        A, m = self.mass_matrix() + c * self.stiffness(q), self.mass[..., None]
-        return lambda b: np.concatenate([solve(A, b[..., :9]), b[..., 9:] / m], axis=-1)
+        """Return what solves (M + c K(q)) x = b of one body, for columns b (12, k)."""
+        A = self.mass_matrix() + c * self.stiffness(q)
+        return lambda b: np.concatenate([np.linalg.solve(A, b[:9]), b[9:] / self.mass])
 
     def coast(self, h: float, count: int) -> None:
         """Take steps of h s under constant loads alone, all at once."""

@@ -95,11 +95,12 @@ class RigidBody(Body):
         x = A @ np.swapaxes(rotation(q), -1, -2) + q[..., None, 9:]
         return np.asarray(x if many else x[..., 0, :])
 
-    def velocity(self, X: ArrayLike) -> Array:
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return v = Λ (W × (X - X̄)) + v̄, shaped as by `position`, in m/s."""
+        q, u = self.q if q is None else q, self.u if u is None else u
         A, many = self._arms(X)
-        spin = np.cross(self.u[..., None, :3], A)
-        v = spin @ np.swapaxes(self.rotation, -1, -2) + self.u[..., None, 3:]
+        spin = np.cross(u[..., None, :3], A)
+        v = spin @ np.swapaxes(rotation(q), -1, -2) + u[..., None, 3:]
         return np.asarray(v if many else v[..., 0, :])
 
     def _arms(self, X: ArrayLike) -> tuple[Array, bool]:
@@ -165,6 +166,10 @@ class RigidBody(Body):
     def step_constants(self) -> tuple[Array, Array, Array]:
         """Return inertia, its inverse and mass, as `steps` take them."""
         return self.characteristics.inertia, self._inverse, self.characteristics.mass
+
+    def apart(self, b: Array) -> Array:
+        """Return M^-1 b of columns (6, k): torques and forces answer apart."""
+        return np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
 
     @cached_property
     def _inverse(self) -> Array:

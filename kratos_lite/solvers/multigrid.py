@@ -10,14 +10,14 @@ Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.blockmatrix import BlockMatrix, LinearLevel
 from kratos_lite.native import kernels
+from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.common import Progress
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
 from kratos_lite.supports import rigid_modes
@@ -125,6 +125,8 @@ class Pyamg:
     """
 
     def __init__(self, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
+        import pyamg  # noqa: F401 (libraries that are loaded later would not heed the limit)
+
         self._A = uncoupled(A, free)
         with one_thread():
             hierarchy = (
@@ -189,20 +191,6 @@ def above_linear(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel)
     hierarchy = MultilevelSolver([top, *below.levels], coarse_solver="splu")
     change_smoothers(hierarchy, FORWARD, BACKWARD)
     return hierarchy
-
-
-def one_thread() -> AbstractContextManager[Any]:
-    """Keep dense algebra, on arrays too small for more, to one thread while pyamg works.
-
-    Idle threads that wait actively for the next small product took three quarters of the time.
-    """
-    import pyamg  # noqa: F401 (libraries that are loaded later would not heed the limit)
-
-    try:
-        from threadpoolctl import threadpool_limits
-    except ImportError:
-        return nullcontext()
-    return cast("AbstractContextManager[Any]", threadpool_limits(1))
 
 
 def uncoupled(A: BlockMatrix, free: Mask) -> BlockMatrix:

@@ -1,0 +1,92 @@
+"""Closing: the reactions with which a step ends where the constraints want it.
+
+What a step makes of an additional force is known only by taking it; how the ends of the constraints answer
+to their reactions, W = h H A^-1 H^T, is known well enough to correct the reactions until the gaps close.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.errors import SolveError
+
+Array = NDArray[np.float64]
+Solve: TypeAlias = Callable[[Array], Array]
+
+CORRECTIONS_MAX = 50
+ROUND_OFF = 1e-15
+"""Share of the velocities, and of the positions over h/2, that a gap cannot get below."""
+CLOSED = 1e-9
+"""Share of the velocities that a gap may be where corrections no longer help."""
+
+
+class Step(NamedTuple):
+    """The end of a step: configuration, velocity, and the generalised load at its middle."""
+
+    q: Array
+    u: Array
+    load: Array
+
+
+Advance: TypeAlias = Callable[[Array], Step]
+"""Gives the end of a step under an additional generalised force."""
+
+
+def close(body: Body, h: float, qh: Array, advance: Advance, solver: Callable[[], Solve]) -> Array:
+    """Take a step of h s that meets the constraints; return the load with reactions (..., dofs).
+
+    Parameters
+    ----------
+    qh : configuration at the middle, where the directions of the reactions are taken.
+    advance : takes the step.
+    solver : gives what solves A x = b, one right side or columns of them, for the matrix A of the kick.
+
+    Raises
+    ------
+    SolveError
+        If the constraints cannot be met.
+    """
+    if not body.constraints:
+        step = advance(np.zeros_like(body.u))
+        body.q, body.u = step.q, step.u
+        return step.load
+    for constraint in body.constraints:
+        constraint.begin(body, h)
+    H = rows(body, qh)
+    inverse = np.asarray(np.linalg.pinv(h * H @ solver()(H.T), rcond=1e-12, hermitian=True), dtype=float)
+    step, multipliers = _corrected(body, h, H, inverse, advance)
+    at = 0
+    for constraint in body.constraints:
+        constraint.react(body, qh, multipliers[at : at + constraint.count])
+        at += constraint.count
+    body.q, body.u = step.q, step.u
+    return step.load + H.T @ multipliers
+
+
+def rows(body: Body, q: Array) -> Array:
+    """Return H (c, dofs) of all constraints of a body."""
+    return np.concatenate([constraint.rows(body, q) for constraint in body.constraints])
+
+
+def _corrected(body: Body, h: float, H: Array, inverse: Array, advance: Advance) -> tuple[Step, Array]:
+    """Return the step and the multipliers with which the gaps close."""
+    multipliers, last, end = np.zeros(len(H)), np.inf, body.time + h
+    extent = max(float(np.abs(body.position(c.points)).max()) for c in body.constraints)
+    for _ in range(CORRECTIONS_MAX):
+        step = advance(H.T @ multipliers)
+        gap = np.concatenate([c.gaps(body, step.q, step.u, end, h) for c in body.constraints])
+        size, scale = float(np.abs(gap).max()), float(np.abs(H @ step.u).max()) + extent * 2 / h
+        if size <= ROUND_OFF * scale or (size > 0.5 * last and size <= CLOSED * scale):
+            return step, multipliers
+        if not size <= 10 * last:  # nor if it is no number
+            break
+        multipliers, last = multipliers - inverse @ gap, size
+    raise SolveError(
+        f"the constraints cannot be met in the step at t = {body.time:g} s with dt = {h:g} s: "
+        "they contradict each other, or the step is too long"
+    )
