@@ -97,7 +97,7 @@ def energy_momentum_step(body: FiniteElementBody, h: float) -> Array:
 
 
 def _balanced(body: FiniteElementBody, h: float, extra: Array, solve: Solve) -> tuple[Array, Array]:
-    """Return the velocity at the end and the load at the middle, by Newton with factors kept while they do."""
+    """Return the velocity at the end and the load at the middle, by Newton with factors kept a while."""
     q, u, ratio = body.q, body.u, body.damping / h
     v, last = u.copy(), np.inf
     for _ in range(NEWTON_MAX):
