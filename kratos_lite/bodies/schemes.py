@@ -109,9 +109,12 @@ def _balanced(body: FiniteElementBody, h: float, extra: Array, solve: Solve) -> 
         if not np.isfinite(size):
             break
         v = v + step
-        if size <= body.tolerance * scale or (size <= 1e-9 * scale and size > SLOW * last):
+        if size <= body.tolerance * scale:
             return v, load
         if size > SLOW * last:
+            given = float(np.abs(solve(h * (load + extra))).max())  # at rest, loads tell what is small
+            if size <= 1e-9 * max(scale, given):
+                return v, load
             solve = body.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
         last = size
     raise SolveError(

@@ -13,7 +13,7 @@ from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.errors import ModelError, SolveError
+from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.supports import Reduction
 
 Array = NDArray[np.float64]
@@ -75,7 +75,8 @@ def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
         body.q = start.copy()
         try:
             iterations = sum(_increment(body, start, k / count, progress) for k in range(1, count + 1))
-        except (SolveError, np.linalg.LinAlgError) as error:
+            body.place(body.q)  # Newton may end at a shape that is turned inside out
+        except (SolveError, InputError, np.linalg.LinAlgError) as error:
             failed = error
             continue
         body.u = np.zeros_like(body.u)
@@ -200,5 +201,7 @@ def _balance(body: Deformable, share: float, multipliers: Array) -> None:
     load, inner = share * body.external_load(body.q), body.internal_load(body.q)
     left = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
-    if left > UNBALANCED * scale:
+    K = body.stiffness(body.q)
+    noise = 1e-14 * float(np.abs(K.data if isinstance(K, BlockMatrix) else K).max() * np.abs(body.q).max())
+    if left > UNBALANCED * scale + noise:
         raise SolveError(f"{left / scale:.1%} of the loads find no reaction, so the body would move")

@@ -193,10 +193,10 @@ def test_few_modes_leave_rigid_motion_exact(modes, brick, drift):
     end(body, 1e-3, 100)
     end(rigid, 1e-3, 100)
     np.testing.assert_allclose(body.linear_momentum(), p, rtol=1e-11)
-    assert drift(MOMENTUM, body.angular_momentum()) < 1e-4
-    assert float(body.energy()) == pytest.approx(start, rel=3e-4)
+    assert drift(MOMENTUM, body.angular_momentum()) < 1e-6
+    assert float(body.energy()) == pytest.approx(start, rel=1e-4)
     X = body.points
-    assert np.abs(body.position(X) - rigid.position(X)).max() < 1e-3
+    assert np.abs(body.position(X) - rigid.position(X)).max() < 1e-4
 
 
 # ---- all kinds of elements -------------------------------------------------------------------------
@@ -441,7 +441,7 @@ def test_the_confined_column_swings_with_that_frequency(scheme, lumped):
         constraint.bind(body)
     top = int(np.argmax(body.points.sum(axis=1)))
     h = 0.1
-    z = np.array([size] + [state.q[3 * top + 2] for state in kl.march(body, h, 40)])
+    z = np.array([size] + [state.q[3 * top + 2] for state in kl.march(body, h, 16)])
     inverse = np.arcsin if scheme == "DEF_EXP" else np.arctan
     seen = np.arccos((z[2:] + z[:-2]) @ z[1:-1] / (2 * z[1:-1] @ z[1:-1])) / h
     assert seen == pytest.approx(2 / h * inverse(omega * h / 2), rel=1e-6)
