@@ -20,9 +20,11 @@ Solve: TypeAlias = Callable[[Array], Array]
 
 CORRECTIONS_MAX = 50
 ROUND_OFF = 1e-15
-"""Share of the velocities, and of the positions over h/2, that a gap cannot get below."""
+"""Share of the velocities that a gap cannot get below."""
 CLOSED = 1e-9
 """Share of the velocities that a gap may be where corrections no longer help."""
+PLACED = 1e-13
+"""Share of the positions that it may be there."""
 
 
 class Step(NamedTuple):
@@ -80,8 +82,9 @@ def _corrected(body: Body, h: float, H: Array, inverse: Array, advance: Advance)
     for _ in range(CORRECTIONS_MAX):
         step = advance(H.T @ multipliers)
         gap = np.concatenate([c.gaps(body, step.q, step.u, end, h) for c in body.constraints])
-        size, scale = float(np.abs(gap).max()), float(np.abs(H @ step.u).max()) + extent * 2 / h
-        if size <= ROUND_OFF * scale or (size > 0.5 * last and size <= CLOSED * scale):
+        size, speed = float(np.abs(gap).max()), float(np.abs(H @ step.u).max())
+        allowed = CLOSED * speed + PLACED * extent * 2 / h
+        if size <= ROUND_OFF * speed or (size > 0.5 * last and size <= allowed):
             return step, multipliers
         if not size <= 10 * last:  # nor if it is no number
             break
