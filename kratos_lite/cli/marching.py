@@ -28,7 +28,7 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
     _apply(scene, options)
     body, start, clock = scene.body, _Totals(scene.body), perf_counter()
     kept = [State.of(body)]
-    last = kept[:]
+    last, largest = kept[:], start.kinetic + start.internal
     with ExitStack() as stack:
         # even after Ctrl-C: the series as far as they came, and the state from which to go on
         stack.callback(_save_state, last, scene.output.get("state"))
@@ -40,6 +40,7 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
         for one in series:
             one.add(kept[0])
         for last[0] in states:
+            largest = max(largest, float(np.sum(body.kinetic_energy() + body.internal_energy())))
             for one in series:
                 one.add(last[0])
             if "picture" in scene.output:
@@ -50,7 +51,7 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
             scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " ")
         )
     if not options.quiet:
-        print("\n".join([*body_lines(scene), *_summary(start, _Totals(body), seconds)]))
+        print("\n".join([*body_lines(scene), *_summary(start, _Totals(body), largest, seconds)]))
         for path in scene.output.values():
             print(line("written", path))
     return 0
@@ -120,11 +121,11 @@ class _Totals:
         )
 
 
-def _summary(start: _Totals, end: _Totals, seconds: float) -> list[str]:
+def _summary(start: _Totals, end: _Totals, largest: float, seconds: float) -> list[str]:
     """Return the lines of the table that say how the march went."""
     steps = end.step - start.step
     gained = end.kinetic - start.kinetic + end.internal - start.internal - (end.work - start.work)
-    scale = max(start.kinetic, end.kinetic, start.internal, end.internal, abs(end.work - start.work))
+    share = gained / largest if largest else 0.0
     rows: list[tuple[str, Any]] = [
         ("time", f"{start.time:.6g} … {end.time:.6g} s, {steps} steps"),
         ("kinetic energy", f"{end.kinetic:.7g} J"),
@@ -134,7 +135,7 @@ def _summary(start: _Totals, end: _Totals, seconds: float) -> list[str]:
         ("work of loads", f"{end.work - start.work:.7g} J"),
         (
             "energy drift",
-            f"{gained / scale if scale else 0.0:+.1e} of the largest energy, loads accounted for",
+            f"{share:+.1e} of the largest energy, with the work of loads",
         ),
         ("linear momentum", f"{vector(end.linear)} kg m/s"),
         ("angular momentum", f"{vector(end.angular)} kg m²/s about the mass centre"),
