@@ -42,7 +42,7 @@ def test_python_of_the_readme_runs(number, tmp_path):
         assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
 
 
-@pytest.mark.parametrize("page", ["users.md", "add-an-element.md", "formats.md", "exercises.md"])
+@pytest.mark.parametrize("page", ["users.md", "add-an-element.md", "formats.md", "exercises.md", "bodies.md"])
 def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
     assert blocks
@@ -54,6 +54,12 @@ def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
         assert len(shares) == 4
         assert shares[0] < shares[1] < 1  # linear elements are too stiff
         assert all(abs(share - 1) < 0.01 for share in shares[2:])
+        flips = float(re.search(r"time between flips: (\S+) s", out).group(1))
+        assert flips == pytest.approx(14.965995, abs=1e-3)  # half a period of W, by elliptic functions
+        orders = [float(order) for order in re.findall(r"order (\S+)", out)]
+        assert orders == pytest.approx([2.0, 2.0, 2.0], abs=0.05)
+        shares = [float(share) for share in re.findall(r"lumped (\S+) of the inertia", out)]
+        assert shares == pytest.approx([1 + 2 / n**2 for n in (1, 2, 4)], abs=1e-3)
 
 
 def test_elements_of_the_guide_conform(tmp_path):
@@ -79,3 +85,85 @@ def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
 def test_own_element_passes_its_conformance_kit():
     out = run(sys.executable, "-m", "kratos_lite", "check", EXAMPLES / "my_wedge.py")
     assert "0 failed" in out
+
+
+BODIES = EXAMPLES / "bodies"
+
+
+def number(pattern, text):
+    return float(re.search(pattern, text).group(1))
+
+
+@pytest.mark.parametrize("kind", ["rigid", "pseudo-rigid", "finite-element"])
+def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_path):
+    pytest.importorskip("matplotlib")
+    out = run(sys.executable, BODIES / "tumbling_box.py", kind, tmp_path / "box.png")
+    moved = [float(x) for x in re.search(r"moved by \[(.*?)\]", out).group(1).split()]
+    assert moved == pytest.approx([1.5, 1.5, 0.0], abs=1e-9)
+    momentum = [float(x) for x in re.search(r"angular momentum \[(.*?)\]", out).group(1).split()]
+    assert momentum == pytest.approx([1.36, 232.0, 0.52], abs=1e-9)
+    assert abs(number(r"energy drift (\S+)", out)) < (1e-6 if kind == "rigid" else 1e-13)
+    assert (tmp_path / "box.png").stat().st_size > 10_000
+
+
+def test_the_scene_of_the_box_is_its_script():
+    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "tumbling_box.json")
+    strain = number(r"internal energy +(\S+) J", run(*march))
+    script = run(sys.executable, BODIES / "tumbling_box.py")
+    assert strain == pytest.approx(number(r"strain energy (\S+) J", script), abs=1e-3)
+
+
+def test_the_top_nutates_as_elliptic_integrals_say():
+    out = run(sys.executable, BODIES / "heavy_top.py")
+    assert number(r"tilt from (\S+)", out) == pytest.approx(0.5, abs=1e-5)
+    assert number(r"to (\S+) rad", out) == pytest.approx(0.7576379147, abs=2e-5)
+    assert number(r"period (\S+) s", out) == pytest.approx(1.7588577458, abs=2e-3)
+    assert number(r"momentum (\S+),", out) == pytest.approx(number(r"at first (\S+) kg", out), abs=1e-9)
+
+
+def test_the_pendulum_is_back_after_its_period(tmp_path):
+    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "pendulum.json", "--csv", "p.csv")
+    out = run(*march, cwd=tmp_path)
+    rows = [list(map(float, row.split(","))) for row in (tmp_path / "p.csv").read_text().splitlines()[1:]]
+    assert rows[-1][6:9] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
+    assert all(abs(x * x + z * z - 1) < 1e-12 for *_, x, _, z in (row[:9] for row in rows))
+    assert abs(number(r"energy drift +(\S+)", out)) < 1e-12
+
+
+def test_both_forms_of_the_spinning_bar_stretch_alike():
+    out = run(sys.executable, BODIES / "rotating_bar.py")
+    # Solfec-1.0: 7.038e-4 m and 7.035e-4 m
+    assert number(r"TL: elongation (\S+) m", out) == pytest.approx(7.038e-4, abs=1e-7)
+    assert number(r"BC: elongation (\S+) m", out) == pytest.approx(7.035e-4, abs=1e-7)
+    for form in ("TL", "BC"):
+        assert number(rf"{form}: energy (\S+) J", out) == pytest.approx(3.315, abs=1e-3)
+
+
+def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone():
+    out = run(sys.executable, BODIES / "stiff_box.py")
+    assert number(r"DEF_LIM: energy drift (\S+),", out) > 1e6
+    assert number(r"ENERGY_MOMENTUM: energy drift (\S+),", out) < 1e-12
+    assert number(r"ENERGY_MOMENTUM: .* momentum drift (\S+)", out) < 1e-12
+
+
+def test_the_scene_of_the_guide_is_sound(tmp_path):
+    page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+    (scene,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "scene.json").write_text(scene)
+    run(sys.executable, "-m", "kratos_lite", "march", tmp_path / "scene.json", "-q")
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 12
+    assert len(list(tmp_path.glob("out_*.vtu"))) == 11
+
+
+def test_the_guide_names_every_type_and_key():
+    from kratos_lite.io.scenes.actions import CONSTRAINTS, LOADS
+    from kratos_lite.io.scenes.reader import KEYS, MESHES, OPTIONS
+    from kratos_lite.io.scenes.scene import OUTPUTS
+
+    page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+    table = page[page.index("| key | value |") :]
+    for name in (*KEYS, *OUTPUTS, *LOADS, *CONSTRAINTS):
+        assert f"`{name}`" in table, name
+    kinds = [*LOADS.values(), *CONSTRAINTS.values()]
+    for name in (*OPTIONS, *MESHES, *(key for kind in kinds for key in (*kind.needs, *kind.takes))):
+        assert re.search(rf"\b{name}\b", table), name

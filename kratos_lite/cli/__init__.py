@@ -1,4 +1,4 @@
-"""The command line: ``kratos-lite solve | info | check | convert | bench``."""
+"""The command line: ``kratos-lite solve | march | info | check | convert | bench``."""
 
 from __future__ import annotations
 
@@ -43,6 +43,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_solve(commands)
+    _add_march(commands)
     _add(
         commands,
         "info",
@@ -54,7 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
         "check",
         "report every problem of a file, or of the elements and materials in a Python file",
         "kratos-lite check beam.mdpa\n  kratos-lite check my_element.py",
-    ).add_argument("input", help="an input file, or a .py file that defines elements or materials")
+    ).add_argument("input", help="an input file or scene, or a .py file that defines elements or materials")
     convert = _add(
         commands,
         "convert",
@@ -74,6 +75,12 @@ SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve ProjectParameters.json --json result.json
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
+
+
+MARCH_EXAMPLES = """kratos-lite march examples/bodies/tumbling_box.json
+  kratos-lite march box.json --pvd box.pvd --csv box.csv --picture box.png
+  kratos-lite march box.json --steps 500 --state half.npz
+  kratos-lite march box.json --steps 500 --restart half.npz"""
 
 
 def _add(commands: object, name: str, text: str, example: str) -> argparse.ArgumentParser:
@@ -129,6 +136,31 @@ def _add_solve(commands: object) -> None:
     how = solve.add_argument_group("solver")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
+    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
+    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def _add_march(commands: object) -> None:
+    march = _add(commands, "march", "let a body move through time and print a summary", MARCH_EXAMPLES)
+    march.add_argument(
+        "input", metavar="SCENE", help="a .json scene, or a .py script with body, dt and steps"
+    )
+    out = march.add_argument_group("output (instead of the files that the scene names)")
+    for key, text in (
+        ("pvd", "states for ParaView: an index, and OUT_00000.vtu … beside it"),
+        ("csv", "a table of energies, momenta and the mass centre"),
+        ("npz", "configurations and velocities of all states as arrays"),
+        ("picture", "the body along its path, and its energies"),
+        ("state", "the last state, for --restart; written after Ctrl-C too"),
+    ):
+        ending = {"picture": "png", "state": "npz"}.get(key, key)
+        out.add_argument(f"--{key}", metavar=f"OUT.{ending}", help=text)
+    how = march.add_argument_group("march")
+    how.add_argument("--steps", type=int, metavar="N", help="number of steps, instead of that of the scene")
+    how.add_argument("--restart", metavar="STATE.npz", help="go on from a state that --state wrote")
+    how.add_argument(
+        "--progress", action="store_true", help="show the share done, also where not on a terminal"
+    )
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 

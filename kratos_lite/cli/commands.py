@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 class TerminalProgress:
     """Show the phase on a terminal once the work has taken more than two seconds."""
 
-    def __init__(self) -> None:
+    def __init__(self, always: bool = False) -> None:
         self.start = self.last = perf_counter()
-        self.shown = False
-        self.wanted = sys.stderr.isatty()
+        self.shown, self.patience = False, 0.0 if always else 2.0
+        self.wanted = always or sys.stderr.isatty()
 
     def __call__(self, phase: str, share: float) -> None:
         """Show a phase and the share of it that is done, at most five times a second."""
         now = perf_counter()
-        if self.wanted and now - self.start > 2 and now - self.last > 0.2:
+        if self.wanted and now - self.start > self.patience and now - self.last > 0.2:
             self.last, self.shown = now, True
             print(
                 f"\r{phase:<10} {share:5.0%}  {now - self.start:6.1f} s", end="", file=sys.stderr, flush=True
@@ -50,7 +50,7 @@ class TerminalProgress:
 
 def solve(options: Namespace) -> int:
     """Solve a file, print the summary, write what was asked for."""
-    _use_threads(options.threads)
+    use_threads(options.threads)
     clock = perf_counter()
     import numpy as np
 
@@ -64,7 +64,19 @@ def solve(options: Namespace) -> int:
         ) from None
 
 
-def _use_threads(count: int | None) -> None:
+def march(options: Namespace) -> int:
+    """March the body of a scene, print the summary, write what was asked for."""
+    use_threads(options.threads)
+    from kratos_lite.cli.marching import march_scene
+
+    progress = TerminalProgress(options.progress)
+    try:
+        return march_scene(options, progress)
+    finally:
+        progress.close()
+
+
+def use_threads(count: int | None) -> None:
     """Tell the kernels, which are loaded later, how many threads to use."""
     if count is not None:
         if count < 1:
@@ -75,6 +87,7 @@ def _use_threads(count: int | None) -> None:
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.io.files import load
 
+    _refuse_scene(options.input, "solve")
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     read = files_read(options.input)
@@ -145,12 +158,23 @@ def info(options: Namespace) -> int:
     from kratos_lite.io.describe import describe
     from kratos_lite.io.documents import ending
     from kratos_lite.io.files import read
+    from kratos_lite.io.scenes import describe_scene, is_scene, read_scene
 
-    if ending(options.input) == ".json":
+    if is_scene(options.input):
+        print(f"{'file':<22}{Path(options.input).name}\n{describe_scene(read_scene(options.input))}")
+    elif ending(options.input) == ".json":
         print(f"{'file':<12}{Path(options.input).name}\n{read(options.input)}")
     else:
         print(describe(_document(options)))
     return 0
+
+
+def _refuse_scene(path: str, command: str) -> None:
+    """Raise InputError for a scene of a body, which is marched."""
+    from kratos_lite.io.scenes import is_scene
+
+    if is_scene(path):
+        raise InputError(f"{path}: a scene of a body is not for {command}; use: kratos-lite march {path}")
 
 
 def _document(options: Namespace) -> Document:
@@ -172,6 +196,12 @@ def _document(options: Namespace) -> Document:
 def check(options: Namespace) -> int:
     """Report every problem of a file."""
     path = Path(options.input)
+    from kratos_lite.io.scenes import is_scene
+
+    if is_scene(path):
+        from kratos_lite.cli.marching import check_scene
+
+        return check_scene(path)
     if path.suffix == ".py":
         return _check_python(path)
     from kratos_lite.io.files import read
@@ -226,6 +256,7 @@ def convert(options: Namespace) -> int:
     """Convert a file."""
     from kratos_lite.io.files import write_document
 
+    _refuse_scene(options.input, "convert")
     check_targets(files_read(options.input), [options.output])
     document = _document(options)
     lost = write_document(options.output, document)

@@ -195,7 +195,13 @@ def check_ending(path: str | Path) -> None:
 
 
 def trajectory_picture(
-    path: str | Path, body: Body, states: Iterable[State], *, shown: int = SHOWN, title: str = ""
+    path: str | Path,
+    body: Body,
+    states: Iterable[State],
+    *,
+    shown: int = SHOWN,
+    title: str = "",
+    size: tuple[float, float] = (8, 8),
 ) -> None:
     """Draw a body along its path, and its energies against time beneath.
 
@@ -206,6 +212,7 @@ def trajectory_picture(
     states : in the order of time.
     shown : how many positions are drawn, evenly spread over the states; the later the stronger.
     title : above the picture.
+    size : largest width and height in inches, at 150 dots per inch.
 
     Raises
     ------
@@ -240,5 +247,13 @@ def trajectory_picture(
     names = ("kinetic", "internal", "potential", "sum")
     curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
     motion_picture(
-        path, body.mesh, positions, table[:, 6:9], table[:, 0], curves, title=title, unit="energy in J"
+        path,
+        body.mesh,
+        positions,
+        table[:, 6:9],
+        table[:, 0],
+        curves,
+        title=title,
+        unit="energy in J",
+        size=size,
     )

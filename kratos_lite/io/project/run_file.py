@@ -146,7 +146,7 @@ def _is_by_part(material: Settings) -> bool:
 
 def _assign(model: Model, section: Settings, collect: _Collector) -> None:
     if not _is_by_part(section):
-        material = collect(_material, section) if section.values else None
+        material = collect(read_material, section) if section.values else None
         if material is not None:
             model.assign(material)
         return
@@ -155,10 +155,11 @@ def _assign(model: Model, section: Settings, collect: _Collector) -> None:
 
 
 def _assign_part(model: Model, section: Settings, part: str) -> None:
-    _at(section, part, model.assign, _material(section.section(part)), part)
+    _at(section, part, model.assign, read_material(section.section(part)), part)
 
 
-def _material(section: Settings) -> LinearMaterial:
+def read_material(section: Settings) -> LinearMaterial:
+    """Return the material of an object; InputError with the place of a mistake."""
     law = section.text("law", "Isotropic3D")
     try:
         kind = MATERIALS[law]
