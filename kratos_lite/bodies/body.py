@@ -8,30 +8,27 @@ stands on the few methods that a kind defines.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite import checks
 from kratos_lite.arguments import finite
-from kratos_lite.batches import Batch
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.grouping import batches_of, element_class
-from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.registry import Registry
 
 if TYPE_CHECKING:
     from kratos_lite.bodies.constraints import Constraint
-    from kratos_lite.bodies.loads import BodyLoad, Bound, Factor
+    from kratos_lite.bodies.given import Material
+    from kratos_lite.bodies.loads import BodyLoad, Bound
+    from kratos_lite.bodies.series import Factor
     from kratos_lite.loads import Load
 
 Array = NDArray[np.float64]
-Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 Gauge: TypeAlias = Callable[[Array], Array]
 
 BODIES: Registry[type[Body]] = Registry("kind of body")
@@ -311,43 +308,3 @@ class Body(ABC):
     def __repr__(self) -> str:
         many = f"{len(self.q)} bodies, " if self.q.ndim > 1 else ""
         return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.scheme})"
-
-
-def elements_of(mesh: Mesh, material: Material) -> list[Batch]:
-    """Return the elements of a mesh with their material, after checks of its geometry.
-
-    Raises
-    ------
-    MeshError, ModelError, InputError
-        If the mesh is broken or inverted, or elements have no material.
-    """
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
-    kinds = [element_class(mesh, block) for block in mesh.blocks]
-    checks.check_blocks(mesh, kinds)
-    checks.check_points(mesh)
-    checks.check_repeated_nodes(mesh)
-    checks.check_jacobians(mesh, kinds)
-    given = material if isinstance(material, Mapping) else {None: material}
-    material_of = np.full(mesh.n_elements, -1)
-    for number, (where, one) in enumerate(given.items()):
-        if not isinstance(one, LinearMaterial):
-            raise InputError(f"a material such as Isotropic3D is needed; got {type(one).__name__}")
-        material_of[mesh.elements(where)] = number
-    return batches_of(mesh, list(given.values()), material_of)
-
-
-def points_of(X: ArrayLike) -> Array:
-    """Return material points as floats (3,) or (m, 3)."""
-    points = finite(X, "material points")
-    if points.ndim not in (1, 2) or points.shape[-1] != 3:
-        raise InputError(f"material points must have shape (3,) or (m, 3); got {points.shape}")
-    return points
-
-
-def vector_of(value: ArrayLike, what: str) -> Array:
-    """Return a vector (..., 3) as floats."""
-    vector = finite(value, what)
-    if vector.shape[-1:] != (3,):
-        raise InputError(f"{what} must have three components; got shape {vector.shape}")
-    return vector

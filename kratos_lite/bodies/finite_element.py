@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Pattern
 from kratos_lite.blockmatrix import BlockMatrix
-from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.forms import FORMS, Form, Modal
+from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.mass import Mass
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError

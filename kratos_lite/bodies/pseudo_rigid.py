@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
-from kratos_lite.bodies.body import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.deformable import Deformable, Solve
+from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.linear_algebra import apply, transposed
 from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
 from kratos_lite.characteristics import Characteristics

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
-from kratos_lite.bodies.body import Body, Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
 from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.bodies import forms
+from kratos_lite.bodies.forms import base as forms
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 

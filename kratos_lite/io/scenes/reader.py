@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody, State
-from kratos_lite.bodies.body import Material
+from kratos_lite.bodies.given import Material
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.generate import annulus, box

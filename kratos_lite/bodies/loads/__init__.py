@@ -1,0 +1,22 @@
+"""Loads on bodies: forces and torques fixed in space or in the body, following pressure, springs, callbacks.
+
+A load is bound to a body when it is added; what is bound gives the generalised force at any configuration.
+Loads of models (gravity, tractions, dead pressure, …) act through their nodal forces, on every kind of body.
+"""
+
+from kratos_lite.bodies.loads.base import BodyLoad, Bound, bind, one_point
+from kratos_lite.bodies.loads.callback import Callback
+from kratos_lite.bodies.loads.forces import Force, Spring, Torque
+from kratos_lite.bodies.loads.pressure import FollowerPressure
+
+__all__ = [
+    "BodyLoad",
+    "Bound",
+    "Callback",
+    "FollowerPressure",
+    "Force",
+    "Spring",
+    "Torque",
+    "bind",
+    "one_point",
+]

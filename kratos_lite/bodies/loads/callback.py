@@ -1,0 +1,56 @@
+"""Loads that are functions of the user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.loads.base import BodyLoad, Bound
+from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class Callback(BodyLoad):
+    """A load of your own.
+
+    Parameters
+    ----------
+    function : takes configuration q, velocity u and time t in s, and returns the generalised force
+        (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> top = Callback(lambda q, u, t: np.r_[0, 0, 0, -20 * np.cross(q[6:9], [0, 0, 1]), 0, 0, 0])
+    """
+
+    def __init__(self, function: Callable[[Array, Array, float], ArrayLike]) -> None:
+        if not callable(function):
+            raise InputError(f"a callback is a function of q, u and t; got {function!r}")
+        self.function = function
+
+    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+        """Return the load on a body."""
+
+        def generalised(q: Array, u: Array, time: float) -> Array:
+            out = np.asarray(self.function(q, u, time), dtype=float)
+            if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
+                R = rotation(q)
+                T = (np.swapaxes(R, -1, -2) @ out[..., 3:6, None])[..., 0] + out[..., 6:]
+                return np.concatenate([T, out[..., :3]], axis=-1)
+            if out.shape != u.shape:
+                nine = " (or 9 numbers a body)" if isinstance(body, RigidBody) else ""
+                raise InputError(
+                    f"a callback must return a generalised force of shape {u.shape}{nine}; got {out.shape}"
+                )
+            if not np.isfinite(out).all():
+                raise InputError(f"a callback returned numbers that are not finite at t = {time:g} s")
+            return out
+
+        return Bound(generalised, factor, steady)

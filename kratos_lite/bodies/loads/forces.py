@@ -1,0 +1,139 @@
+"""Forces on points, torques, and springs, which pull at points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.given import vector_of
+from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, one_point, upright
+from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.errors import InputError, ModelError
+
+Array = NDArray[np.float64]
+
+
+class Force(BodyLoad):
+    """A force on a material point.
+
+    Parameters
+    ----------
+    point : (3,) m, in the undeformed body.
+    force : (3,) N.
+    frame : ``spatial`` keeps its direction in space, ``convected`` moves with the body (times Λ or F).
+    """
+
+    def __init__(self, point: ArrayLike, force: ArrayLike, frame: str = "spatial") -> None:
+        self.point, self.force = one_point(point), vector_of(force, "a force")
+        self.frame = checked_frame(frame)
+
+    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+        """Return the load on a body; MeshError if the point lies outside."""
+        X, f = self.point, self.force
+        body.find(X)
+        if self.frame == "convected":
+            fixed = body.push(X, f, upright(body)) if isinstance(body, RigidBody) else None
+            return Bound(
+                lambda q, u, t: body.push(X, body.convected(f, X, q), q), factor, steady, convected=fixed
+            )
+
+        def potential(q: Array) -> Array:
+            return np.asarray(-(f * body.position(X, q)).sum(axis=-1))
+
+        central = not isinstance(body, RigidBody) or bool((np.abs(X - body.center) == 0).all())
+        fixed = body.push(X, f, body.q) if central else None
+        return Bound(
+            lambda q, u, t: body.push(X, f, q), factor, steady, spatial=fixed, potential_energy=potential
+        )
+
+
+class Torque(BodyLoad):
+    """A torque on a rigid body.
+
+    Parameters
+    ----------
+    torque : (3,) N m.
+    frame : ``spatial`` keeps its direction in space, ``convected`` turns with the body.
+    """
+
+    def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
+        self.torque, self.frame = vector_of(torque, "a torque"), checked_frame(frame)
+
+    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+        """Return the load on a body; ModelError unless it is rigid."""
+        if not isinstance(body, RigidBody):
+            raise ModelError(
+                f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces at two points"
+            )
+        zero, t = np.zeros(3), self.torque
+        fixed = np.broadcast_to(np.concatenate([t, zero]), body.u.shape)
+        if self.frame == "convected":
+            return Bound(lambda q, u, time: fixed, factor, steady, convected=fixed)
+
+        def generalised(q: Array, u: Array, time: float) -> Array:
+            T = (np.swapaxes(rotation(q), -1, -2) @ t[:, None])[..., 0]
+            return np.concatenate([T, np.zeros_like(T)], axis=-1)
+
+        return Bound(generalised, factor, steady, spatial=fixed)
+
+
+class Spring(BodyLoad):
+    """A spring, with a damper if wanted, from a material point to a fixed point in space.
+
+    Parameters
+    ----------
+    point : (3,) m, in the undeformed body.
+    anchor : (3,) m, in space.
+    stiffness : N/m, or a function (elongation in m, its rate in m/s) that gives the pull in N.
+    damping : N s/m.
+    length : natural length in m; that at the start if not given.
+    """
+
+    def __init__(
+        self,
+        point: ArrayLike,
+        anchor: ArrayLike,
+        stiffness: float | Callable[[float, float], float],
+        damping: float = 0.0,
+        length: float | None = None,
+    ) -> None:
+        self.point, self.anchor = one_point(point), one_point(anchor)
+        self.stiffness, self.damping, self.length = stiffness, damping, length
+        if not callable(stiffness) and float(finite(stiffness, "the stiffness of a spring")) < 0:
+            raise InputError(f"the stiffness of a spring must be ≥ 0 N/m; got {stiffness}")
+        if float(finite(damping, "the damping of a spring")) < 0:
+            raise InputError(f"the damping of a spring must be ≥ 0 N s/m; got {damping}")
+
+    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+        """Return the load on a body; MeshError if the point lies outside."""
+        X, anchor = self.point, self.anchor
+        body.find(X)
+        L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
+
+        def generalised(q: Array, u: Array, time: float) -> Array:
+            if q.ndim > 1:
+                raise ModelError("a spring acts on single bodies; march them one by one")
+            y = body.position(X, q) - anchor
+            distance = float(np.linalg.norm(y))
+            direction = y / distance if distance > 0 else np.zeros(3)
+            dofs, H = body.rows(X, q)
+            rate = float(direction @ (H @ u[dofs]))
+            return body.push(X, -self._pull(distance - L, rate) * direction, q)
+
+        def potential(q: Array) -> Array:
+            if callable(self.stiffness):
+                return no_potential(q)
+            stretch = np.linalg.norm(body.position(X, q) - anchor, axis=-1) - L
+            return np.asarray(self.stiffness * stretch**2 / 2)
+
+        return Bound(generalised, factor, steady, potential_energy=potential)
+
+    def _pull(self, elongation: float, rate: float) -> float:
+        if callable(self.stiffness):
+            return float(self.stiffness(elongation, rate))
+        return self.stiffness * elongation + self.damping * rate

@@ -1,0 +1,61 @@
+"""Pressure that follows the faces of the deformed body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.batches import add_nodal
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.loads.base import BodyLoad, Bound
+from kratos_lite.elements import surface_pressure
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.loads import outward
+from kratos_lite.mesh import Where
+
+Array = NDArray[np.float64]
+
+
+class FollowerPressure(BodyLoad):
+    """Pressure on faces of the deformed body: it follows their normals and areas.
+
+    A positive pressure pushes into the body.  `kratos_lite.Pressure` is the dead one: normals and areas are
+    those of the undeformed body (as in Solfec-1.0, whose sign is the other way round).
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    pressure : Pa.
+    """
+
+    def __init__(self, where: Where, pressure: float) -> None:
+        value = finite(pressure, "a pressure")
+        if value.ndim:
+            raise InputError(f"a pressure must be one number in Pa; got {pressure}")
+        self.where, self.pressure = where, float(value)
+
+    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+        """Return the load on a body; ModelError if there are no such faces."""
+        mesh = body.mesh
+        if mesh is None:
+            raise ModelError("a pressure acts on the faces of a mesh; this body has none")
+        blocks = [(block, self.pressure * outward(mesh, block)) for block in mesh.faces(self.where)]
+        if not blocks:
+            raise ModelError(f"a pressure finds no face on {self.where!r}")
+
+        def nodal(x: Array) -> Array:
+            total = np.zeros_like(x)
+            for block, p in blocks:
+                assert block.shape is not None
+                add_nodal(total, block.nodes, surface_pressure(block.shape, x[block.nodes], p))
+            return total
+
+        def generalised(q: Array, u: Array, time: float) -> Array:
+            if q.ndim > 1:
+                raise ModelError("a following pressure acts on single bodies; march them one by one")
+            return body.push_nodes(nodal(body.position(mesh.points, q)), q)
+
+        return Bound(generalised, factor, steady)
