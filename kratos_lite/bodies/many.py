@@ -37,6 +37,8 @@ def together(bodies: Sequence[Body]) -> Body:
     >>> float(bodies[1].mass_center()[0])
     7.0
     """
+    if not isinstance(bodies, Sequence):
+        raise InputError(f"a body or a sequence of bodies is needed; got {type(bodies).__name__}")
     members = list(bodies)
     first = _alike(members)
     characteristics = Characteristics.stack([body.characteristics for body in members])

@@ -120,7 +120,8 @@ def _positive(dt: float) -> float:
 
 def _divided(body: Body, h: float, substeps: int | str) -> int:
     """Return the number of parts of each step; InputError if an explicit one is too long."""
-    if substeps != "auto" and (isinstance(substeps, (bool, str)) or substeps < 1):
+    whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool) and substeps >= 1
+    if substeps != "auto" and not whole:
         raise InputError(f"substeps must be a whole number ≥ 1, or 'auto'; got {substeps!r}")
     parts = 1 if isinstance(substeps, str) else int(substeps)
     if not isinstance(body, Deformable):

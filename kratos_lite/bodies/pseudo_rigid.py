@@ -76,7 +76,8 @@ class PseudoRigidBody(Deformable):
         if characteristics is None:
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its characteristics")
-            characteristics = Characteristics.of(mesh.points, elements_of(mesh, material))
+            elements = elements_of(mesh, material)
+            characteristics = Characteristics.of(mesh.points, elements)
         characteristics.check_deformable()
         lead = np.shape(characteristics.mass)
         q = np.zeros((*lead, 12))
@@ -126,8 +127,8 @@ class PseudoRigidBody(Deformable):
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
         spin = hat(vector_of(angular, "an angular velocity")) @ self.deformation
-        self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
         self.u[..., 9:] = vector_of(linear, "a velocity")
+        self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
 
     # ---- forces ----------------------------------------------------------------------------------
 

@@ -70,7 +70,8 @@ class RigidBody(Body):
         if characteristics is None:
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its characteristics")
-            characteristics = Characteristics.of(mesh.points, elements_of(mesh, material))
+            elements = elements_of(mesh, material)
+            characteristics = Characteristics.of(mesh.points, elements)
         lead = np.shape(characteristics.mass)
         q = np.zeros((*lead, 12))
         q[..., [0, 4, 8]] = 1.0

@@ -1,0 +1,95 @@
+"""The same body in the same motion as another kind."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.rotations import exp
+
+SPIN, FLIGHT = (0.05, 10, 0.05), (1, 2, 3)
+KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
+PAIRS = [(a, b) for a in KINDS for b in KINDS]
+
+
+def spinning(brick, kind, steps=40):
+    body = brick(kind, cells=(1, 2, 2))
+    body.set_velocity(FLIGHT, SPIN)
+    for _ in kl.march(body, 1e-3, steps, every=steps):
+        pass
+    return body
+
+
+@pytest.mark.parametrize(("kind", "other"), PAIRS)
+def test_place_mass_and_momenta_go_along(kind, other, brick):
+    body = spinning(brick, kind)
+    result = kl.convert(body, other)
+    assert type(result) is other
+    assert (result.time, result.step) == (body.time, body.step)
+    np.testing.assert_allclose(result.mass_center(), body.mass_center(), atol=1e-13)
+    np.testing.assert_allclose(result.linear_momentum(), body.linear_momentum(), rtol=1e-12)
+    exact = kind is kl.RigidBody or other is kl.RigidBody or kind is kl.PseudoRigidBody
+    rtol = 1e-10 if exact else 1e-3
+    np.testing.assert_allclose(result.angular_momentum(), body.angular_momentum(), rtol=rtol, atol=rtol)
+    X = body.mesh.points
+    far = np.abs(result.position(X) - body.position(X)).max()
+    assert far < (
+        1e-12 if KINDS.index(kind) <= KINDS.index(other) and kind is not kl.FiniteElementBody else 0.02
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "between"), [(a, b) for a, b in PAIRS if KINDS.index(a) <= KINDS.index(b)][:-1]
+)
+def test_there_and_back_is_the_same(kind, between, brick):
+    body = spinning(brick, kind)
+    back = kl.convert(kl.convert(body, between), kind)
+    np.testing.assert_allclose(back.q, body.q, atol=1e-12)
+    np.testing.assert_allclose(back.u, body.u, atol=1e-11)
+
+
+def test_a_turned_rigid_body_becomes_turned_elements(brick):
+    body = brick(kl.RigidBody)
+    body.turn(exp([0.5, 1.5, -0.7]))
+    body.set_velocity(FLIGHT, SPIN)
+    soft = kl.convert(body, kl.FiniteElementBody, form="BC", damping=1e-3)
+    assert (soft.form.name, soft.damping) == ("BC", 1e-3)
+    X = body.mesh.points
+    np.testing.assert_allclose(soft.position(X), body.position(X), atol=1e-14)
+    np.testing.assert_allclose(soft.velocity(X), body.velocity(X), atol=1e-13)
+    assert soft.internal_energy() < 1e-15
+    assert soft.kinetic_energy() == pytest.approx(float(body.kinetic_energy()), rel=1e-12)
+
+
+def test_what_elements_do_beyond_an_affine_motion_is_left_out(brick):
+    """The nearest affine motion with respect to mass: its rest carries no momentum and no moment."""
+    rng = np.random.default_rng(2)
+    body = brick(cells=(2, 2, 2))
+    body.place(0.02 * rng.uniform(-1, 1, body.q.shape))
+    body.u[...] = rng.uniform(-1, 1, body.u.shape)
+    whole = kl.convert(body, kl.PseudoRigidBody)
+    X = body.points
+    rest = body.velocity(X) - whole.velocity(X)
+    weighted = body.times_mass(rest.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(weighted.sum(axis=0), 0, atol=1e-11)
+    np.testing.assert_allclose(weighted.T @ X, 0, atol=1e-11)
+    np.testing.assert_allclose(whole.linear_momentum(), body.linear_momentum(), rtol=1e-11)
+    assert whole.kinetic_energy() < body.kinetic_energy()
+
+
+def test_the_other_body_is_another(brick):
+    body = spinning(brick, kl.PseudoRigidBody)
+    other = kl.convert(body, kl.PseudoRigidBody)
+    assert not np.shares_memory(body.q, other.q)
+    assert not np.shares_memory(body.u, other.u)
+
+
+@pytest.mark.parametrize("target", [kl.Obstacle, "rigid", None])
+def test_a_kind_that_is_none_is_refused(target, brick):
+    with pytest.raises(kl.InputError, match="becomes a RigidBody, PseudoRigidBody or FiniteElementBody"):
+        kl.convert(brick(kl.RigidBody), target)
+
+
+def test_a_body_without_a_mesh_stays_what_it_is():
+    top = kl.RigidBody(characteristics=kl.Characteristics(mass=1.0, inertia=np.eye(3)))
+    with pytest.raises(kl.ModelError, match="only a single body with a mesh and a material"):
+        kl.convert(top, kl.PseudoRigidBody)
