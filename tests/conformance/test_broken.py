@@ -106,6 +106,27 @@ def test_a_derivative_with_r_where_s_belongs_is_named():
     assert 0.1 < found["derivatives"].measured < 4
 
 
+def test_the_pyramid_of_solfec_is_found():
+    """dr/dz = x y in place of x y / (1 - z)², with r = x y z / (1 - z)."""
+
+    def dN(xi):
+        x, y, z = np.moveaxis(np.asarray(xi, dtype=float), -1, 0)
+        signs = [np.sign(X[0] * X[1]) for X in Pyramid5.nodes]
+        wrong = np.stack([sign / 4 * (x * y - x * y / (1 - z) ** 2) for sign in signs], axis=-1)
+        out = Pyramid5.dN(xi)
+        out[..., 2] += wrong
+        return out
+
+    made = with_functions(Pyramid5, dN=dN)
+    assert set(failed(check_shape(made))) == {"derivatives"}
+
+    class Broken(KinematicLinear):
+        shape, rule = made, pyramid(2)
+
+    assert set(failed(check_element(Broken))) == {"derivatives"}
+    assert not alone_element(Broken)  # no patch test sees it: linear displacements stay exact
+
+
 def test_wrong_derivatives_that_still_sum_to_zero_are_named_both():
     def dN(xi):
         out = Tetrahedron10.dN(xi)
