@@ -155,7 +155,8 @@ class FiniteElementBody(Deformable):
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""
         arms = self.points + self.displacement - self.mass_center()
-        v = vector_of(linear, "a velocity") + np.cross(vector_of(angular, "an angular velocity"), arms)
+        w = vector_of(angular, "an angular velocity", ())
+        v = vector_of(linear, "a velocity", ()) + np.cross(w, arms)
         self.u = v.ravel()
 
     def find(self, X: Array) -> None:
@@ -275,6 +276,6 @@ class FiniteElementBody(Deformable):
 
     def angular_momentum(self, about: ArrayLike | None = None) -> Array:
         """Return Σ (x_a - about) × (M u)_a, (3,) in kg m²/s; see `Body`."""
-        origin = self.mass_center() if about is None else vector_of(about, "a point")
+        origin = self.mass_center() if about is None else vector_of(about, "a point", ())
         arms = self.points + self.displacement - origin
         return np.asarray(np.cross(arms, self.times_mass(self.u).reshape(-1, 3)).sum(axis=0))

@@ -52,9 +52,11 @@ def points_of(X: ArrayLike) -> Array:
     return points
 
 
-def vector_of(value: ArrayLike, what: str) -> Array:
-    """Return a vector (..., 3) as floats."""
+def vector_of(value: ArrayLike, what: str, lead: tuple[int, ...] | None = None) -> Array:
+    """Return a vector (..., 3) as floats; if leading axes are given, one that fits them."""
     vector = finite(value, what)
     if vector.shape[-1:] != (3,):
         raise InputError(f"{what} must have three components; got shape {vector.shape}")
+    if lead is not None and vector.shape[:-1] not in ((), lead):
+        raise InputError(f"{what} must have shape {(*lead, 3)} or (3,); got {vector.shape}")
     return vector

@@ -90,8 +90,8 @@ class PseudoRigidBody(Deformable):
 
     @property
     def deformation(self) -> Array:
-        """Deformation gradient F (..., 3, 3)."""
-        return gradient_of(self.q)
+        """Deformation gradient F (..., 3, 3), a copy."""
+        return gradient_of(self.q).copy()
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
         """Return x = F (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
@@ -126,8 +126,8 @@ class PseudoRigidBody(Deformable):
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
-        spin = hat(vector_of(angular, "an angular velocity")) @ self.deformation
-        self.u[..., 9:] = vector_of(linear, "a velocity")
+        spin = hat(vector_of(angular, "an angular velocity", self.q.shape[:-1])) @ self.deformation
+        self.u[..., 9:] = vector_of(linear, "a velocity", self.q.shape[:-1])
         self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
 
     # ---- forces ----------------------------------------------------------------------------------

@@ -87,8 +87,8 @@ class RigidBody(Body):
 
     @property
     def rotation(self) -> Array:
-        """Rotation Λ (..., 3, 3)."""
-        return rotation(self.q)
+        """Rotation Λ (..., 3, 3), a copy."""
+        return rotation(self.q).copy()
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
         """Return x = Λ (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
@@ -125,8 +125,8 @@ class RigidBody(Body):
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
-        w = vector_of(angular, "an angular velocity")
-        self.u[..., 3:] = vector_of(linear, "a velocity")
+        w = vector_of(angular, "an angular velocity", self.q.shape[:-1])
+        self.u[..., 3:] = vector_of(linear, "a velocity", self.q.shape[:-1])
         self.u[..., :3] = (np.swapaxes(self.rotation, -1, -2) @ w[..., None])[..., 0]
 
     # ---- forces ----------------------------------------------------------------------------------

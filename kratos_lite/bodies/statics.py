@@ -97,7 +97,7 @@ def _increment(body: Deformable, start: Array, share: float, progress: Progress 
         largest = float(np.abs(step).max())
         if not np.isfinite(largest):
             break
-        if largest > noise:  # less would not make it better
+        if largest > noise or iteration == 1:  # less would not make it better
             body.q = body.q + step
         if largest <= max(noise, CONVERGED * float(np.abs(body.q - start).max())):
             _balance(body, share, multipliers)

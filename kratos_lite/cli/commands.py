@@ -158,10 +158,14 @@ def info(options: Namespace) -> int:
     from kratos_lite.io.describe import describe
     from kratos_lite.io.documents import ending
     from kratos_lite.io.files import read
-    from kratos_lite.io.scenes import describe_scene, is_scene, read_scene
+    from kratos_lite.io.scenes.kinds import is_scene
 
     if is_scene(options.input):
-        print(f"{'file':<22}{Path(options.input).name}\n{describe_scene(read_scene(options.input))}")
+        from kratos_lite.io.scenes.describe import describe_scene
+        from kratos_lite.io.scenes.scene import read_scene
+
+        scene = read_scene(options.input, strict=not options.lenient)
+        print(f"{'file':<22}{Path(options.input).name}\n{describe_scene(scene)}")
     elif ending(options.input) == ".json":
         print(f"{'file':<12}{Path(options.input).name}\n{read(options.input)}")
     else:
@@ -171,7 +175,7 @@ def info(options: Namespace) -> int:
 
 def _refuse_scene(path: str, command: str) -> None:
     """Raise InputError for a scene of a body, which is marched."""
-    from kratos_lite.io.scenes import is_scene
+    from kratos_lite.io.scenes.kinds import is_scene
 
     if is_scene(path):
         raise InputError(f"{path}: a scene of a body is not for {command}; use: kratos-lite march {path}")
@@ -196,12 +200,12 @@ def _document(options: Namespace) -> Document:
 def check(options: Namespace) -> int:
     """Report every problem of a file."""
     path = Path(options.input)
-    from kratos_lite.io.scenes import is_scene
+    from kratos_lite.io.scenes.kinds import is_scene
 
     if is_scene(path):
         from kratos_lite.cli.marching import check_scene
 
-        return check_scene(path)
+        return check_scene(path, strict=not options.lenient)
     if path.suffix == ".py":
         return _check_python(path)
     from kratos_lite.io.files import read

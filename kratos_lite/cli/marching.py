@@ -15,8 +15,8 @@ from kratos_lite.bodies import Body, State
 from kratos_lite.cli.targets import check_targets
 from kratos_lite.errors import InputError
 from kratos_lite.io.results import check_picture
-from kratos_lite.io.scenes import OUTPUTS, BodyScene, read_scene
 from kratos_lite.io.scenes.describe import body_lines, line, vector
+from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene, read_scene
 from kratos_lite.io.trajectory import Series, trajectory_picture
 
 SERIES = ("pvd", "csv", "npz")
@@ -24,7 +24,7 @@ SERIES = ("pvd", "csv", "npz")
 
 def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> int:
     """March the scene of the options; return the exit code."""
-    scene = read_scene(options.input)
+    scene = read_scene(options.input, strict=not options.lenient)
     _apply(scene, options)
     body, start, clock = scene.body, _Totals(scene.body), perf_counter()
     kept = [State.of(body)]
@@ -57,9 +57,9 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
     return 0
 
 
-def check_scene(path: Path) -> int:
+def check_scene(path: Path, strict: bool) -> int:
     """Report every problem of a scene, without a step."""
-    scene = read_scene(path)
+    scene = read_scene(path, strict=strict)
     _check_outputs(scene, scene.output, scene.files)
     scene.march()
     print(f"{path}: {scene.body.kind} body, {scene.steps} steps of {scene.dt:g} s, no errors")

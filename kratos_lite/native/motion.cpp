@@ -192,6 +192,8 @@ std::pair<int64_t, int64_t> rigid_steps(Floats q, Floats u, Floats inertia, Floa
         gather(a, first, count, g.acceleration);
         gather(fixed, first, count, g.spatial);
         gather(turning, first, count, g.convected);
+        if (total)  // from where it was, so that it does not matter how steps are divided into calls
+            for (int l = 0; l < count; ++l) g.work[0][l] = total[first + l];
         for (int64_t step = 0; step < steps; ++step) {
             run<kl::rigid_half>(g);
             run<kl::rigid_load>(g);
@@ -200,7 +202,7 @@ std::pair<int64_t, int64_t> rigid_steps(Floats q, Floats u, Floats inertia, Floa
         }
         all.scatter_from(g, first, count);
         if (total)
-            for (int l = 0; l < count; ++l) total[first + l] += g.work[0][l];
+            for (int l = 0; l < count; ++l) total[first + l] = g.work[0][l];
     });
     return failure.first;
 }
@@ -284,13 +286,15 @@ std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Float
         gather(fixed, first, count, g.load);
         for (int i = 0; i < 3; ++i)
             for (int l = 0; l < LANES; ++l) g.load[9 + i][l] += g.mass[0][l] * g.acceleration[i][l];
+        if (total)
+            for (int l = 0; l < count; ++l) g.work[0][l] = total[first + l];
         for (int64_t step = 0; step < steps; ++step) {
             run<kl::pseudo_finish>(g);
             if (noted(g, first, step, failure)) break;
         }
         all.scatter_from(g, first, count);
         if (total)
-            for (int l = 0; l < count; ++l) total[first + l] += g.work[0][l];
+            for (int l = 0; l < count; ++l) total[first + l] = g.work[0][l];
     });
     return failure.first;
 }

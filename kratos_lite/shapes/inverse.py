@@ -118,6 +118,7 @@ def _newton(
         J = np.swapaxes(cells, 1, 2) @ shape.dN(at)
         step = _solve(J, miss)
         length = np.abs(step).max(axis=1)
+        step[~np.isfinite(length)] = 0.0  # J is singular there: the point is given up
         xi[active] = at = at + step * np.minimum(1.0, 2.0 / np.maximum(length, 1e-300))[:, None]
         miss = p[active] - (shape.N(at)[:, None, :] @ cells)[:, 0]
         done = (np.abs(miss).max(axis=1) <= small[active]) | (length <= tolerance)

@@ -79,7 +79,7 @@ class _Collector:
             return None
 
 
-def read_json_scene(path: Path) -> BodyScene:
+def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
     """Return the scene of a JSON file; its files are named from its folder.
 
     Raises
@@ -95,7 +95,7 @@ def read_json_scene(path: Path) -> BodyScene:
     files = [path]
     time = collect(_time, settings)
     output = collect(_outputs, settings, path.parent)
-    body = collect(_body_of, settings, path.parent, files)
+    body = collect(_body_of, settings, path.parent, files, strict)
     if body is None:
         collect.problems.raise_if_any()
     collect(_start, settings, body)
@@ -140,18 +140,18 @@ def _outputs(settings: Settings, folder: Path) -> dict[str, str]:
 
 
 def _mesh_and_material(
-    settings: Settings, folder: Path, files: list[Path]
+    settings: Settings, folder: Path, files: list[Path], strict: bool
 ) -> tuple[Mesh | None, Material | None]:
-    mesh, material = _mesh(settings, folder, files) if "mesh" in settings else (None, None)
+    mesh, material = _mesh(settings, folder, files, strict) if "mesh" in settings else (None, None)
     if "material" in settings:
         material = _material(settings.section("material"), mesh)
     return mesh, material
 
 
-def _mesh(settings: Settings, folder: Path, files: list[Path]) -> tuple[Mesh, Material | None]:
+def _mesh(settings: Settings, folder: Path, files: list[Path], strict: bool) -> tuple[Mesh, Material | None]:
     value = settings.get("mesh")
     if isinstance(value, str):
-        return _mesh_of_file(settings, folder, files)
+        return _mesh_of_file(settings, folder, files, strict)
     if not isinstance(value, Object) or len(value) != 1 or next(iter(value)) not in MESHES:
         kinds = " or ".join(f'{{"{name}": {{…}}}}' for name in MESHES)
         raise settings.error("mesh", f"mesh must be the name of a file, {kinds}; got {shown(value)}")
@@ -166,7 +166,9 @@ def _mesh(settings: Settings, folder: Path, files: list[Path]) -> tuple[Mesh, Ma
     return placed(settings.section("mesh"), name, make, **values), None
 
 
-def _mesh_of_file(settings: Settings, folder: Path, files: list[Path]) -> tuple[Mesh, Material | None]:
+def _mesh_of_file(
+    settings: Settings, folder: Path, files: list[Path], strict: bool
+) -> tuple[Mesh, Material | None]:
     """Return the mesh of a file, and its materials by property id if all elements have one."""
     path, note = find_file(settings, "mesh", folder)
     if note:
@@ -174,7 +176,7 @@ def _mesh_of_file(settings: Settings, folder: Path, files: list[Path]) -> tuple[
     if ending(path) == ".json":
         raise settings.error("mesh", f"mesh must be a mesh file such as .mdpa; got {path.name}")
     files.append(path)
-    document = read_document(path)
+    document = read_document(path, strict=strict)
     mesh = model_from(document, materials=False).mesh
     numbers = {int(number) for block in mesh.blocks for number in np.unique(block.properties)}
     given = {n: document.properties[n].values for n in sorted(numbers) if n in document.properties}
@@ -199,8 +201,8 @@ def _material(section: Settings, mesh: Mesh | None) -> Material:
 # ---- body ------------------------------------------------------------------------------------------
 
 
-def _body_of(settings: Settings, folder: Path, files: list[Path]) -> Body:
-    return _body(settings, *_mesh_and_material(settings, folder, files))
+def _body_of(settings: Settings, folder: Path, files: list[Path], strict: bool) -> Body:
+    return _body(settings, *_mesh_and_material(settings, folder, files, strict))
 
 
 def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> Body:

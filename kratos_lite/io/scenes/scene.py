@@ -42,8 +42,8 @@ class BodyScene:
         )
 
 
-def read_scene(path: str | Path) -> BodyScene:
-    """Return the scene of a .json file or a .py script.
+def read_scene(path: str | Path, *, strict: bool = True) -> BodyScene:
+    """Return the scene of a .json file or a .py script; `strict` is that of `kratos_lite.read` for its mesh.
 
     Raises
     ------
@@ -59,19 +59,4 @@ def read_scene(path: str | Path) -> BodyScene:
         raise InputError(f"{path}: a scene is a .json file or a .py script")
     from kratos_lite.io.scenes.reader import read_json_scene
 
-    return read_json_scene(path)
-
-
-def is_scene(path: str | Path) -> bool:
-    """Return whether a file is a scene: a .json file with a body, or a script that defines one."""
-    path = Path(path)
-    if path.suffix.lower() == ".json" and path.is_file():
-        from kratos_lite.io.project.settings import read_settings
-
-        settings = read_settings(path)
-        return "body" in settings and "model" not in settings
-    if path.suffix.lower() == ".py" and path.is_file():
-        from kratos_lite.io.scenes.script import defines_scene
-
-        return defines_scene(path)
-    return False
+    return read_json_scene(path, strict)

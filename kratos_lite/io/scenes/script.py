@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import runpy
 import sys
 import traceback
@@ -13,21 +12,10 @@ from typing import Any
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.many import together
 from kratos_lite.errors import InputError, KratosLiteError, nearest
+from kratos_lite.io.scenes.kinds import NEEDED
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
 
-NEEDED = ("body", "dt", "steps")
 OPTIONAL = ("every", "substeps", "output")
-
-
-def defines_scene(path: Path) -> bool:
-    """Return whether a script assigns all names of a scene, without running it."""
-    try:
-        tree = ast.parse(path.read_bytes())
-    except (SyntaxError, ValueError):
-        return False
-    targets = [t for node in tree.body if isinstance(node, ast.Assign) for t in node.targets]
-    names = {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
-    return names.issuperset(NEEDED)
 
 
 def run_script(path: Path) -> BodyScene:
