@@ -29,7 +29,8 @@ class TerminalProgress:
     """Show the phase on a terminal once the work has taken more than two seconds."""
 
     def __init__(self, always: bool = False) -> None:
-        self.start = self.last = perf_counter()
+        self.start = perf_counter()
+        self.last = 0.0 if always else self.start
         self.shown, self.patience = False, 0.0 if always else 2.0
         self.wanted = always or sys.stderr.isatty()
 
