@@ -18,7 +18,19 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks import __main__ as command  # noqa: E402
-from benchmarks import cases, curves, driver, errors, fields, meshes, report, scenes, sets, tables  # noqa: E402
+from benchmarks import (  # noqa: E402
+    cases,
+    curves,
+    driver,
+    errors,
+    fields,
+    meshes,
+    motion,
+    report,
+    scenes,
+    sets,
+    tables,
+)
 from benchmarks.programs import PROGRAMS  # noqa: E402
 
 E, NU = 1.0, 0.3
@@ -181,6 +193,27 @@ def test_real_scenes_are_written_whole(shared, tmp_path):
     assert model.loads
 
 
+@pytest.mark.parametrize("name", [name for name in motion.MOTIONS if not name.startswith("many")])
+def test_motions_keep_what_they_should(name):
+    found = motion.measured(kl, name, share=100)
+    exact = 1e-12 if "em" in name else 1e-4
+    assert found["step"] > 0
+    assert found["energy"] < exact
+    assert not found["momentum"] > exact
+
+
+def test_motions_have_rows_beside_solfec():
+    rows = [
+        {"group": "motion", "program": program, "scene": name, "kind": "", "n": 0, "task": "march"}
+        | {"phases": {"step": 2e-6}, "process": 1.0, "drift": {"energy": 1e-9, "momentum": float("nan")}}
+        for name in ("rigid", "many_rigid")
+        for program in ("kratos_lite", "kratos_lite NumPy")
+    ]
+    text = report.motions(rows)
+    assert "| 2 | 2 | 7 … 9 | 0.29 | 1e-09 |  |" in text
+    assert text.count("\n") == 4
+
+
 # ---- sets, results and report --------------------------------------------------------------------------
 
 
@@ -188,7 +221,7 @@ def test_every_set_names_scenes_and_programs_that_exist(tmp_path):
     for name, make in command.COMMANDS.items():
         runs = make(command.arguments([name, "--cases", str(tmp_path)]), tmp_path)
         assert runs, name
-        assert {run.scene for run in runs} <= set(scenes.SCENES)
+        assert {run.scene for run in runs} <= {*scenes.SCENES, *motion.MOTIONS}
         assert {run.program for run in runs} <= {*PROGRAMS, *command.HELPERS}
         assert len(set(runs)) == len(runs)
 
