@@ -15,6 +15,7 @@ from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Block, Mesh, Where, WhereElements, outward_signs, with_rows
+from kratos_lite.series import Factor, function_of
 from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
@@ -134,6 +135,32 @@ class Traction(Load):
             assert block.shape is not None
             add_nodal(total, block.nodes, surface_load(block.shape, mesh.points[block.nodes], self.traction))
         return total
+
+
+class Varying(Load):
+    """A load that changes with the time; where nothing moves it is what it is at the time 0.
+
+    Parameters
+    ----------
+    load : any load.
+    factor : `TimeSeries`, or function of the time in s, by which it is multiplied.
+
+    Examples
+    --------
+    >>> from kratos_lite.series import TimeSeries
+    >>> ramp = Varying(Gravity((0, 0, -9.81)), TimeSeries([0.0, 1.0], [0.0, 2.0]))
+    >>> ramp.factor(0.5)
+    1.0
+    """
+
+    def __init__(self, load: Load, factor: Factor) -> None:
+        if not isinstance(load, Load) or isinstance(load, Varying):
+            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+        self.load, self.factor = load, function_of(factor, "the factor of a load")
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return the nodal forces (n, 3) in N at the time 0."""
+        return self.factor(0.0) * self.load.forces(mesh, batches)
 
 
 class LineLoad(Traction):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from kratos_lite.bodies.constraints import Constraint
     from kratos_lite.bodies.given import Material
     from kratos_lite.bodies.loads import BodyLoad, Bound
-    from kratos_lite.bodies.series import Factor
+    from kratos_lite.series import Factor
     from kratos_lite.loads import Load
 
 Array = NDArray[np.float64]

@@ -75,6 +75,7 @@ class Equations:
     points : (n, 3) m, from which multigrid knows the rigid modes.
     method, reason : as `choose` gives them.
     linear_level : makes the linear elements within quadratic ones, for multigrid.
+    symmetric : whether K is symmetric positive definite; otherwise the method is ``dense`` or ``direct``.
 
     What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
     """
@@ -85,6 +86,7 @@ class Equations:
     method: str
     reason: str
     linear_level: Callable[[], LinearLevel | None] | None = None
+    symmetric: bool = True
 
     def solve(self, f: Array, tolerance: float, progress: Progress | None = None) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
@@ -138,7 +140,9 @@ class Equations:
     def _factors(self) -> direct.Factorisation:
         """The reduced matrix factorised."""
         return (
-            direct.factorise_dense(self._full) if self.method == "dense" else direct.factorise(self._sparse)
+            direct.factorise_dense(self._full)
+            if self.method == "dense"
+            else direct.factorise(self._sparse, self.symmetric)
         )
 
     @cached_property

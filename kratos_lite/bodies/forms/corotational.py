@@ -13,7 +13,7 @@ from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.bodies.closing import Solve
 from kratos_lite.bodies.forms import base
 from kratos_lite.bodies.forms.base import Form
-from kratos_lite.bodies.mass import Mass
+from kratos_lite.mass import Mass
 from kratos_lite.rotations import polar
 
 Array = NDArray[np.float64]

@@ -1,0 +1,6 @@
+"""ALE terms: a rotating body of revolution, and a uniformly translated window of a long body."""
+
+from kratos_lite.ale.matrices import MotionMatrices
+from kratos_lite.ale.motion import Motion, Rotation, Translation
+
+__all__ = ["Motion", "MotionMatrices", "Rotation", "Translation"]

@@ -1,0 +1,89 @@
+"""The ends of a window: the two faces at which it cuts the body, and what they do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.ale.motion import Translation
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.elements.surface import surface_mass
+from kratos_lite.errors import ModelError
+from kratos_lite.mesh import Mesh
+
+if TYPE_CHECKING:
+    from kratos_lite.system import System
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FLAT = 1e-6
+"""Share of the length of the window by which an end face may be uneven."""
+
+
+def end_nodes(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
+    """Return the rows of the nodes at the lower and the upper end along the direction."""
+    x = mesh.points @ motion.direction
+    used = mesh.used_nodes()
+    low, high = float(x[used].min()), float(x[used].max())
+    near = FLAT * (high - low)
+    return np.flatnonzero((x <= low + near) & used), np.flatnonzero((x >= high - near) & used)
+
+
+def dashpots(mesh: Mesh, motion: Translation, system: System) -> BlockMatrix:
+    """Return the damping of absorbing ends: ρ c_p along the direction and ρ c_s across it, (3a, 3a) in N s/m.
+
+    Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
+    """
+    pattern = system.pattern
+    data = np.zeros((len(pattern.indices), 3, 3))
+    rows = np.repeat(np.arange(pattern.n_nodes, dtype=np.int64), np.diff(pattern.indptr))
+    keys = rows * pattern.n_nodes + pattern.indices
+    local = np.full(mesh.n_nodes, -1)
+    local[system.nodes] = np.arange(len(system.nodes))
+    impedance = _impedances(mesh, motion, system)
+    for nodes in end_nodes(mesh, motion):
+        for block in mesh.faces(nodes):
+            assert block.shape is not None
+            m = surface_mass(block.shape, mesh.points[block.nodes])
+            blocks = m[..., None, None] * impedance[block.ids][:, None, None]
+            cells = local[block.nodes]
+            places = np.searchsorted(keys, cells[:, :, None] * pattern.n_nodes + cells[:, None, :])
+            np.add.at(data, places, blocks)
+    return BlockMatrix(data, pattern.indices, pattern.indptr)
+
+
+def _impedances(mesh: Mesh, motion: Translation, system: System) -> Array:
+    """Return ρ c_p n n^T + ρ c_s (1 - n n^T) of the material of each element, (m, 3, 3)."""
+    along = np.outer(motion.direction, motion.direction)
+    out = np.zeros((mesh.n_elements, 3, 3))
+    for batch in system.batches:
+        C, rho = batch.material.C, batch.material.density
+        p, s = np.sqrt(rho * C[0, 0]), np.sqrt(rho * C[3, 3])
+        out[batch.rows] = p * along + s * (np.eye(3) - along)
+    return out
+
+
+def periodic_pairs(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
+    """Return the nodes of the upper end and those of the lower one that they meet.
+
+    Raises
+    ------
+    ModelError
+        If the nodes of the two ends do not lie opposite one another.
+    """
+    low, high = end_nodes(mesh, motion)
+    across = np.eye(3) - np.outer(motion.direction, motion.direction)
+    a, b = mesh.points[low] @ across, mesh.points[high] @ across
+    size = float(np.ptp(mesh.points, axis=0).max())
+    if len(low) == len(high):
+        distance = np.abs(a[:, None, :] - b[None]).max(axis=2)
+        nearest = distance.argmin(axis=0)
+        if len(set(nearest.tolist())) == len(high) and distance.min(axis=0).max() <= FLAT * size:
+            return high, low[nearest]
+    raise ModelError(
+        f"periodic ends need nodes that lie opposite one another; there are {len(low)} and {len(high)}, "
+        "not in the same places"
+    )

@@ -1,0 +1,142 @@
+"""The scalar matrices of a motion: one number for each pair of nodes, alike for x, y and z."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import fields
+from kratos_lite.ale.motion import Motion, Rotation
+from kratos_lite.assembly import Pattern, assemble_scalar
+from kratos_lite.batches import Batch
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.mass import Mass
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.quadrature import Rule, rule_for
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
+from kratos_lite.voigt import tensor
+
+Array = NDArray[np.float64]
+
+
+@remembered
+def exact_rule(shape: type[Shape]) -> Rule:
+    """Return the rule that integrates (c·grad N_i)(c·grad N_j), c linear, over affine cells.
+
+    In each direction of a product c has degree 1 and grad N that of the shape; over a tetrahedron grad N has one
+    less.
+    """
+    return rule_for(shape.cell, 2 * (shape.degree + (0 if shape.cell == "tetrahedron" else 1)))
+
+
+class MotionMatrices:
+    """What a motion adds to the equations of elements, for the rates 1; each is made when it is asked for.
+
+    All are data (nnz,) on one pattern.
+
+    Attributes
+    ----------
+    G : ∫ ρ N_i c·grad N_j, row i of the test function.
+    S : its skew part.
+    H : ∫ ρ (c·grad N_i)(c·grad N_j), symmetric, ≥ 0.
+    stiffening : ∫ σ0 : (grad N_i ⊗ grad N_j), σ0 the stress of the centrifugal load.
+    """
+
+    def __init__(
+        self, motion: Motion, points: Array, batches: Sequence[Batch], pattern: Pattern, mass: Mass
+    ) -> None:
+        self.motion, self.points, self.batches = motion, points, batches
+        self.pattern, self.mass = pattern, mass
+
+    def _assembled(self, kernel: Any) -> Array:
+        matrix = assemble_scalar(self.points, self.batches, self.pattern, kernel)
+        return np.asarray(matrix.data)
+
+    def _along(self, element: KinematicLinear) -> tuple[Array, Array, Array]:
+        """Return N (g, n), c·grad N (..., g, n) and dV (..., g) by the exact rule."""
+        rule = exact_rule(element.shape)
+        fine = type(element)(element.X, rule)
+        dV, D = fine._gauss
+        c = self.motion.field(fine.gauss_points())
+        return tabulate(element.shape, rule)[0], (c[..., None, :] @ D)[..., 0, :], dV
+
+    @cached_property
+    def G(self) -> Array:
+        """∫ ρ N_i c·grad N_j in kg/s for the rate 1."""
+
+        def kernel(element: KinematicLinear, material: LinearMaterial) -> Array:
+            N, along, dV = self._along(element)
+            return np.asarray((N.T * (material.density * dV)[..., None, :]) @ along)
+
+        return self._assembled(kernel)
+
+    @cached_property
+    def H(self) -> Array:
+        """∫ ρ (c·grad N_i)(c·grad N_j) in kg/s² for the rate 1."""
+
+        def kernel(element: KinematicLinear, material: LinearMaterial) -> Array:
+            _, along, dV = self._along(element)
+            weighted = along * (material.density * dV)[..., None]
+            return np.asarray(np.swapaxes(weighted, -1, -2) @ along)
+
+        return self._assembled(kernel)
+
+    @cached_property
+    def S(self) -> Array:
+        """The skew part (G - G^T) / 2."""
+        return (self.G - self._transposed(self.G)) / 2
+
+    def _transposed(self, data: Array) -> Array:
+        from scipy.sparse import csr_array
+
+        n = self.pattern.n_nodes
+        matrix = csr_array((data, self.pattern.indices, self.pattern.indptr), shape=(n, n)).T.tocsr()
+        matrix.sort_indices()
+        return np.asarray(matrix.data)
+
+    def times(self, data: Array, v: Array) -> Array:
+        """Return the matrix of `data` times nodal vectors v (n, 3)."""
+        from scipy.sparse import csr_array
+
+        n = self.pattern.n_nodes
+        return np.asarray(csr_array((data, self.pattern.indices, self.pattern.indptr), shape=(n, n)) @ v)
+
+    # ---- loads for the rates 1 --------------------------------------------------------------------
+
+    @cached_property
+    def centrifugal(self) -> Array:
+        """-∫ ρ N A² (X - X0), outward, as nodal forces (n, 3) for the rate 1; 0 for a translation."""
+        if not isinstance(self.motion, Rotation):
+            return np.zeros_like(self.points)
+        return self._inertia(-self.motion.A @ self.motion.A)
+
+    @cached_property
+    def euler(self) -> Array:
+        """-∫ ρ N A (X - X0) as nodal forces (n, 3) for the acceleration 1; 0 for a translation."""
+        if not isinstance(self.motion, Rotation):
+            return np.zeros_like(self.points)
+        return self._inertia(-self.motion.A)
+
+    def _inertia(self, A: Array) -> Array:
+        assert isinstance(self.motion, Rotation)
+        arms = (self.points - self.motion.centre) @ A.T
+        return np.asarray(self.mass.scalar @ arms)
+
+    # ---- centrifugal stiffening ---------------------------------------------------------------------
+
+    def stiffening(self, u0: Array) -> Array:
+        """Return ∫ σ(u0) : (grad N_i ⊗ grad N_j) as data (nnz,) in N/m, of displacements u0 (n, 3)."""
+        data = np.zeros(len(self.pattern.indices))
+        for group, batch in enumerate(self.batches):
+            stress = tensor(fields.at_gauss(self.points, batch, u0))
+            for chunk in batch.chunks():
+                dV, D = batch.at(self.points, chunk)._gauss
+                weighted = stress[chunk] * dV[..., None, None]
+                self.pattern.add(data, group, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
+        return data

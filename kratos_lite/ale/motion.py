@@ -1,0 +1,147 @@
+"""Motions in which the mesh does not take part: the rotation of a body of revolution, the passing of a long body.
+
+The mesh stands in space while the material moves through it with the velocity rate · c(X), c = A (X - X0) for a
+rotation with A v = v × e, and c = -e for a window that moves with +e along its body.  The material time
+derivative of a displacement is u' + rate (c · grad) u, which adds to M u'' + K u = f
+
+    (2 rate G) u' + (acceleration G - rate² H) u,   G_ij = ∫ ρ N_i c·grad N_j,   H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
+
+Source: GetFEM user documentation, ALE support for objects having a large rigid body motion, with the signs of its
+loads and a factor 2 put right; Nackenhorst, Comput. Methods Appl. Mech. Eng. 193 (2004) 4299-4322.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.errors import InputError
+from kratos_lite.rotations import hat
+from kratos_lite.series import Factor, function_of
+
+Array = NDArray[np.float64]
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+ENDS = ("absorbing", "periodic", "fixed", "natural")
+"""What the two cut faces of a window do."""
+
+
+class Motion(ABC):
+    """The rigid motion of the material through a mesh that does not take part in it.
+
+    Attributes
+    ----------
+    direction : (3,) unit vector, the axis of a rotation or the way of a window.
+    rate, acceleration : functions of the time in s.
+    steady : whether they never change.
+    damping : α in 1/s, mass-proportional damping relative to the rigid motion.
+    """
+
+    def __init__(self, direction: ArrayLike | str, rate: Factor, acceleration: Factor, damping: float) -> None:
+        self.direction = _unit(direction)
+        self.rate = function_of(rate, "a rate")
+        self.acceleration = function_of(acceleration, "an acceleration")
+        self.steady = not (callable(rate) or callable(acceleration))
+        alpha = finite(damping, "a damping")
+        if alpha.ndim or alpha < 0:
+            raise InputError(f"a damping must be one number in 1/s, ≥ 0; got {damping}")
+        self.damping = float(alpha)
+
+    @abstractmethod
+    def field(self, X: Array) -> Array:
+        """Return the velocity c of the material through the mesh for the rate 1, (..., 3) at points X (..., 3)."""
+
+
+class Rotation(Motion):
+    """A body of revolution that turns about its axis while its mesh stands still.
+
+    Geometry, density and material must be axisymmetric.  A positive rate turns clockwise about the axis, as
+    seen from its tip: c = (X - X0) × e.
+
+    Parameters
+    ----------
+    axis : ``"x"``, ``"y"``, ``"z"`` or (3,).
+    rate : rad/s; number, `TimeSeries` or function of the time.
+    acceleration : rad/s², likewise.
+    centre : (3,) m, a point of the axis.
+    skew : take the skew part of G, which keeps the energy on every mesh.
+    stiffening : add the stiffness that the centrifugal stress gives; a rotor that may turn freely needs it.
+    damping : α in 1/s.
+
+    Examples
+    --------
+    >>> Rotation("z", rate=30.0).field(np.array([1.0, 0.0, 5.0]))
+    array([ 0., -1.,  0.])
+    """
+
+    def __init__(
+        self,
+        axis: ArrayLike | str = "z",
+        rate: Factor = 0.0,
+        acceleration: Factor = 0.0,
+        *,
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+        skew: bool = True,
+        stiffening: bool = False,
+        damping: float = 0.0,
+    ) -> None:
+        super().__init__(axis, rate, acceleration, damping)
+        self.centre = finite(centre, "the centre of a rotation")
+        if self.centre.shape != (3,):
+            raise InputError(f"the centre of a rotation must have shape (3,); got {self.centre.shape}")
+        self.skew, self.stiffening = bool(skew), bool(stiffening)
+        self.A = -hat(self.direction)
+
+    def field(self, X: Array) -> Array:
+        """Return A (X - X0) = (X - X0) × e."""
+        return np.asarray((X - self.centre) @ self.A.T)
+
+
+class Translation(Motion):
+    """A window that moves along a long body, whose material passes through its mesh.
+
+    Parameters
+    ----------
+    direction : ``"x"``, ``"y"``, ``"z"`` or (3,): the way of the window for a positive rate.
+    rate : m/s; number, `TimeSeries` or function of the time.
+    acceleration : m/s², likewise.
+    ends : what the two faces across the direction do: ``absorbing`` lets waves out (Lysmer's dashpots),
+        ``periodic`` joins them, ``fixed`` holds them, ``natural`` leaves them to what the model says.
+    damping : α in 1/s.
+    """
+
+    def __init__(
+        self,
+        direction: ArrayLike | str = "x",
+        rate: Factor = 0.0,
+        acceleration: Factor = 0.0,
+        *,
+        ends: str = "absorbing",
+        damping: float = 0.0,
+    ) -> None:
+        super().__init__(direction, rate, acceleration, damping)
+        if ends not in ENDS:
+            raise InputError(f"ends must be one of {', '.join(ENDS)}; got {ends!r}")
+        self.ends = ends
+
+    def field(self, X: Array) -> Array:
+        """Return -e."""
+        return np.broadcast_to(-self.direction, X.shape)
+
+
+def _unit(direction: ArrayLike | str) -> Array:
+    """Return a direction of any length as a unit vector."""
+    if isinstance(direction, str):
+        if direction not in AXES:
+            raise InputError(f"an axis is 'x', 'y', 'z' or a vector; got {direction!r}")
+        return np.array(AXES[direction])
+    v = finite(direction, "an axis")
+    length = float(np.linalg.norm(v))
+    if v.shape != (3,) or length == 0:
+        raise InputError(f"an axis needs three components, not all 0; got {direction!r}")
+    return np.asarray(v / length)
+
+

@@ -1,0 +1,313 @@
+"""The equations of motion of a model: M u'' + C u' + K u = f(t), with what a motion of the material adds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import solvers
+from kratos_lite.ale import MotionMatrices, Rotation, Translation
+from kratos_lite.ale.ends import dashpots
+from kratos_lite.arguments import finite
+from kratos_lite.assembly import Progress
+from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.loads import Varying
+from kratos_lite.mass import Mass
+from kratos_lite.solvers.banded import add_scalar
+from kratos_lite.supports import reduction, resolve
+from kratos_lite.system import System
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+Solve: TypeAlias = Callable[[Array, Array], Array]
+"""Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
+
+DIRECT_MAX = 30_000
+"""Up to this many unknowns matrices are factorised, as they are needed many times."""
+
+
+class EquationsOfMotion:
+    """Mass, damping, stiffness and loads of a model, on the nodes that its elements use.
+
+    Parameters
+    ----------
+    model : elements with density, supports, loads, and its motion if it has one.
+    lumped : whether the mass stands in the nodes.
+    rayleigh : α in 1/s and β in s of the damping α M + β K.
+
+    Attributes
+    ----------
+    system : pattern, K and supports.
+    mass : M.
+    terms : the matrices of the motion, or None.
+    warnings : what the checks of the model found.
+
+    Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        lumped: bool = False,
+        rayleigh: tuple[float, float] = (0.0, 0.0),
+        progress: Progress | None = None,
+    ) -> None:
+        self.model, self.progress = model, progress
+        self.rayleigh = _checked_rayleigh(rayleigh)
+        batches, part, self.warnings = model.checked()
+        for batch in batches:
+            if not batch.material.density > 0:
+                raise ModelError(
+                    f"{type(batch.material).__name__} has density {batch.material.density:g}, but what moves "
+                    "needs mass; give each material a density > 0 kg/m³"
+                )
+        links = resolve(model.supports, part >= 0) if model.supports.links else {}
+        self.system = System(
+            model.mesh.points,
+            batches,
+            model.supports,
+            links,
+            solver="direct",
+            patterns=model.patterns,
+            progress=progress,
+        )
+        self._links = links
+        self.mass = Mass(self.system.points, self.system.batches, self.system.pattern, lumped)
+        self.terms: MotionMatrices | None = None
+        if model.motion is not None:
+            self.terms = MotionMatrices(
+                model.motion, self.system.points, self.system.batches, self.system.pattern, self.mass
+            )
+        self._kept: tuple[Any, Solve] | None = None
+
+    # ---- loads and supports ------------------------------------------------------------------------------
+
+    @cached_property
+    def _loads(self) -> tuple[Array, list[tuple[Array, Callable[[float], float]]]]:
+        """Constant nodal forces, and those that change with their factors."""
+        mesh, batches = self.model.mesh, self.model.batches()
+        constant, changing = np.zeros(self.size), []
+        for load in self.model.loads:
+            if isinstance(load, Varying):
+                changing.append((self.system.local(load.load.forces(mesh, batches)), load.factor))
+            else:
+                constant += self.system.local(load.forces(mesh, batches))
+        return constant, changing
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom, the prescribed ones among them."""
+        return 3 * len(self.system.nodes)
+
+    def load(self, time: float) -> Array:
+        """Return the nodal forces (3a,) at a time, those of the motion among them."""
+        constant, changing = self._loads
+        total = constant.copy()
+        for forces, factor in changing:
+            total += factor(time) * forces
+        return total + self.inertia_load(time)
+
+    def inertia_load(self, time: float) -> Array:
+        """Return the centrifugal and Euler load (3a,) of the motion at a time."""
+        if self.terms is None:
+            return np.zeros(self.size)
+        rate, acceleration = self.terms.motion.rate(time), self.terms.motion.acceleration(time)
+        total = np.zeros_like(self.system.points)
+        if rate:
+            total += rate**2 * self.terms.centrifugal
+        if acceleration:
+            total += acceleration * self.terms.euler
+        return total.ravel()
+
+    def prescribed(self, time: float) -> Array:
+        """Return the displacements (3a,) at a time where the free ones are 0."""
+        supports = self.model.supports
+        if not self.model.movements:
+            return self.system.reduced.c
+        kept = supports.values.copy()
+        try:
+            for rows, axis, value in self.model.movements:
+                supports.values[rows, axis] = value(time)
+            links = resolve(supports, self._used) if supports.links else {}
+            return reduction(supports, self.system.nodes, links).c
+        finally:
+            supports.values[...] = kept
+
+    @cached_property
+    def _used(self) -> NDArray[np.bool_]:
+        used = np.zeros(self.system.n_nodes, dtype=bool)
+        used[self.system.nodes] = True
+        return used
+
+    # ---- matrices ----------------------------------------------------------------------------------------
+
+    @property
+    def K(self) -> BlockMatrix:
+        """Stiffness (3a, 3a) of the elements alone in N/m."""
+        K: BlockMatrix = self.system.K
+        return K
+
+    def stiffness_terms(self, time: float) -> Array | None:
+        """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
+        if self.terms is None:
+            return None
+        motion, terms = self.terms.motion, self.terms
+        rate, acceleration = motion.rate(time), motion.acceleration(time)
+        out: Array | None = None
+        if rate:
+            out = -(rate**2) * terms.H
+            if isinstance(motion, Rotation) and motion.stiffening:
+                out = out + rate**2 * self._stiffening
+            if motion.damping:
+                out = out + motion.damping * rate * self._convective
+        if acceleration:
+            spin = acceleration * (terms.G if isinstance(motion, Translation) else self._convective)
+            out = spin if out is None else out + spin
+        return out
+
+    def damping_terms(self, time: float) -> Array | None:
+        """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
+        alpha = self.rayleigh[0] + (self.terms.motion.damping if self.terms else 0.0)
+        out: Array | None = alpha * self.mass_data if alpha else None
+        if self.terms is not None and (rate := self.terms.motion.rate(time)):
+            gyroscopic = 2 * rate * self._convective
+            out = gyroscopic if out is None else out + gyroscopic
+        return out
+
+    @property
+    def _convective(self) -> Array:
+        """G, or its skew part where that is asked for: a window always takes it, beside its dashpots."""
+        assert self.terms is not None
+        motion = self.terms.motion
+        return self.terms.G if isinstance(motion, Rotation) and not motion.skew else self.terms.S
+
+    @cached_property
+    def _stiffening(self) -> Array:
+        """Stiffness by the stress of the centrifugal load for the rate 1."""
+        assert self.terms is not None
+        supports = self.model.supports
+        zero = np.zeros_like(self.system.reduced.c)
+        equations = solvers.Equations(
+            self.K, reduction_at_zero(self.system.reduced, zero), self.system.points, "direct", ""
+        )
+        del supports
+        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12).x
+        return self.terms.stiffening(u0.reshape(-1, 3))
+
+    @cached_property
+    def mass_data(self) -> Array:
+        """Mass matrix as data (nnz,) on the pattern in kg."""
+        from scipy.sparse import csr_array
+
+        if not self.mass.lumped:
+            return np.asarray(self.mass.scalar.data)
+        pattern = self.system.pattern
+        data = np.zeros(len(pattern.indices))
+        empty = csr_array((data, pattern.indices, pattern.indptr), shape=self.mass.scalar.shape)
+        rows = np.repeat(np.arange(pattern.n_nodes), np.diff(pattern.indptr))
+        empty.data[rows == pattern.indices] = self.mass.nodal
+        return np.asarray(empty.data)
+
+    @cached_property
+    def dashpots(self) -> BlockMatrix | None:
+        """Damping of the absorbing ends of a window, (3a, 3a) in N s/m, or None."""
+        motion = self.terms.motion if self.terms else None
+        if not isinstance(motion, Translation) or motion.ends != "absorbing":
+            return None
+        return dashpots(self.model.mesh, motion, self.system)
+
+    def times_mass(self, v: Array) -> Array:
+        """Return M v."""
+        return self.mass.times(v)
+
+    def times_damping(self, v: Array, time: float) -> Array:
+        """Return C v at a time."""
+        out = self.rayleigh[1] * (self.K @ v) if self.rayleigh[1] else np.zeros_like(v)
+        if (scalar := self.damping_terms(time)) is not None:
+            out = out + self._scalar_times(scalar, v)
+        if self.dashpots is not None:
+            out = out + self.dashpots @ v
+        return np.asarray(out)
+
+    def times_stiffness(self, u: Array, time: float) -> Array:
+        """Return K u with what the motion adds, at a time."""
+        out = self.K @ u
+        if (scalar := self.stiffness_terms(time)) is not None:
+            out = out + self._scalar_times(scalar, u)
+        return np.asarray(out)
+
+    def _scalar_times(self, data: Array, v: Array) -> Array:
+        from scipy.sparse import csr_array
+
+        pattern = self.system.pattern
+        n = pattern.n_nodes
+        matrix = csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+        return np.asarray(matrix @ v.reshape(-1, 3)).ravel()
+
+    def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
+        """Return m M + c C + k K at a time, (3a, 3a)."""
+        K = self.K
+        A = BlockMatrix((k + c * self.rayleigh[1]) * K.data, K.indices, K.indptr)
+        scalar = m * self.mass_data
+        for factor, terms in ((c, self.damping_terms(time)), (k, self.stiffness_terms(time))):
+            if terms is not None:
+                scalar = scalar + factor * terms
+        add_scalar(A, scalar)
+        if c and self.dashpots is not None:
+            A.data += c * self.dashpots.data
+        return A
+
+    def solver(self, time: float, m: float, c: float, k: float) -> Solve:
+        """Return what solves (m M + c C + k K) u = f + reactions; kept as long as the matrix is the same."""
+        key = m, c, k, *self._rates(time)
+        if self._kept is None or self._kept[0] != key:
+            self._kept = key, self._solver(self.matrix(time, m, c, k), self.is_symmetric(time, c))
+        return self._kept[1]
+
+    def _rates(self, time: float) -> tuple[float, float]:
+        if self.terms is None:
+            return 0.0, 0.0
+        return self.terms.motion.rate(time), self.terms.motion.acceleration(time)
+
+    def is_symmetric(self, time: float, c: float) -> bool:
+        """Return whether a matrix with the share c of damping is symmetric at a time."""
+        rate, acceleration = self._rates(time)
+        damped = bool(self.terms and self.terms.motion.damping)
+        return not (acceleration or (rate and (c or damped)))
+
+    def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
+        reduced = self.system.reduced
+        iterate = symmetric and len(reduced.free) > DIRECT_MAX
+        method = "amg" if iterate else "direct"
+        equations = solvers.Equations(A, reduced, self.system.points, method, "", symmetric=symmetric)
+
+        def solve(f: Array, prescribed: Array) -> Array:
+            reduced.c, kept = prescribed, reduced.c
+            try:
+                return equations.solve(f, 1e-13).x
+            finally:
+                reduced.c = kept
+
+        return solve
+
+
+def reduction_at_zero(reduced: Any, zero: Array) -> Any:
+    """Return supports that prescribe 0 where they prescribe anything."""
+    from dataclasses import replace
+
+    return replace(reduced, c=zero)
+
+
+def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:
+    values = finite(rayleigh, "the Rayleigh damping")
+    if values.shape != (2,) or (values < 0).any():
+        raise InputError(f"Rayleigh damping is α ≥ 0 in 1/s and β ≥ 0 in s; got {rayleigh!r}")
+    return float(values[0]), float(values[1])

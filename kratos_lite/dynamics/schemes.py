@@ -1,0 +1,62 @@
+"""Schemes of transient dynamics: one family of implicit ones, and central differences.
+
+The generalised-α method takes M a at t⁺ - αm h, and C v + K u - f at t⁺ - αf h, with Newmark's formulas
+
+    a⁺ = (Δu - h v) / (β h²) - (1/(2β) - 1) a,    v⁺ = v + h ((1 - γ) a + γ a⁺)
+
+Source: Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375; Hilber, Hughes & Taylor, Earthq. Eng. Struct. Dyn. 5
+(1977) 283-292; Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kratos_lite.errors import InputError
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """A generalised-α method by its four numbers; see `newmark`, `hht` and `generalised_alpha`."""
+
+    name: str
+    beta: float
+    gamma: float
+    alpha_m: float = 0.0
+    alpha_f: float = 0.0
+
+
+@dataclass(frozen=True)
+class CentralDifference:
+    """Central differences (velocity Verlet) with lumped mass: explicit, stable for steps below 2/ω."""
+
+    name: str = "central_difference"
+
+
+def newmark(beta: float = 0.25, gamma: float = 0.5) -> Implicit:
+    """Return Newmark's method; the trapezoidal rule if nothing is given: order 2, no dissipation.
+
+    >>> newmark().name
+    'newmark(0.25, 0.5)'
+    """
+    if not (gamma >= 0.5 and beta > 0 and 2 * beta >= gamma):
+        raise InputError(
+            f"Newmark's method is stable for γ ≥ 1/2 and β ≥ γ/2; got β = {beta}, γ = {gamma}: "
+            "take central_difference for an explicit scheme"
+        )
+    return Implicit(f"newmark({beta:g}, {gamma:g})", beta, gamma)
+
+
+def hht(alpha: float = -0.05) -> Implicit:
+    """Return the method of Hilber, Hughes and Taylor, -1/3 ≤ α ≤ 0: order 2, high frequencies die out."""
+    if not -1 / 3 <= alpha <= 0:
+        raise InputError(f"the α of HHT lies in -1/3 … 0; got {alpha}")
+    return Implicit(f"hht({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, 0.0, -alpha)
+
+
+def generalised_alpha(rho_inf: float = 0.8) -> Implicit:
+    """Return the generalised-α method whose highest frequencies shrink by ρ∞ (0 … 1) a step: order 2."""
+    if not 0 <= rho_inf <= 1:
+        raise InputError(f"ρ∞ of the generalised-α method lies in 0 … 1; got {rho_inf}")
+    m, f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+    return Implicit(f"generalised_alpha({rho_inf:g})", (1 - m + f) ** 2 / 4, 0.5 - m + f, m, f)

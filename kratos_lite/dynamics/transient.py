@@ -1,0 +1,297 @@
+"""Transient: a model in time."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.arguments import finite
+from kratos_lite.assembly import Progress
+from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
+from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.finite_strain import highest_frequency
+from kratos_lite.io.output import write_whole
+from kratos_lite.solvers.blas import one_thread
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+FIELDS = ("u", "v", "a", "time", "step")
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A model at one time.
+
+    Attributes
+    ----------
+    time, step : s, and number of steps taken.
+    u, v, a : displacement, velocity, acceleration (n, 3) in m, m/s, m/s².
+    reactions : (n, 3) N, forces of the supports on the body; 0 where nothing is fixed.
+    """
+
+    time: float
+    step: int
+    u: Array
+    v: Array
+    a: Array
+    reactions: Array
+
+    def save(self, path: str | Path) -> None:
+        """Write what a march needs to go on to an .npz file, as a whole or not at all."""
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **{name: np.asarray(getattr(self, name)) for name in FIELDS})
+        write_whole(path, buffer.getvalue())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Moment:
+        """Read a moment; InputError if the file holds none."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                u, v, a, time, step = (file[name] for name in FIELDS)
+        except FileNotFoundError:
+            raise InputError(f"{path}: there is no such file") from None
+        except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+            raise InputError(f"{path}: not a moment that Moment.save wrote ({error})") from None
+        return cls(float(time), int(step), u, v, a, np.zeros_like(u))
+
+
+class Transient:
+    """A model that moves in time; made by `Model.transient`.
+
+    Parameters
+    ----------
+    model : elements with density, supports, loads, and its motion if it has one.
+    scheme : `newmark()`, `hht()`, `generalised_alpha()` or `CentralDifference()`.
+    displacement, velocity : (n, 3) at the time 0; at rest if not given.
+    lumped : whether the mass stands in the nodes; central differences always lump it.
+    rayleigh : α in 1/s and β in s of the damping α M + β K.
+
+    Attributes
+    ----------
+    equations : the equations of motion.
+    time, step : s, and number of steps taken.
+    u, v, a : (3a,) of the nodes that elements use.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0, 0, 1e3)))
+    >>> top = [moment.u[:, 2].max() for moment in Transient(bar).march(dt=1e-3, steps=100)]
+    >>> print(f"{max(top):.2e} m, twice the static one")
+    2.00e-03 m, twice the static one
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        scheme: Implicit | CentralDifference | None = None,
+        displacement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        lumped: bool = False,
+        rayleigh: tuple[float, float] = (0.0, 0.0),
+        progress: Progress | None = None,
+    ) -> None:
+        self.scheme = newmark() if scheme is None else scheme
+        if not isinstance(self.scheme, (Implicit, CentralDifference)):
+            raise InputError(f"a scheme such as newmark() or CentralDifference() is needed; got {scheme!r}")
+        explicit = isinstance(self.scheme, CentralDifference)
+        self.progress = progress
+        self.equations = EquationsOfMotion(
+            model, lumped=lumped or explicit, rayleigh=rayleigh, progress=progress
+        )
+        if explicit and self.equations.terms is not None:
+            raise ModelError("central differences do not take a motion of the material; use newmark()")
+        if explicit and model.supports.links:
+            raise ModelError("central differences do not take constraints; use newmark()")
+        self.time, self.step = 0.0, 0
+        self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
+        start = self.equations.prescribed(0.0)
+        held = self._held
+        self.u[held] = start[held]
+        self.v[held] = self._speed(0.0)[held] if velocity is None else self.v[held]
+        self.a = self._initial_acceleration()
+
+    @property
+    def _held(self) -> NDArray[np.bool_]:
+        held = np.ones(self.equations.size, dtype=bool)
+        held[self.equations.system.reduced.free] = False
+        return held
+
+    def _given(self, values: ArrayLike | None, what: str) -> Array:
+        n = self.equations.system.n_nodes
+        if values is None:
+            return np.zeros(self.equations.size)
+        given = finite(values, f"the initial {what}")
+        if given.shape != (n, 3):
+            raise InputError(f"the initial {what} needs shape ({n}, 3); got {given.shape}")
+        return self.equations.system.local(given).copy()
+
+    def _speed(self, time: float, h: float = 1e-6) -> Array:
+        """Return the velocity of what is prescribed, by differences where it changes."""
+        if not self.equations.model.movements:
+            return np.zeros(self.equations.size)
+        return (self.equations.prescribed(time + h) - self.equations.prescribed(time)) / h
+
+    def _initial_acceleration(self) -> Array:
+        """Return M^-1 (f - C v - K u) where nothing is prescribed."""
+        e = self.equations
+        force = e.load(0.0) - e.times_damping(self.v, 0.0) - e.times_stiffness(self.u, 0.0)
+        return e.solver(0.0, 1.0, 0.0, 0.0)(force, np.zeros(e.size))
+
+    # ---- marching ------------------------------------------------------------------------------------------
+
+    def march(
+        self,
+        dt: float,
+        steps: int,
+        *,
+        every: int = 1,
+        until: Callable[[Moment], bool] | None = None,
+    ) -> Iterator[Moment]:
+        """Advance and yield moments.
+
+        Parameters
+        ----------
+        dt : step in s, > 0.
+        steps : number of steps.
+        every : a moment is yielded after so many steps, and after the last.
+        until : function of a moment; the march ends when it is true.
+
+        Raises
+        ------
+        InputError
+            A number is wrong, or the step is beyond the stability of central differences.
+        SolveError
+            The matrix of a step is singular, or the motion is no longer finite.
+        """
+        h = finite(dt, "a step")
+        if h.ndim or not h > 0:
+            raise InputError(f"a step must be one number of seconds > 0; got {dt}")
+        for name, count in (("steps", steps), ("every", every)):
+            if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+                raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+        advance = self._explicit if isinstance(self.scheme, CentralDifference) else self._implicit
+        if isinstance(self.scheme, CentralDifference):
+            self._check_stable(float(h))
+        return self._moments(advance, float(h), int(steps), int(every), until)
+
+    def _moments(
+        self,
+        advance: Callable[[float], None],
+        h: float,
+        steps: int,
+        every: int,
+        until: Callable[[Moment], bool] | None,
+    ) -> Iterator[Moment]:
+        for done in range(1, steps + 1):
+            with one_thread():
+                advance(h)
+            self.time += h  # one after the other, so that a restart comes to the same times
+            self.step += 1
+            if done % every and done < steps:
+                continue
+            if not np.isfinite(self.u).all():
+                raise SolveError(f"the motion is no longer finite at t = {self.time:g} s: it is not stable")
+            if self.progress:
+                self.progress("march", done / steps)
+            moment = self.moment()
+            yield moment
+            if until and until(moment):
+                return
+
+    def _implicit(self, h: float) -> None:
+        """Take a step of the generalised-α method, for the increment of the displacement."""
+        s, e = self.scheme, self.equations
+        assert isinstance(s, Implicit)
+        end, f = self.time + h, 1 - s.alpha_f
+        a_old = self.v / (s.beta * h) + (1 / (2 * s.beta) - 1) * self.a  # minus a⁺ for Δu = 0
+        v_new = (1 - s.gamma / s.beta) * self.v + h * (1 - s.gamma / (2 * s.beta)) * self.a
+        middle = self.time + f * h
+        force = e.load(middle)
+        force = force - e.times_stiffness(self.u, end)
+        force -= e.times_damping(f * v_new + s.alpha_f * self.v, end)
+        force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * self.a)
+        solve = e.solver(end, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
+        change = np.where(self._held, e.prescribed(end) - self.u, 0.0)
+        du = solve(force, self._prescribed_change(change, end))
+        self.u = self.u + du
+        self.a = du / (s.beta * h * h) - a_old
+        self.v = s.gamma / (s.beta * h) * du + v_new
+
+    def _prescribed_change(self, change: Array, end: float) -> Array:
+        """Return the change of what is prescribed; with constraints, of all that follows from it."""
+        reduced = self.equations.system.reduced
+        if reduced.T is None:
+            return change
+        c = self.equations.prescribed(end)
+        return np.asarray(c - (self.u - reduced.T @ self.u[reduced.free]))
+
+    def _explicit(self, h: float) -> None:
+        """Take a step of central differences; damping sees the velocity half a step before the end."""
+        e, held = self.equations, self._held
+        half = self.v + h / 2 * self.a
+        u = self.u + h * half
+        start = self.u
+        u[held] = e.prescribed(self.time + h)[held]
+        force = e.load(self.time + h) - e.times_damping(half, self.time) - e.times_stiffness(u, self.time)
+        a = e.mass.solve(force)
+        a[held] = 0.0
+        self.v = half + h / 2 * a
+        self.v[held] = (u[held] - start[held]) / h
+        self.u, self.a = u, a
+
+    def _check_stable(self, h: float) -> None:
+        e = self.equations
+        omega = highest_frequency(e.system.points, e.system.batches, lumped=True)
+        alpha, beta = e.rayleigh
+        xi = alpha / (2 * omega) + beta * omega / 2
+        critical = 2 / omega * (np.sqrt(1 + xi * xi) - xi)
+        if h > critical * (1 + 1e-9):
+            raise InputError(
+                f"central differences are not stable with steps of {h:g} s: the critical step is "
+                f"{critical:.4g} s; take a shorter step or newmark()"
+            )
+
+    # ---- what is known at the time ---------------------------------------------------------------------------
+
+    def moment(self) -> Moment:
+        """Return the model as it is now."""
+        system = self.equations.system
+        u, v, a = (system.whole(x).copy() for x in (self.u, self.v, self.a))
+        return Moment(self.time, self.step, u, v, a, self.reactions())
+
+    def put(self, moment: Moment) -> None:
+        """Go on from a moment, such as `Moment.load` gives."""
+        n = self.equations.system.n_nodes
+        if moment.u.shape != (n, 3):
+            raise InputError(f"this moment is of {len(moment.u)} nodes; the model has {n}")
+        local = self.equations.system.local
+        self.u, self.v, self.a = (local(x).copy() for x in (moment.u, moment.v, moment.a))
+        self.time, self.step = moment.time, moment.step
+
+    def reactions(self) -> Array:
+        """Return M a + C v + K u - f at fixed nodes, (n, 3) in N; 0 where nothing is fixed."""
+        e = self.equations
+        left = e.times_mass(self.a) + e.times_damping(self.v, self.time)
+        left += e.times_stiffness(self.u, self.time) - e.load(self.time)
+        out = e.system.whole(left).copy()
+        out[~e.model.supports.fixed] = 0.0
+        return out
+
+    def energy(self) -> float:
+        """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping."""
+        e = self.equations
+        kinetic = self.v @ e.times_mass(self.v)
+        return float(kinetic + self.u @ e.times_stiffness(self.u, self.time)) / 2
