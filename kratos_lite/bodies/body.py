@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -37,7 +37,7 @@ BODIES: Registry[type[Body]] = Registry("kind of body")
 
 @dataclass
 class Clock:
-    """Time in s and number of steps; bodies that advance together share one."""
+    """Time in s and number of steps; bodies share one while they advance together."""
 
     time: float = 0.0
     step: int = 0
@@ -197,7 +197,7 @@ class Body(ABC):
 
     @time.setter
     def time(self, value: float) -> None:
-        self.clock.time = value
+        self.clock = replace(self.clock, time=float(value))
 
     @property
     def step(self) -> int:
@@ -206,7 +206,7 @@ class Body(ABC):
 
     @step.setter
     def step(self, value: int) -> None:
-        self.clock.step = value
+        self.clock = replace(self.clock, step=int(value))
 
     # ---- characteristics -------------------------------------------------------------------------
 
