@@ -266,12 +266,15 @@ class Body(ABC):
         constraint.bind(self)
         self.constraints.append(constraint)
 
-    def external_load(self, q: Array | None = None, time: float | None = None) -> Array:
-        """Return the generalised external load (..., dofs) at a configuration and a time in s."""
+    def external_load(
+        self, q: Array | None = None, time: float | None = None, u: Array | None = None
+    ) -> Array:
+        """Return the generalised external load (..., dofs) at a configuration, a time in s and a velocity."""
         q, t = self.q if q is None else q, self.time if time is None else time
+        u = self.u if u is None else u
         total = np.zeros_like(self.u)
         for load in self.loads:
-            total += load(q, self.u, t)
+            total += load(q, u, t)
         return total
 
     def constant_loads(self) -> tuple[Array, Array, Array]:

@@ -84,3 +84,25 @@ def test_part_of_a_group_may_go_on():
 def test_substeps_are_whole_numbers(kind, substeps):
     with pytest.raises(InputError, match="substeps must be a whole number"):
         kl.march(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
+
+
+# ---- loads that depend on the velocity -------------------------------------------------------------
+
+SCHEMES = [(kl.RigidBody, s) for s in kl.RigidBody.schemes] + [
+    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.schemes
+]
+
+
+@pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
+def test_a_damper_is_of_second_order(kind, scheme):
+    """m v̇ = -d v of a body that only slides: v = exp(-d t / m), x = (m/d)(1 - v)."""
+    errors = []
+    for steps in (500, 1000):
+        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, scheme=scheme)
+        d = float(body.mass)
+        body.set_velocity((1, 0, 0))
+        body.add(kl.Spring(body.center, (-9, 0.1, 0.1), stiffness=0, damping=d))
+        march(body, 1 / steps, steps)
+        errors.append(abs(body.mass_center()[0] - 0.1 - (1 - np.exp(-1))))
+    assert errors[1] < 1e-6
+    assert errors[0] / errors[1] == pytest.approx(4, abs=0.2)
