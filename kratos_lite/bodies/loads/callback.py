@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound
 from kratos_lite.bodies.rigid import RigidBody
@@ -23,6 +24,7 @@ class Callback(BodyLoad):
     ----------
     function : takes configuration q, velocity u and time t in s, and returns the generalised force
         (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
+        It is called at the middle of each step, with the old velocity and then with the mean one.
 
     Examples
     --------
@@ -39,7 +41,7 @@ class Callback(BodyLoad):
         """Return the load on a body."""
 
         def generalised(q: Array, u: Array, time: float) -> Array:
-            out = np.asarray(self.function(q, u, time), dtype=float)
+            out = finite(self.function(q, u, time), f"what a callback returns at t = {time:g} s")
             if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
                 R = rotation(q)
                 T = (np.swapaxes(R, -1, -2) @ out[..., 3:6, None])[..., 0] + out[..., 6:]
@@ -49,8 +51,6 @@ class Callback(BodyLoad):
                 raise InputError(
                     f"a callback must return a generalised force of shape {u.shape}{nine}; got {out.shape}"
                 )
-            if not np.isfinite(out).all():
-                raise InputError(f"a callback returned numbers that are not finite at t = {time:g} s")
             return out
 
-        return Bound(generalised, factor, steady)
+        return Bound(generalised, factor, steady, follows_velocity=True)
