@@ -24,7 +24,8 @@ class Callback(BodyLoad):
     ----------
     function : takes configuration q, velocity u and time t in s, and returns the generalised force
         (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
-        It is called at the middle of each step, with the old velocity and then with the mean one.
+    of_velocity : whether it depends on u; then each step is taken twice, with the old velocity and with the
+        mean of old and new.
 
     Examples
     --------
@@ -32,10 +33,12 @@ class Callback(BodyLoad):
     >>> top = Callback(lambda q, u, t: np.r_[0, 0, 0, -20 * np.cross(q[6:9], [0, 0, 1]), 0, 0, 0])
     """
 
-    def __init__(self, function: Callable[[Array, Array, float], ArrayLike]) -> None:
+    def __init__(
+        self, function: Callable[[Array, Array, float], ArrayLike], *, of_velocity: bool = True
+    ) -> None:
         if not callable(function):
             raise InputError(f"a callback is a function of q, u and t; got {function!r}")
-        self.function = function
+        self.function, self.of_velocity = function, bool(of_velocity)
 
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body."""
@@ -53,4 +56,4 @@ class Callback(BodyLoad):
                 )
             return out
 
-        return Bound(generalised, factor, steady, follows_velocity=True)
+        return Bound(generalised, factor, steady, follows_velocity=self.of_velocity)
