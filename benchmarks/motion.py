@@ -53,7 +53,10 @@ def heavy_top(scheme: str) -> Callable[[Any], Any]:
         body = kl.RigidBody(characteristics=top, scheme=scheme)
         body.u[:3] = 0.0, 0.0, 50.0
         body.turn([[1, 0, 0], [0, np.cos(0.05), -np.sin(0.05)], [0, np.sin(0.05), np.cos(0.05)]])
-        body.add(kl.Callback(lambda q, u, t: np.array([0, 0, 0, -20 * q[7], 20 * q[6], 0, 0, 0, 0.0])))
+        torque = kl.Callback(
+            lambda q, u, t: np.array([0, 0, 0, -20 * q[7], 20 * q[6], 0, 0, 0, 0.0]), of_velocity=False
+        )
+        body.add(torque)
         return body
 
     return make

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -37,7 +37,7 @@ BODIES: Registry[type[Body]] = Registry("kind of body")
 
 @dataclass
 class Clock:
-    """Time in s and number of steps; bodies that advance together share one."""
+    """Time in s and number of steps; bodies share one while they advance together."""
 
     time: float = 0.0
     step: int = 0
@@ -197,7 +197,7 @@ class Body(ABC):
 
     @time.setter
     def time(self, value: float) -> None:
-        self.clock.time = value
+        self.clock = replace(self.clock, time=float(value))
 
     @property
     def step(self) -> int:
@@ -206,7 +206,7 @@ class Body(ABC):
 
     @step.setter
     def step(self, value: int) -> None:
-        self.clock.step = value
+        self.clock = replace(self.clock, step=int(value))
 
     # ---- characteristics -------------------------------------------------------------------------
 
@@ -266,12 +266,15 @@ class Body(ABC):
         constraint.bind(self)
         self.constraints.append(constraint)
 
-    def external_load(self, q: Array | None = None, time: float | None = None) -> Array:
-        """Return the generalised external load (..., dofs) at a configuration and a time in s."""
+    def external_load(
+        self, q: Array | None = None, time: float | None = None, u: Array | None = None
+    ) -> Array:
+        """Return the generalised external load (..., dofs) at a configuration, a time in s and a velocity."""
         q, t = self.q if q is None else q, self.time if time is None else time
+        u = self.u if u is None else u
         total = np.zeros_like(self.u)
         for load in self.loads:
-            total += load(q, self.u, t)
+            total += load(q, u, t)
         return total
 
     def constant_loads(self) -> tuple[Array, Array, Array]:

@@ -39,5 +39,9 @@ class Deformable(Body):
         """Return an upper bound of the angular frequencies at the configuration, in rad/s."""
 
     def critical_step(self) -> float:
-        """Return the largest step in s with which ``DEF_EXP`` is stable: 2/ω of `highest_frequency`."""
-        return 2.0 / self.highest_frequency()
+        """Return the largest step in s with which ``DEF_EXP`` is stable: 2/ω, and less with damping.
+
+        The damping force is that of the old velocity, so that h²ω²/2 + h η ω² must not exceed 2.
+        """
+        h = 2.0 / self.highest_frequency()
+        return float(h * h / (np.hypot(h, self.damping) + self.damping))

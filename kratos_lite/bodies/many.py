@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.body import Body, Clock
 from kratos_lite.bodies.loads import Bound
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
@@ -59,7 +59,7 @@ def together(bodies: Sequence[Body]) -> Body:
         RigidBody.__init__(
             whole, characteristics=characteristics, scheme=first.scheme, tolerance=first.tolerance
         )
-    whole.clock = first.clock
+    whole.clock = Clock(first.time, first.step)
     whole.external_work = np.array([body.external_work for body in members])
     for row, body in enumerate(members):
         whole.q[row], whole.u[row] = body.q, body.u

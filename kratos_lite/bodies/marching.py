@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -81,11 +82,11 @@ def march(
     >>> [round(float(state.q[11]), 9) for state in states]
     [-1.2, -4.95]
     """
-    one = body if isinstance(body, Body) else together(body)
     h = _positive(dt)
     for name, count in (("steps", steps), ("every", every)):
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
             raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+    one = _alone(body) if isinstance(body, Body) else together(body)
     return _states(one, h, int(steps), int(every), _divided(one, h, substeps), until, progress)
 
 
@@ -109,6 +110,12 @@ def _states(
         yield state
         if until and until(state):
             return
+
+
+def _alone(body: Body) -> Body:
+    """Return a body with a clock of its own, though it may have advanced together with others before."""
+    body.clock = replace(body.clock)
+    return body
 
 
 def _positive(dt: float) -> float:
@@ -157,8 +164,8 @@ def _advance(body: Body, h: float, count: int, parts: int) -> None:
         for _ in range(count):
             if not compiled:
                 _step(body, h / parts, parts)
-            body.time += h  # one after the other, so that a restart comes to the same times
-            body.step += 1
+            body.clock.time += h  # one after the other, so that a restart comes to the same times
+            body.clock.step += 1
     if body.scheme == "DEF_EXP" and isinstance(body, Deformable):
         _check_still_stable(body, h / parts, count)
     if not compiled and not np.isfinite(body.u).all():
@@ -172,13 +179,13 @@ def _step(body: Body, h: float, parts: int) -> None:
     """Take one step in so many parts of h s."""
     start = body.time
     for part in range(parts):
-        body.time = start + part * h
+        body.clock.time = start + part * h
         before = body.u
         load = take_step(body, h)
         body.external_work += h / 2 * ((before + body.u) * load).sum(axis=-1)
         if isinstance(body, FiniteElementBody):
             body.q, body.u = body.form.project(body.q, body.u)
-    body.time = start
+    body.clock.time = start
 
 
 def _check_still_stable(body: Deformable, h: float, count: int) -> None:

@@ -30,10 +30,10 @@ SLOW = 0.2
 """Rate of an iteration with old factors above which new ones are made."""
 
 
-def rigid_step(body: RigidBody, h: float) -> Array:
-    """Advance a rigid body by h s; return the generalised load at the middle."""
+def rigid_step(body: RigidBody, h: float, v: Array) -> Array:
+    """Advance a rigid body by h s, loaded as by the velocity v; return the generalised load at the middle."""
     qh = steps.rigid_half(body.q, body.u, h)
-    load = body.external_load(qh, body.time + h / 2)
+    load = body.external_load(qh, body.time + h / 2, v)
 
     def advance(extra: Array) -> Step:
         q, u = body.q.copy(), body.u.copy()
@@ -43,10 +43,10 @@ def rigid_step(body: RigidBody, h: float) -> Array:
     return close(body, h, qh, advance, lambda: body.apart)
 
 
-def pseudo_rigid_step(body: PseudoRigidBody, h: float) -> Array:
-    """Advance a pseudo-rigid body by h s; return the generalised load at the middle."""
+def pseudo_rigid_step(body: PseudoRigidBody, h: float, v: Array) -> Array:
+    """Advance a pseudo-rigid body by h s; see `rigid_step`."""
     qh = body.q + h / 2 * body.u
-    load = body.external_load(qh, body.time + h / 2)
+    load = body.external_load(qh, body.time + h / 2, v)
     c = 0.0 if body.scheme == "DEF_EXP" else body.damping * h / 2 + h * h / 4
 
     def advance(extra: Array) -> Step:
@@ -57,19 +57,19 @@ def pseudo_rigid_step(body: PseudoRigidBody, h: float) -> Array:
     return close(body, h, qh, advance, lambda: body.solver(qh, c))
 
 
-def explicit_step(body: FiniteElementBody, h: float) -> Array:
-    """Advance by ``DEF_EXP``: the kick takes the mass matrix alone; return the load at the middle."""
-    return _kick(body, h, body.q + h / 2 * body.u, body.mass_solver())
+def explicit_step(body: FiniteElementBody, h: float, v: Array) -> Array:
+    """Advance by ``DEF_EXP``: the kick takes the mass matrix alone; see `rigid_step`."""
+    return _kick(body, h, v, body.q + h / 2 * body.u, body.mass_solver())
 
 
-def linearly_implicit_step(body: FiniteElementBody, h: float) -> Array:
-    """Advance by ``DEF_LIM``: M + (η h/2 + h²/4) K at the middle; return the load there."""
+def linearly_implicit_step(body: FiniteElementBody, h: float, v: Array) -> Array:
+    """Advance by ``DEF_LIM``: M + (η h/2 + h²/4) K at the middle; see `rigid_step`."""
     qh = body.q + h / 2 * body.u
-    return _kick(body, h, qh, body.solver(qh, body.damping * h / 2 + h * h / 4))
+    return _kick(body, h, v, qh, body.solver(qh, body.damping * h / 2 + h * h / 4))
 
 
-def _kick(body: FiniteElementBody, h: float, qh: Array, solve: Solve) -> Array:
-    load = body.external_load(qh, body.time + h / 2)
+def _kick(body: FiniteElementBody, h: float, v: Array, qh: Array, solve: Solve) -> Array:
+    load = body.external_load(qh, body.time + h / 2, v)
     force = load - body.internal_load(qh)
     if body.damping:
         force -= body.damping * body.damping_load(qh, body.u)
@@ -81,8 +81,8 @@ def _kick(body: FiniteElementBody, h: float, qh: Array, solve: Solve) -> Array:
     return close(body, h, qh, advance, lambda: solve)
 
 
-def energy_momentum_step(body: FiniteElementBody, h: float) -> Array:
-    """Advance by ``ENERGY_MOMENTUM``; return the external load at the middle.
+def energy_momentum_step(body: FiniteElementBody, h: float, v: Array) -> Array:
+    """Advance by ``ENERGY_MOMENTUM``; see `rigid_step`.
 
     M (u⁺ - u) / h + f(q, dq) = f_ext at q + dq/2, with dq = h/2 (u + u⁺).
     """
@@ -90,19 +90,21 @@ def energy_momentum_step(body: FiniteElementBody, h: float) -> Array:
     solve = body.solver(middle, h * h / 4 * (1 + 2 * body.damping / h))
 
     def advance(extra: Array) -> Step:
-        u, load = _balanced(body, h, extra, solve)
+        u, load = _balanced(body, h, v, extra, solve)
         return Step(body.q + h / 2 * (body.u + u), u, load)
 
     return close(body, h, middle, advance, lambda: solve)
 
 
-def _balanced(body: FiniteElementBody, h: float, extra: Array, solve: Solve) -> tuple[Array, Array]:
+def _balanced(
+    body: FiniteElementBody, h: float, loading: Array, extra: Array, solve: Solve
+) -> tuple[Array, Array]:
     """Return the velocity at the end and the load at the middle, by Newton with factors kept a while."""
     q, u, ratio = body.q, body.u, body.damping / h
     v, last = u.copy(), np.inf
     for _ in range(NEWTON_MAX):
         dq = h / 2 * (u + v)
-        load = body.external_load(q + dq / 2, body.time + h / 2)
+        load = body.external_load(q + dq / 2, body.time + h / 2, loading)
         force = load + extra - body.load_over(q, dq, ratio)
         step = solve(h * force - body.times_mass(v - u))
         size, scale = float(np.abs(step).max()), float(np.abs(v).max())
@@ -124,16 +126,31 @@ def _balanced(body: FiniteElementBody, h: float, extra: Array, solve: Solve) -> 
 
 
 def take_step(body: Body, h: float) -> Array:
-    """Advance a body by h s with its scheme; return the load on it, reactions included, at the middle."""
+    """Advance a body by h s with its scheme; return the load on it, reactions included, at the middle.
+
+    Loads that depend on the velocity see the old one first; then the step is taken again with the mean of
+    old and new, so that they too are of second order.
+    """
+    q, u = body.q, body.u
+    load = _loaded_by(body, h, u)
+    if any(load.follows_velocity for load in body.loads):
+        mean = (u + body.u) / 2
+        body.q, body.u = q, u
+        load = _loaded_by(body, h, mean)
+    return load
+
+
+def _loaded_by(body: Body, h: float, v: Array) -> Array:
+    """Take the step with loads as they are at the velocity v."""
     if isinstance(body, RigidBody):
-        return rigid_step(body, h)
+        return rigid_step(body, h, v)
     if isinstance(body, PseudoRigidBody):
-        return pseudo_rigid_step(body, h)
+        return pseudo_rigid_step(body, h, v)
     assert isinstance(body, FiniteElementBody)
-    return FINITE_ELEMENT_SCHEMES[body.scheme](body, h)
+    return FINITE_ELEMENT_SCHEMES[body.scheme](body, h, v)
 
 
-FINITE_ELEMENT_SCHEMES: dict[str, Callable[[FiniteElementBody, float], Array]] = {
+FINITE_ELEMENT_SCHEMES: dict[str, Callable[[FiniteElementBody, float, Array], Array]] = {
     "DEF_EXP": explicit_step,
     "DEF_LIM": linearly_implicit_step,
     "ENERGY_MOMENTUM": energy_momentum_step,

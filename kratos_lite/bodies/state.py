@@ -92,9 +92,10 @@ def at(body: Body, state: State) -> Iterator[None]:
     if state.time == body.time and np.array_equal(state.q, body.q) and np.array_equal(state.u, body.u):
         yield
         return
-    kept = State.of(body)
+    kept, clock = State.of(body), body.clock
     state.put_into(body)
     try:
         yield
     finally:
         kept.put_into(body)
+        body.clock = clock

@@ -206,7 +206,11 @@ def test_a_point_outside_of_elements():
         (lambda: kl.Force((0, 0, 0), (1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'convected'"),
         (lambda: kl.Torque((1, 0, 0), frame="body"), kl.InputError, "'spatial' or 'convected'"),
         (lambda: kl.Torque((1, NAN, 0)), kl.InputError, "a torque must be finite"),
-        (lambda: kl.Spring((0, 0, 0), (1, 1, 1), -5.0), kl.InputError, "stiffness of a spring must be ≥ 0"),
+        (
+            lambda: kl.Spring((0, 0, 0), (1, 1, 1), -5.0),
+            kl.InputError,
+            "stiffness of a spring must be one number ≥ 0",
+        ),
         (lambda: kl.Spring((0, 0, 0), (1, 1, 1), 5.0, damping=-1), kl.InputError, "damping of a spring"),
         (lambda: kl.Spring((9, 0, 0), (1, 1, 1), 5.0), kl.MeshError, "outside the mesh"),
         (lambda: kl.FollowerPressure("lid", 5.0), kl.KratosLiteError, "lid"),
@@ -250,7 +254,7 @@ def test_a_load_on_faces_of_a_body_without_a_mesh(load, refused):
     ("function", "words"),
     [
         (lambda q, u, t: np.zeros(5), "a callback must return a generalised force of shape"),
-        (lambda q, u, t: np.full_like(u, NAN), "a callback returned numbers that are not finite at t = "),
+        (lambda q, u, t: np.full_like(u, NAN), "what a callback returns at t = .* must be finite"),
     ],
 )
 def test_callbacks_that_return_nonsense(kind, function, words, refused):

@@ -42,6 +42,7 @@ class Bound:
     acceleration : (3,) m/s² if the load is gravity, alike everywhere.
     spatial, convected : generalised force (..., dofs) fixed in space, or in a rigid body, if that is all.
     potential_energy : of a conservative load for the factor 1, (...) in J.
+    follows_velocity : whether it may depend on the velocity.
     """
 
     generalised: Generalised
@@ -51,6 +52,7 @@ class Bound:
     spatial: Array | None = None
     convected: Array | None = None
     potential_energy: Callable[[Array], Array] = no_potential
+    follows_velocity: bool = False
 
     @classmethod
     def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> Bound:

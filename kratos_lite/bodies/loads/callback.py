@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound
 from kratos_lite.bodies.rigid import RigidBody
@@ -23,6 +24,8 @@ class Callback(BodyLoad):
     ----------
     function : takes configuration q, velocity u and time t in s, and returns the generalised force
         (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
+    of_velocity : whether it depends on u; then each step is taken twice, with the old velocity and with the
+        mean of old and new.
 
     Examples
     --------
@@ -30,16 +33,18 @@ class Callback(BodyLoad):
     >>> top = Callback(lambda q, u, t: np.r_[0, 0, 0, -20 * np.cross(q[6:9], [0, 0, 1]), 0, 0, 0])
     """
 
-    def __init__(self, function: Callable[[Array, Array, float], ArrayLike]) -> None:
+    def __init__(
+        self, function: Callable[[Array, Array, float], ArrayLike], *, of_velocity: bool = True
+    ) -> None:
         if not callable(function):
             raise InputError(f"a callback is a function of q, u and t; got {function!r}")
-        self.function = function
+        self.function, self.of_velocity = function, bool(of_velocity)
 
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body."""
 
         def generalised(q: Array, u: Array, time: float) -> Array:
-            out = np.asarray(self.function(q, u, time), dtype=float)
+            out = finite(self.function(q, u, time), f"what a callback returns at t = {time:g} s")
             if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
                 R = rotation(q)
                 T = (np.swapaxes(R, -1, -2) @ out[..., 3:6, None])[..., 0] + out[..., 6:]
@@ -49,8 +54,6 @@ class Callback(BodyLoad):
                 raise InputError(
                     f"a callback must return a generalised force of shape {u.shape}{nine}; got {out.shape}"
                 )
-            if not np.isfinite(out).all():
-                raise InputError(f"a callback returned numbers that are not finite at t = {time:g} s")
             return out
 
-        return Bound(generalised, factor, steady)
+        return Bound(generalised, factor, steady, follows_velocity=self.of_velocity)

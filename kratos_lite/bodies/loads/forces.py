@@ -103,11 +103,9 @@ class Spring(BodyLoad):
         length: float | None = None,
     ) -> None:
         self.point, self.anchor = one_point(point), one_point(anchor)
-        self.stiffness, self.damping, self.length = stiffness, damping, length
-        if not callable(stiffness) and float(finite(stiffness, "the stiffness of a spring")) < 0:
-            raise InputError(f"the stiffness of a spring must be ≥ 0 N/m; got {stiffness}")
-        if float(finite(damping, "the damping of a spring")) < 0:
-            raise InputError(f"the damping of a spring must be ≥ 0 N s/m; got {damping}")
+        self.stiffness = stiffness if callable(stiffness) else _not_negative(stiffness, "stiffness", "N/m")
+        self.damping = _not_negative(damping, "damping", "N s/m")
+        self.length = None if length is None else _not_negative(length, "length", "m")
 
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
@@ -131,9 +129,17 @@ class Spring(BodyLoad):
             stretch = np.linalg.norm(body.position(X, q) - anchor, axis=-1) - L
             return np.asarray(self.stiffness * stretch**2 / 2)
 
-        return Bound(generalised, factor, steady, potential_energy=potential)
+        damped = callable(self.stiffness) or self.damping > 0
+        return Bound(generalised, factor, steady, potential_energy=potential, follows_velocity=damped)
 
     def _pull(self, elongation: float, rate: float) -> float:
         if callable(self.stiffness):
             return float(self.stiffness(elongation, rate))
         return self.stiffness * elongation + self.damping * rate
+
+
+def _not_negative(value: float, what: str, unit: str) -> float:
+    number = finite(value, f"the {what} of a spring")
+    if number.ndim or number < 0:
+        raise InputError(f"the {what} of a spring must be one number ≥ 0 {unit}; got {value}")
+    return float(number)

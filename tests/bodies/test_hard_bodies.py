@@ -1,0 +1,108 @@
+"""Bodies where mistakes would go unseen: strong damping, clocks, loads on velocities, wrong input."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError
+
+KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
+SOFT = (
+    (kl.PseudoRigidBody, {}),
+    (kl.FiniteElementBody, {}),
+    (kl.FiniteElementBody, {"lumped": True}),
+    (kl.FiniteElementBody, {"form": "BC"}),
+    (kl.FiniteElementBody, {"form": "BC-MODAL"}),
+)
+RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
+each_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def march(body, dt, steps, **options):
+    """Return the last state."""
+    *_, last = kl.march(body, dt, steps, every=steps, **options)
+    return last
+
+
+# ---- explicit steps with damping -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("damping", [1e-3, 2e-2])
+@pytest.mark.parametrize(("kind", "options"), SOFT)
+def test_automatic_steps_are_stable_with_damping(kind, options, damping):
+    body = kind(kl.box(), RUBBER, scheme="DEF_EXP", damping=damping, **options)
+    body.u += 1e-3 * np.random.default_rng(0).normal(size=body.u.shape)
+    start = body.energy()
+    march(body, 0.1, 10, substeps="auto")
+    assert body.energy() < start
+
+
+def test_the_critical_step_with_damping_is_sharp():
+    """The highest mode of a pseudo-rigid cube, shorter and longer than h²ω²/2 + h η ω² = 2."""
+    ends = {}
+    for share in (0.99, 1.02):
+        body = kl.PseudoRigidBody(kl.box(), RUBBER, scheme="DEF_EXP", damping=0.01)
+        h, omega = body.critical_step(), body.highest_frequency()
+        assert h**2 * omega**2 / 2 + h * 0.01 * omega**2 == pytest.approx(2, rel=1e-12)
+        body.u[[0, 4, 8]] = 1e-9  # breathing
+        for _ in range(200):
+            half = body.q + share * h / 2 * body.u
+            force = -body.internal_load(half)
+            force[:9] -= 0.01 * body.stiffness(half) @ body.u[:9]
+            kick = np.concatenate([np.linalg.solve(body.mass_matrix(), force[:9]), np.zeros(3)])
+            body.u = body.u + share * h * kick
+            body.q = half + share * h / 2 * body.u
+        ends[share] = np.abs(body.u[:9]).max()
+    assert ends[0.99] < 1e-9 < 1e-8 < ends[1.02]
+
+
+# ---- clocks ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS[:2])
+def test_bodies_that_advanced_together_have_clocks_of_their_own(kind):
+    one, two = (kind(kl.box(), RUBBER) for _ in range(2))
+    march([one, two], 0.1, 3)
+    assert (one.step, two.step) == (3, 3)
+    march(one, 0.1, 2)
+    assert (one.step, two.step) == (5, 3)
+    assert two.time == pytest.approx(0.3)
+    kl.State.of(one).put_into(two)
+    one.time = 7.0
+    assert two.time == pytest.approx(0.5)
+
+
+def test_part_of_a_group_may_go_on():
+    bodies = [kl.RigidBody(kl.box(), RUBBER) for _ in range(3)]
+    march(bodies, 0.1, 3)
+    march(bodies[:2], 0.1, 2)
+    assert [body.step for body in bodies] == [5, 5, 3]
+
+
+@each_kind
+@pytest.mark.parametrize("substeps", [1.5, 0, None, float("nan"), float("inf"), [1], "some", True])
+def test_substeps_are_whole_numbers(kind, substeps):
+    with pytest.raises(InputError, match="substeps must be a whole number"):
+        kl.march(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
+
+
+# ---- loads that depend on the velocity -------------------------------------------------------------
+
+SCHEMES = [(kl.RigidBody, s) for s in kl.RigidBody.schemes] + [
+    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.schemes
+]
+
+
+@pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
+def test_a_damper_is_of_second_order(kind, scheme):
+    """m v̇ = -d v of a body that only slides: v = exp(-d t / m), x = (m/d)(1 - v)."""
+    errors = []
+    for steps in (500, 1000):
+        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, scheme=scheme)
+        d = float(body.mass)
+        body.set_velocity((1, 0, 0))
+        body.add(kl.Spring(body.center, (-9, 0.1, 0.1), stiffness=0, damping=d))
+        march(body, 1 / steps, steps)
+        errors.append(abs(body.mass_center()[0] - 0.1 - (1 - np.exp(-1))))
+    assert errors[1] < 1e-6
+    assert errors[0] / errors[1] == pytest.approx(4, abs=0.2)
