@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite import checks, mobility
+from kratos_lite.ale.guards import attach
+from kratos_lite.ale.motion import Motion
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import PatternCache, Progress
 from kratos_lite.batches import Batch
@@ -20,9 +22,13 @@ from kratos_lite.mesh import Mesh, Where, WhereElements
 from kratos_lite.quadrature import Rule
 from kratos_lite.result import Result
 from kratos_lite.statics import StaticSystem, solve_static
-from kratos_lite.supports import AXES, Link, Supports, rigid_modes
+from kratos_lite.supports import AXES, Link, Supports, axis_numbers, rigid_modes
+
+if TYPE_CHECKING:
+    from kratos_lite.dynamics import Transient
 
 Array = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 class Model:
@@ -53,6 +59,8 @@ class Model:
         self.mesh = mesh
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
+        self.motion: Motion | None = None
+        self.movements: list[tuple[NDArray[np.int64], int, Callable[[float], float]]] = []
         self.patterns = PatternCache()
         self.notes: list[str] = []
         self.initial_displacement: Array | None = None
@@ -85,14 +93,22 @@ class Model:
         self._rules[number] = rule
         self._rule_of[self.mesh.elements(where)] = number
 
-    def fix(self, where: Where, axes: str = "xyz", value: ArrayLike = 0.0, *, override: bool = False) -> None:
+    def fix(
+        self,
+        where: Where,
+        axes: str = "xyz",
+        value: ArrayLike | Callable[[float], float] = 0.0,
+        *,
+        override: bool = False,
+    ) -> None:
         """Prescribe the displacement of nodes.
 
         Parameters
         ----------
         where : part name, predicate on the points (n, 3), mask or node rows.
         axes : some of ``"x"``, ``"y"``, ``"z"``, e.g. ``"xz"``.
-        value : m; one number, one per axis, or one row per node.
+        value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of the time in
+            s for transients, which statics take at the time 0.
         override : let this value win over an earlier one for the same degree of freedom.
 
         Raises
@@ -104,7 +120,12 @@ class Model:
         if not len(rows):
             what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
             raise ModelError(f"cannot fix {axes}: {what}")
-        self.supports.fix(rows, axes, value, override)
+        if callable(value):
+            start = float(finite(value(0.0), "a prescribed displacement"))
+            self.supports.fix(rows, axes, start, override)
+            self.movements += [(rows, axis, value) for axis in axis_numbers(axes)]
+        else:
+            self.supports.fix(rows, axes, value, override)
 
     def link(
         self,
@@ -130,11 +151,21 @@ class Model:
         offset = float(finite(constant, "the constant of a constraint"))
         self.supports.link([Link(dof(slave), tuple(map(dof, masters)), tuple(weights), offset)])
 
-    def add(self, load: Load) -> None:
-        """Add a load; loads add up."""
+    def add(self, load: Load | Motion) -> None:
+        """Add a load (loads add up), or the motion of the material through the mesh (there is one)."""
+        if isinstance(load, Motion):
+            self._move(load)
+            return
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         self.loads.append(load)
+
+    def _move(self, motion: Motion) -> None:
+        """Take over a motion, and what the ends of a window do."""
+        if self.motion is not None:
+            raise ModelError("the model has a motion already; there is one")
+        attach(motion, self)
+        self.motion = motion
 
     def stress_free_at(self, displacement: ArrayLike) -> None:
         """Make the body stress-free at a displacement u0 (n, 3) in m: strain comes from u - u0."""
@@ -196,10 +227,11 @@ class Model:
         """
         return self.checked()[2]
 
-    def checked(self) -> tuple[list[Batch], NDArray[np.int64], list[str]]:
+    def checked(self, *, free: bool = False) -> tuple[list[Batch], NDArray[np.int64], list[str]]:
         """Return the batches, the part of each node and the warnings of a model that passes all checks.
 
         Parts are numbered from 0; they neither share nodes nor constraints.  Nodes without elements have -1.
+        Where rigid motions may be `free`, as inertia holds what supports do not, all nodes are of one part.
         """
         mesh = self.mesh
         warnings = self.check_geometry()
@@ -213,6 +245,8 @@ class Model:
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
+        if free:
+            return batches, np.where(used, 0, -1), warnings
         bodies = mobility.bodies(mesh, faces)
         return batches, mobility.check_supports(mesh, self.supports, bodies), warnings
 
@@ -239,6 +273,10 @@ class Model:
         SolveError
             If the accuracy asked for cannot be reached.
         """
+        if self.motion is not None:
+            from kratos_lite.dynamics.steady import solve_steady
+
+            return solve_steady(self, tolerance, progress)
         return solve_static(self, solver, tolerance, progress)
 
     def system(
@@ -271,6 +309,42 @@ class Model:
         Returns the result of each case by its name; other arguments and errors as for `solve`.
         """
         return StaticSystem(self, solver, tolerance, progress).solve_cases(cases)
+
+    # ---- in time -----------------------------------------------------------------------------------
+
+    def transient(self, **options: Any) -> Transient:
+        """Return the model ready to move in time; options as of `kratos_lite.Transient`.
+
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Gravity((0, 0, -9.81)))
+        >>> moments = list(bar.transient().march(dt=1e-3, steps=10, every=5))
+        >>> [round(moment.time, 6) for moment in moments]
+        [0.005, 0.01]
+        """
+        from kratos_lite.dynamics import Transient
+
+        return Transient(self, **options)
+
+    def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
+        """Return natural frequencies (count,) in rad/s, ascending, and shapes (count, n, 3).
+
+        Supports hold what they hold, at zero.  With a motion of the material these are not the frequencies of
+        waves; see `complex_modes`.
+        """
+        from kratos_lite.dynamics.modal import natural_modes
+
+        return natural_modes(self, count, lumped)
+
+    def complex_modes(self, count: int = 6) -> tuple[Complexes, Complexes]:
+        """Return eigenvalues λ (count,) in 1/s of λ² M + λ C + K, nearest to 0 first, and their shapes.
+
+        C and K hold what the motion of the material adds at the time 0; shapes are (count, n, 3), complex.
+        """
+        from kratos_lite.dynamics.modal import complex_modes
+
+        return complex_modes(self, count)
 
     def state(self) -> list[Any]:
         """Return copies of all that matters to the equations of the model, but for prescribed values."""

@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 def exact_rule(shape: type[Shape]) -> Rule:
     """Return the rule that integrates (c·grad N_i)(c·grad N_j), c linear, over affine cells.
 
-    In each direction of a product c has degree 1 and grad N that of the shape; over a tetrahedron grad N has one
-    less.
+    In each direction of a product c has degree 1 and grad N that of the shape; over a tetrahedron grad N has
+    one less.
     """
     return rule_for(shape.cell, 2 * (shape.degree + (0 if shape.cell == "tetrahedron" else 1)))
 

@@ -1,13 +1,14 @@
-"""Motions in which the mesh does not take part: the rotation of a body of revolution, the passing of a long body.
+"""Motions in which the mesh takes no part: a body of revolution that turns, a long body that passes.
 
-The mesh stands in space while the material moves through it with the velocity rate · c(X), c = A (X - X0) for a
-rotation with A v = v × e, and c = -e for a window that moves with +e along its body.  The material time
+The mesh stands in space while the material moves through it with the velocity rate · c(X): c = A (X - X0) for
+a rotation with A v = v × e, and c = -e for a window that moves with +e along its body.  The material time
 derivative of a displacement is u' + rate (c · grad) u, which adds to M u'' + K u = f
 
-    (2 rate G) u' + (acceleration G - rate² H) u,   G_ij = ∫ ρ N_i c·grad N_j,   H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
+    2 rate G u' + (acceleration G - rate² H) u,
+    G_ij = ∫ ρ N_i c·grad N_j,    H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
 
-Source: GetFEM user documentation, ALE support for objects having a large rigid body motion, with the signs of its
-loads and a factor 2 put right; Nackenhorst, Comput. Methods Appl. Mech. Eng. 193 (2004) 4299-4322.
+Source: GetFEM user documentation, ALE support for objects having a large rigid body motion, with the signs of
+its loads and a factor 2 put right; Nackenhorst, Comput. Methods Appl. Mech. Eng. 193 (2004) 4299-4322.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ class Motion(ABC):
     damping : α in 1/s, mass-proportional damping relative to the rigid motion.
     """
 
-    def __init__(self, direction: ArrayLike | str, rate: Factor, acceleration: Factor, damping: float) -> None:
+    def __init__(
+        self, direction: ArrayLike | str, rate: Factor, acceleration: Factor, damping: float
+    ) -> None:
         self.direction = _unit(direction)
         self.rate = function_of(rate, "a rate")
         self.acceleration = function_of(acceleration, "an acceleration")
@@ -52,7 +55,7 @@ class Motion(ABC):
 
     @abstractmethod
     def field(self, X: Array) -> Array:
-        """Return the velocity c of the material through the mesh for the rate 1, (..., 3) at points X (..., 3)."""
+        """Return the velocity c of the material through the mesh for the rate 1 at points X (..., 3)."""
 
 
 class Rotation(Motion):
@@ -143,5 +146,3 @@ def _unit(direction: ArrayLike | str) -> Array:
     if v.shape != (3,) or length == 0:
         raise InputError(f"an axis needs three components, not all 0; got {direction!r}")
     return np.asarray(v / length)
-
-

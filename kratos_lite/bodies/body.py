@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from kratos_lite.bodies.constraints import Constraint
     from kratos_lite.bodies.given import Material
     from kratos_lite.bodies.loads import BodyLoad, Bound
-    from kratos_lite.series import Factor
     from kratos_lite.loads import Load
+    from kratos_lite.series import Factor
 
 Array = NDArray[np.float64]
 Gauge: TypeAlias = Callable[[Array], Array]

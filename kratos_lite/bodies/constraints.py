@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.given import points_of, vector_of
 from kratos_lite.bodies.loads import one_point
-from kratos_lite.series import Factor, function_of, integral_of
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.series import Factor, function_of, integral_of
 
 Array = NDArray[np.float64]
 

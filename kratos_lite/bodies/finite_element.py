@@ -16,9 +16,9 @@ from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.forms import FORMS, Form, Modal
 from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
-from kratos_lite.mass import Mass
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mass import Mass
 from kratos_lite.mesh import Located, Mesh
 from kratos_lite.modes import modes
 from kratos_lite.rotations import check_rotation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -41,6 +42,7 @@ class EquationsOfMotion:
     model : elements with density, supports, loads, and its motion if it has one.
     lumped : whether the mass stands in the nodes.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
+    free : whether supports may leave rigid motions free.
 
     Attributes
     ----------
@@ -58,11 +60,12 @@ class EquationsOfMotion:
         *,
         lumped: bool = False,
         rayleigh: tuple[float, float] = (0.0, 0.0),
+        free: bool = True,
         progress: Progress | None = None,
     ) -> None:
         self.model, self.progress = model, progress
         self.rayleigh = _checked_rayleigh(rayleigh)
-        batches, part, self.warnings = model.checked()
+        batches, part, self.warnings = model.checked(free=free)
         for batch in batches:
             if not batch.material.density > 0:
                 raise ModelError(
@@ -164,8 +167,8 @@ class EquationsOfMotion:
         out: Array | None = None
         if rate:
             out = -(rate**2) * terms.H
-            if isinstance(motion, Rotation) and motion.stiffening:
-                out = out + rate**2 * self._stiffening
+            if self.stiffened:
+                out = out + rate**2 * self.stiffening
             if motion.damping:
                 out = out + motion.damping * rate * self._convective
         if acceleration:
@@ -189,16 +192,21 @@ class EquationsOfMotion:
         motion = self.terms.motion
         return self.terms.G if isinstance(motion, Rotation) and not motion.skew else self.terms.S
 
-    @cached_property
-    def _stiffening(self) -> Array:
-        """Stiffness by the stress of the centrifugal load for the rate 1."""
-        assert self.terms is not None
-        supports = self.model.supports
-        zero = np.zeros_like(self.system.reduced.c)
-        equations = solvers.Equations(
-            self.K, reduction_at_zero(self.system.reduced, zero), self.system.points, "direct", ""
+    @property
+    def stiffened(self) -> bool:
+        """Whether the motion has centrifugal stiffening."""
+        return (
+            self.terms is not None
+            and isinstance(self.terms.motion, Rotation)
+            and self.terms.motion.stiffening
         )
-        del supports
+
+    @cached_property
+    def stiffening(self) -> Array:
+        """Stiffness by the stress of the centrifugal load for the rate 1, data (nnz,) in kg/s²."""
+        assert self.terms is not None
+        at_zero = replace(self.system.reduced, c=np.zeros_like(self.system.reduced.c))
+        equations = solvers.Equations(self.K, at_zero, self.system.points, "direct", "")
         u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
@@ -223,6 +231,13 @@ class EquationsOfMotion:
         if not isinstance(motion, Translation) or motion.ends != "absorbing":
             return None
         return dashpots(self.model.mesh, motion, self.system)
+
+    def matrix_of_mass(self) -> BlockMatrix:
+        """Return M alone, (3a, 3a)."""
+        K = self.K
+        M = BlockMatrix(np.zeros_like(K.data), K.indices, K.indptr)
+        add_scalar(M, self.mass_data)
+        return M
 
     def times_mass(self, v: Array) -> Array:
         """Return M v."""
@@ -267,19 +282,20 @@ class EquationsOfMotion:
 
     def solver(self, time: float, m: float, c: float, k: float) -> Solve:
         """Return what solves (m M + c C + k K) u = f + reactions; kept as long as the matrix is the same."""
-        key = m, c, k, *self._rates(time)
+        key = m, c, k, *self.rates(time)
         if self._kept is None or self._kept[0] != key:
             self._kept = key, self._solver(self.matrix(time, m, c, k), self.is_symmetric(time, c))
         return self._kept[1]
 
-    def _rates(self, time: float) -> tuple[float, float]:
+    def rates(self, time: float) -> tuple[float, float]:
+        """Return rate and acceleration of the motion at a time."""
         if self.terms is None:
             return 0.0, 0.0
         return self.terms.motion.rate(time), self.terms.motion.acceleration(time)
 
     def is_symmetric(self, time: float, c: float) -> bool:
         """Return whether a matrix with the share c of damping is symmetric at a time."""
-        rate, acceleration = self._rates(time)
+        rate, acceleration = self.rates(time)
         damped = bool(self.terms and self.terms.motion.damping)
         return not (acceleration or (rate and (c or damped)))
 
@@ -297,13 +313,6 @@ class EquationsOfMotion:
                 reduced.c = kept
 
         return solve
-
-
-def reduction_at_zero(reduced: Any, zero: Array) -> Any:
-    """Return supports that prescribe 0 where they prescribe anything."""
-    from dataclasses import replace
-
-    return replace(reduced, c=zero)
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

@@ -4,8 +4,8 @@ The generalised-α method takes M a at t⁺ - αm h, and C v + K u - f at t⁺ -
 
     a⁺ = (Δu - h v) / (β h²) - (1/(2β) - 1) a,    v⁺ = v + h ((1 - γ) a + γ a⁺)
 
-Source: Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375; Hilber, Hughes & Taylor, Earthq. Eng. Struct. Dyn. 5
-(1977) 283-292; Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
+Source: Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375; Hilber, Hughes & Taylor, Earthq. Eng. Struct. Dyn.
+5 (1977) 283-292; Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
 """
 
 from __future__ import annotations

@@ -150,7 +150,7 @@ class Transient:
         force = e.load(0.0) - e.times_damping(self.v, 0.0) - e.times_stiffness(self.u, 0.0)
         return e.solver(0.0, 1.0, 0.0, 0.0)(force, np.zeros(e.size))
 
-    # ---- marching ------------------------------------------------------------------------------------------
+    # ---- marching --------------------------------------------------------------------------------
 
     def march(
         self,
@@ -264,7 +264,7 @@ class Transient:
                 f"{critical:.4g} s; take a shorter step or newmark()"
             )
 
-    # ---- what is known at the time ---------------------------------------------------------------------------
+    # ---- what is known at the time ---------------------------------------------------------------
 
     def moment(self) -> Moment:
         """Return the model as it is now."""

@@ -62,6 +62,14 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
     return np.asarray((measure @ N)[..., :, None] * t[..., None, :])
 
 
+def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
+    """Return ∫ N N^T dA of faces X (..., k, 3) as (..., k, k) in m²."""
+    rule = face_rule(shape)
+    N, _ = tabulate(shape, rule)
+    measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
+    return np.asarray((N.T * measure[..., None, :]) @ N)
+
+
 def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
     """Return -∫ N p n dA of faces as nodal forces (..., k, 3) in N: a pressure pushes against n.
 

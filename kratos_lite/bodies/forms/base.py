@@ -21,8 +21,8 @@ from kratos_lite.assembly import Pattern, assemble_stiffness
 from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.bodies.deformable import Solve
-from kratos_lite.mass import Mass
 from kratos_lite.errors import ModelError
+from kratos_lite.mass import Mass
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import Equations
 from kratos_lite.solvers.banded import Factoriser

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from kratos_lite.batches import Batch
 from kratos_lite.bodies.closing import Solve
 from kratos_lite.bodies.forms.corotational import Corotational
-from kratos_lite.mass import Mass
 from kratos_lite.errors import InputError
+from kratos_lite.mass import Mass
 from kratos_lite.modes import modes
 
 Array = NDArray[np.float64]

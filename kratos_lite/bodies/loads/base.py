@@ -14,10 +14,10 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.given import elements_of, points_of
 from kratos_lite.bodies.rigid import RigidBody
-from kratos_lite.series import Factor, function_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Gravity, Load
 from kratos_lite.materials import Isotropic3D
+from kratos_lite.series import Factor, function_of
 
 Array = NDArray[np.float64]
 Generalised: TypeAlias = Callable[[Array, Array, float], Array]

@@ -1,0 +1,146 @@
+"""Guards: what a motion of the material asks of a model, and how near it is to its critical rate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.ale.ends import end_nodes, periodic_pairs
+from kratos_lite.ale.matrices import MotionMatrices
+from kratos_lite.ale.motion import Motion, Rotation, Translation
+from kratos_lite.elements.kinematic_linear import lame_constants
+from kratos_lite.elements.surface import area_vectors, face_rule
+from kratos_lite.errors import ModelError
+from kratos_lite.supports import Link
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+
+NEAR_CRITICAL = 0.9
+"""Share of the critical rate from which a warning is given."""
+LEAK = 1e-2
+"""Share of the velocity that may pass through the boundary before a warning is given."""
+NOT_ROUND = 0.2
+"""Share from which a body is not one of revolution at all."""
+
+
+def attach(motion: Motion, model: Model) -> None:
+    """Check a model against a motion and add the constraints of its ends.
+
+    Raises
+    ------
+    ModelError
+        The body is not one of revolution about the axis, or the ends cannot be joined.
+    """
+    if isinstance(motion, Translation):
+        if motion.ends == "periodic":
+            slaves, masters = periodic_pairs(model.mesh, motion)
+            model.supports.link(
+                [
+                    Link(3 * int(a) + axis, (3 * int(b) + axis,), (1.0,), 0.0)
+                    for a, b in zip(slaves, masters, strict=True)
+                    for axis in range(3)
+                    if not model.supports.fixed[a, axis]
+                ]
+            )
+        elif motion.ends == "fixed":
+            for nodes in end_nodes(model.mesh, motion):
+                model.supports.fix(nodes, "xyz", 0.0, False)
+        return
+    share = leak(motion, model)
+    if share > NOT_ROUND:
+        raise ModelError(
+            f"the body is not one of revolution about the axis {motion.direction.tolist()}: {share:.0%} of the "
+            "velocity passes through its boundary; give the axis of the body and a point of it, centre=…"
+        )
+
+
+def leak(motion: Motion, model: Model) -> float:
+    """Return the largest share of the velocity of the material that passes through the boundary."""
+    normal, largest = 0.0, 0.0
+    for block in model.mesh.boundary:
+        if block.shape is None or not len(block):
+            continue
+        rule = face_rule(block.shape)
+        X = model.mesh.points[block.nodes]
+        n = area_vectors(block.shape, X, rule)
+        n = n / np.linalg.norm(n, axis=-1, keepdims=True)
+        N = np.array([block.shape.N(xi) for xi in rule.points])
+        c = motion.field(N @ X)
+        normal = max(normal, float(np.abs((c * n).sum(axis=-1)).max()))
+        largest = max(largest, float(np.linalg.norm(c, axis=-1).max()))
+    return normal / largest if largest else 0.0
+
+
+def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:
+    """Return the lowest speeds c_p, c_s and c_R (Rayleigh) of the materials in m/s."""
+    p, s = np.inf, np.inf
+    for batch in terms.batches:
+        C, rho = batch.material.C, batch.material.density
+        p = min(p, float(np.sqrt(C[0, 0] / rho)))
+        s = min(s, float(np.sqrt(C[3, 3] / rho)))
+    return p, s, rayleigh_speed(p, s)
+
+
+def rayleigh_speed(p: float, s: float) -> float:
+    """Return the speed of Rayleigh's surface wave for those of pressure and shear waves, in m/s.
+
+    It is the root of (2 - x)² = 4 sqrt(1 - x) sqrt(1 - x s²/p²) with x = (c_R / c_s)².
+
+    >>> round(rayleigh_speed(192.610300980, 102.954536490), 6)
+    95.481346
+    """
+    low, high, k = 1e-6, 1.0 - 1e-12, (s / p) ** 2
+    for _ in range(200):
+        x = (low + high) / 2
+        f = (2 - x) ** 2 - 4 * np.sqrt(1 - x) * np.sqrt(1 - k * x)
+        low, high = (x, high) if f < 0 else (low, x)
+    return float(s * np.sqrt((low + high) / 2))
+
+
+def critical_rate_estimate(terms: MotionMatrices) -> float:
+    """Return the rate at which the fastest material moves as fast as the slowest waves, in rad/s or m/s."""
+    if isinstance(terms.motion, Translation):
+        return wave_speeds(terms)[1]
+    fastest = float(np.linalg.norm(terms.motion.field(terms.points), axis=1).max())
+    return wave_speeds(terms)[2] / fastest
+
+
+def warnings_of(terms: MotionMatrices | None, model: Model) -> list[str]:
+    """Return what is doubtful about a motion, with figures."""
+    if terms is None:
+        return []
+    motion, said = terms.motion, []
+    rate, limit = abs(motion.rate(0.0)), critical_rate_estimate(terms)
+    unit = "m/s" if isinstance(motion, Translation) else "rad/s"
+    if rate >= NEAR_CRITICAL * limit:
+        where = "above" if rate >= limit else "near"
+        said.append(
+            f"the rate {rate:g} {unit} is {where} the critical one, about {limit:.4g} {unit} (material as fast "
+            "as its slowest waves): solutions are not stable there"
+        )
+    if isinstance(motion, Rotation):
+        share = leak(motion, model)
+        if share > LEAK:
+            said.append(
+                f"{share:.1%} of the velocity passes through the polygonal rim; take more cells around the "
+                "axis, or quadratic ones"
+            )
+        if any(lame_constants(batch.material.C) is None for batch in terms.batches):
+            said.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
+        if not motion.stiffening and not _rotation_held(motion, model):
+            said.append(
+                "nothing holds the rotation about the axis: the linear theory makes a free rotor unstable at "
+                "any rate; hold the hub or take stiffening=True"
+            )
+    return said
+
+
+def _rotation_held(motion: Rotation, model: Model) -> bool:
+    """Return whether a support works against the rotation about the axis."""
+    c = motion.field(model.mesh.points)
+    return bool(np.abs(c[model.supports.fixed]).max(initial=0.0) > 1e-9 * np.abs(c).max())

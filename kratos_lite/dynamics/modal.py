@@ -1,0 +1,115 @@
+"""Natural frequencies of a model, and the complex ones of a model whose material moves through its mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.errors import InputError
+from kratos_lite.modes import DENSE_MODES, modes
+from kratos_lite.solvers import direct
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array, Array]:
+    """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
+    equations = EquationsOfMotion(model, lumped=lumped)
+    K, M = (reduced(equations, A) for A in (equations.K, equations.matrix_of_mass()))
+    omega, shapes = modes(K, M, count)
+    return omega, expanded(equations, shapes)
+
+
+def complex_modes(model: Model, count: int) -> tuple[Complexes, Complexes]:
+    """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
+    e = EquationsOfMotion(model)
+    M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    n = K.shape[0]
+    if not 1 <= count <= 2 * n:
+        raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
+    if 2 * n <= DENSE_MODES or count > n // 4:
+        inverse = np.linalg.inv(M.toarray())
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K.toarray(), -inverse @ C.toarray()]])
+        values, vectors = np.linalg.eig(A)
+    else:
+        values, vectors = _by_iteration(M, C, K, count)
+    order = np.argsort(np.abs(values), kind="stable")[:count]
+    return values[order], expanded(e, vectors[:n, order])
+
+
+def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Complexes]:
+    """Return eigenvalues nearest to 0 by Arnoldi on the inverse pencil, which needs factors of K alone.
+
+    With x = (u, λ u) the inverse takes (p, q) to (-K^-1 (C p + M q), p).
+    """
+    from scipy.sparse.linalg import LinearOperator, eigs
+
+    n = K.shape[0]
+    factors = direct.factorise(K, symmetric=False)
+
+    def inverse(x: Array) -> Array:
+        p, q = x[:n], x[n:]
+        return np.concatenate([-factors.solve(C @ p + M @ q), p])
+
+    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(2 * n)
+    values, vectors = eigs(operator, min(count + 2, 2 * n - 2), which="LM", v0=start)
+    return 1 / values, vectors
+
+
+def critical_rate(model: Model, count: int = 1) -> Array:
+    """Return the lowest rates (count,) at which K - rate² H is singular, in rad/s or m/s.
+
+    They are those of the mesh; `critical_rate_estimate` is the limit of ever finer ones.
+    """
+    e = EquationsOfMotion(model)
+    if e.terms is None:
+        raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
+    from kratos_lite.blockmatrix import BlockMatrix
+    from kratos_lite.solvers.banded import add_scalar
+
+    H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
+    add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
+    K, H = reduced(e, e.K), reduced(e, H)
+    n = K.shape[0]
+    if n <= DENSE_MODES:
+        from scipy.linalg import eigh
+
+        largest = eigh(H.toarray(), K.toarray(), eigvals_only=True)[::-1][:count]
+    else:
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        factors = direct.factorise(K)
+        inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
+        start = np.random.default_rng(0).standard_normal(n)
+        largest = eigsh(H, count, K, which="LA", Minv=inverse, v0=start, return_eigenvectors=False)[::-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+
+
+def reduced(equations: EquationsOfMotion, A: Any) -> Any:
+    """Return T^T A T on the free degrees of freedom as CSR."""
+    matrix, supports = A.scipy().tocsr(), equations.system.reduced
+    if supports.T is not None:
+        return (supports.T.T @ matrix @ supports.T).tocsr()
+    return matrix[supports.free][:, supports.free]
+
+
+def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
+    """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
+    system, supports = equations.system, equations.system.reduced
+    full = np.zeros((equations.size, shapes.shape[1]), dtype=shapes.dtype)
+    if supports.T is not None:
+        full = supports.T @ shapes
+    else:
+        full[supports.free] = shapes
+    out = np.zeros((shapes.shape[1], system.n_nodes, 3), dtype=shapes.dtype)
+    out[:, system.nodes] = full.T.reshape(shapes.shape[1], -1, 3)
+    return out

@@ -1,0 +1,70 @@
+"""Steady motion: what rests in space while its material moves through the mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import solvers
+from kratos_lite.ale.guards import warnings_of
+from kratos_lite.assembly import Progress
+from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.loads import check_loads
+from kratos_lite.native import described
+from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.statics import Phases, judge
+
+if TYPE_CHECKING:
+    from kratos_lite.model import Model
+
+Array = NDArray[np.float64]
+
+
+def solve_steady(model: Model, tolerance: float = 1e-10, progress: Progress | None = None) -> Result:
+    """Solve (K - rate² H + …) u = f of a model with a motion, at the time 0; see `Model.solve`."""
+    phase = Phases()
+    with phase("check"):
+        e = EquationsOfMotion(model, free=False, progress=progress)
+        warnings = e.warnings + warnings_of(e.terms, model)
+    with phase("load"):
+        forces, inertia = e.load(0.0), e.inertia_load(0.0)
+        nodal = e.system.whole(forces).copy()
+        warnings += check_loads(model.loads, e.system.batches, nodal, model.supports)
+    with phase("assemble"):
+        A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
+    with phase("solve"):
+        method = "direct" if len(e.system.reduced.free) <= DIRECT_MAX or not symmetric else "amg"
+        why = "one of few unknowns" if method == "direct" and symmetric else ""
+        why = why or (
+            "the matrix of a motion with damping is not symmetric" if not symmetric else "many unknowns"
+        )
+        equations = solvers.Equations(A, e.system.reduced, e.system.points, method, why, symmetric=symmetric)
+        solution = equations.solve(forces, tolerance, progress)
+    with phase("verify"):
+        u = solution.x
+        left = e.system.whole(A @ u - forces).copy()
+        held = model.supports.fixed
+        tied = [dof for link in model.supports.links for dof in (link.slave, *link.masters)]
+        reactions = np.where(held, left, 0.0)
+        reactions.flat[tied] = left.flat[tied]
+        judge(solution, u, (0.0, 0.0))
+    report = Report(
+        unknowns=len(e.system.reduced.free),
+        total_load=nodal.sum(axis=0),
+        total_reaction=reactions.sum(axis=0),
+        solver=solution.method,
+        reason=solution.reason,
+        iterations=solution.iterations,
+        backward_error=solution.backward_error,
+        force_error=0.0,
+        moment_error=0.0,
+        seconds=phase.seconds,
+        peak_memory=peak_memory(),
+        warnings=warnings,
+        notes=list(model.notes),
+        skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
+        kernels=described(),
+    )
+    return Result(model.mesh, e.system.batches, e.system.whole(u), reactions, nodal, report)
