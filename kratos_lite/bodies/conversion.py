@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.rotations import hat, polar
 
@@ -47,6 +47,8 @@ def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
     """
     if kind not in (RigidBody, PseudoRigidBody, FiniteElementBody):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
+    if isinstance(body, Obstacle):
+        raise ModelError("an obstacle has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
     F, rate = affine(body)
