@@ -271,6 +271,10 @@ class FiniteElementBody(Deformable):
         """Return x̄ (3,) in m."""
         return np.asarray(self._shares @ (self.points + self.displacement))
 
+    def reference_center(self) -> Array:
+        """Return the mass centre (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
+        return np.asarray(self._shares @ self.points)
+
     def linear_momentum(self) -> Array:
         """Return Σ (M u)_a, (3,) in kg m/s."""
         return np.asarray(self._mass.nodal @ self.u.reshape(-1, 3))

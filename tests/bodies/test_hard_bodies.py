@@ -177,3 +177,16 @@ def test_each_of_many_bodies_may_have_its_own_force_and_torque():
     march(many, 0.5, 2)
     np.testing.assert_allclose(many.linear_momentum(), force, atol=1e-14)
     np.testing.assert_allclose(many.angular_momentum(), force, atol=1e-14)
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_a_tapered_body_stays_undeformed_when_converted(lumped):
+    """Lumped mass has its centre elsewhere, which must not look like deformation."""
+    mesh = kl.box(element="KinematicLinear3D20N")
+    mesh.points[:, 1:] *= 1 + mesh.points[:, :1]
+    soft = kl.FiniteElementBody(mesh, RUBBER, lumped=lumped)
+    soft.q, soft.u = np.tile([1.0, 2, 3], 20), np.tile([4.0, 5, 6], 20)
+    body = kl.convert(soft, kl.PseudoRigidBody)
+    np.testing.assert_allclose(body.deformation, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(body.mass_center(), body.center + np.array([1, 2, 3]), atol=1e-14)
+    np.testing.assert_allclose(body.u, np.repeat([0, 4, 5, 6], [9, 1, 1, 1]), atol=1e-13)
