@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import points_of, vector_of
-from kratos_lite.bodies.loads import one_point
+from kratos_lite.bodies.given import one_point, points_of, vector_of
 from kratos_lite.bodies.series import Factor, function_of, integral_of
 from kratos_lite.errors import InputError, ModelError
 
@@ -38,6 +37,8 @@ class Constraint(ABC):
 
     def __init__(self, points: ArrayLike) -> None:
         self.points = np.atleast_2d(points_of(points))
+        if not len(self.points):
+            raise InputError(f"a {type(self).__name__} needs one point at least; got none")
         self.reactions = np.zeros_like(self.points)
         self._body: Body | None = None
         self._rows: Array | None = None
