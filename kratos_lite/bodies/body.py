@@ -55,6 +55,8 @@ class Body(ABC):
     characteristics : mass, volume, mass centre, Euler and inertia tensor.
     tolerance : relative size of the last Newton step of an implicit scheme.
     damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
+    marched : u as the last march left it, None before; where it is another one, or constraints are new, a
+        march starts with an impulse that meets the constraints.
     external_work : work of loads and reactions since the start, J.
     """
 
@@ -84,6 +86,7 @@ class Body(ABC):
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
+        self.marched: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
         self.scheme = self.default_scheme() if scheme is None else scheme
         self.damping = damping
@@ -158,6 +161,10 @@ class Body(ABC):
     @abstractmethod
     def times_mass(self, v: Array) -> Array:
         """Return the mass matrix times v (..., dofs)."""
+
+    @abstractmethod
+    def mass_solver(self) -> Callable[[Array], Array]:
+        """Return what solves M x = b of a single body, for columns b (dofs, k)."""
 
     @abstractmethod
     def mass_center(self) -> Array:
@@ -283,6 +290,7 @@ class Body(ABC):
             raise InputError(f"a constraint such as FixPoint is needed; got {type(constraint).__name__}")
         constraint.bind(self)
         self.constraints.append(constraint)
+        self.marched = None
 
     def external_load(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None

@@ -190,6 +190,10 @@ class PseudoRigidBody(Deformable):
         A = self.mass_matrix() + c * self.stiffness(q)
         return lambda b: np.concatenate([np.linalg.solve(A, b[:9]), b[9:] / self.mass])
 
+    def mass_solver(self) -> Solve:
+        """Return what solves M x = b; see `Body`."""
+        return self.solver(self.q, 0.0)
+
     def coast(self, h: float, count: int) -> None:
         """Take steps of h s under constant loads alone, all at once."""
         acceleration, spatial, _ = self.constant_loads()

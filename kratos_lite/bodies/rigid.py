@@ -5,6 +5,7 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import ClassVar
 
@@ -168,6 +169,10 @@ class RigidBody(Body):
     def step_constants(self) -> tuple[Array, Array, Array]:
         """Return inertia, its inverse and mass, as `steps` take them."""
         return self.characteristics.inertia, self._inverse, self.characteristics.mass
+
+    def mass_solver(self) -> Callable[[Array], Array]:
+        """Return what solves M x = b; see `Body`."""
+        return self.apart
 
     def apart(self, b: Array) -> Array:
         """Return M^-1 b of columns (6, k): torques and forces answer apart."""
