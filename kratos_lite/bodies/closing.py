@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError, SolveError
 
 Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 _log = logging.getLogger("kratos_lite")
 
 Solve: TypeAlias = Callable[[Array], Array]
@@ -128,6 +131,23 @@ def _extent(body: Body) -> float:
 def rows(body: Body, q: Array) -> Array:
     """Return H (c, dofs) of all constraints of a body."""
     return np.concatenate([constraint.rows(body, q) for constraint in body.constraints])
+
+
+def allowed(H: Array) -> csr_array[Any, Any]:
+    """Return the motions (dofs, k) that rows H (c, dofs) leave free: H T = 0."""
+    from scipy.linalg import null_space
+    from scipy.sparse import csr_array, eye_array
+
+    count = (H != 0).sum(axis=1)
+    if (count <= 1).all():  # each row holds one displacement, or none
+        return csr_array(eye_array(H.shape[1], format="csr")[:, ~(H != 0).any(axis=0)])
+    tied = (H != 0).any(axis=0)  # only these take part in what is held together
+    inner = null_space(H[:, tied])
+    free = np.flatnonzero(~tied)
+    T = np.zeros((H.shape[1], inner.shape[1] + len(free)))
+    T[np.ix_(tied, np.arange(inner.shape[1]))] = inner
+    T[free, inner.shape[1] + np.arange(len(free))] = 1.0
+    return csr_array(T)
 
 
 def _corrected(body: Body, h: float, H: Array, inverse: Array, advance: Advance) -> tuple[Step, Array]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Pattern
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.bodies.closing import allowed
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.forms import FORMS, Form, Modal
 from kratos_lite.bodies.given import Material, elements_of, fitting, one_point, points_of, vector_of
@@ -255,11 +256,20 @@ class FiniteElementBody(Deformable):
         return self.form.highest_frequency(self.q)
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
-        """Return the lowest natural frequencies of the free undeformed body, and their shapes.
+        """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
 
-        Frequencies are (count,) in rad/s, shapes (3n, count) with φ^T M φ = 1; six are rigid motions.
+        Returns
+        -------
+        frequencies (count,) in rad/s, ascending; shapes (3n, count) with φ^T M φ = 1.  A body that nothing
+        holds has its six rigid motions first.
         """
-        return modes(self.form.K0.scipy().tocsr(), self._mass.matrix(), count)
+        K, M = self.form.K0.scipy().tocsr(), self._mass.matrix()
+        held = [c.rows(self, np.zeros(self.dofs)) for c in self.constraints]
+        if not held:
+            return modes(K, M, count)
+        T = allowed(np.concatenate(held))
+        omega, shapes = modes((T.T @ K @ T).tocsr(), (T.T @ M @ T).tocsr(), count)
+        return omega, np.asarray(T @ shapes)
 
     # ---- momenta ---------------------------------------------------------------------------------
 

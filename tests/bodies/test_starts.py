@@ -85,3 +85,26 @@ def test_two_runs_of_quadratic_elements_are_the_same_bit_by_bit():
         return last
 
     np.testing.assert_array_equal(run(12).q, run(12).q)
+
+
+def test_modes_are_those_of_the_held_body():
+    """A slender clamped bar bends as a beam, 1.8751² sqrt(E I / (ρ A)) / L², less a little by shear."""
+    steel = kl.Isotropic3D(E=2e11, nu=0.0, density=7850.0)
+    bar = kl.FiniteElementBody(kl.box((0.1, 0.1, 2.0), (1, 1, 10), "KinematicLinear3D20N"), steel)
+    bar.constrain(kl.FixPoint("z-"))
+    beam = 1.87510407**2 * np.sqrt(2e11 * 0.1**2 / 12 / 7850) / 4
+    omega, shapes = bar.modes(3)
+    assert omega[0] == pytest.approx(beam, rel=5e-3)
+    assert omega[1] == pytest.approx(omega[0], rel=1e-9)
+    assert not shapes[np.repeat(bar.points[:, 2] == 0, 3)].any()
+
+
+def test_modes_with_an_oblique_direction():
+    """What slides along a slope is a motion without stiffness."""
+    body = kl.FiniteElementBody(kl.box(), RUBBER)
+    body.constrain(kl.FixDirection("z-", (0, 1, 1)))
+    omega, shapes = body.modes(7)
+    assert (omega[:3] < 1e-3).all()  # along x, along the slope, about its normal
+    assert omega[3] > 1
+    held = shapes.reshape(-1, 3, 7)[body.points[:, 2] == 0]
+    assert np.abs(held[:, 1] + held[:, 2]).max() < 1e-12
