@@ -45,7 +45,8 @@ class Registry(Generic[T]):
         key = name if name in self._items else self._aliases.get(name, name)
         if key not in self._items:
             known = [*self._items, *self._aliases]
-            raise InputError(f"unknown {self.kind} {name!r}.{nearest(name, known)}")
+            hint = nearest(name, known) if isinstance(name, str) else ""
+            raise InputError(f"unknown {self.kind} {name!r}.{hint}")
         return self._items[key]
 
     def __contains__(self, name: object) -> bool:

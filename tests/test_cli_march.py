@@ -151,7 +151,7 @@ def test_what_exists_is_kept_when_a_march_fails(run, folder):
         )
     done = run("march", "fails.py", "--csv", "a.csv", "--state", "s.npz")
     assert done.code == 2
-    assert "error: a callback returned numbers that are not finite at t = 0.25 s" in done.err
+    assert "error: what a callback returns at t = 0.25 s must be finite" in done.err
     assert len((folder / "a.csv").read_text().splitlines()) == 4
     assert kl.State.load("s.npz").step == 2
 

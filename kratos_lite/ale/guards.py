@@ -54,8 +54,8 @@ def attach(motion: Motion, model: Model) -> None:
     share = leak(motion, model)
     if share > NOT_ROUND:
         raise ModelError(
-            f"the body is not one of revolution about the axis {motion.direction.tolist()}: {share:.0%} of the "
-            "velocity passes through its boundary; give the axis of the body and a point of it, centre=…"
+            f"the body is not one of revolution about the axis {motion.direction.tolist()}: {share:.0%} of "
+            "the velocity passes through its boundary; give the axis of the body and a point of it, centre=…"
         )
 
 
@@ -120,8 +120,8 @@ def warnings_of(terms: MotionMatrices | None, model: Model) -> list[str]:
     if rate >= NEAR_CRITICAL * limit:
         where = "above" if rate >= limit else "near"
         said.append(
-            f"the rate {rate:g} {unit} is {where} the critical one, about {limit:.4g} {unit} (material as fast "
-            "as its slowest waves): solutions are not stable there"
+            f"the rate {rate:g} {unit} is {where} the critical one, about {limit:.4g} {unit} (material as "
+            "fast as its slowest waves): solutions are not stable there"
         )
     if isinstance(motion, Rotation):
         share = leak(motion, model)

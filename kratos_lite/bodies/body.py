@@ -55,6 +55,8 @@ class Body(ABC):
     characteristics : mass, volume, mass centre, Euler and inertia tensor.
     tolerance : relative size of the last Newton step of an implicit scheme.
     damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
+    marched : u as the last march left it, None before; where it is another one, or constraints are new, a
+        march starts with an impulse that meets the constraints.
     external_work : work of loads and reactions since the start, J.
     """
 
@@ -62,7 +64,6 @@ class Body(ABC):
     schemes: ClassVar[tuple[str, ...]] = ()
     rows_are_constant: ClassVar[bool] = False
     dofs: int
-    tolerance: float
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -85,9 +86,10 @@ class Body(ABC):
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
+        self.marched: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
-        self.scheme = scheme or self.default_scheme()
-        self.damping = self._checked_damping(damping)
+        self.scheme = self.default_scheme() if scheme is None else scheme
+        self.damping = damping
 
     # ---- what a kind defines ---------------------------------------------------------------------
 
@@ -161,6 +163,10 @@ class Body(ABC):
         """Return the mass matrix times v (..., dofs)."""
 
     @abstractmethod
+    def mass_solver(self) -> Callable[[Array], Array]:
+        """Return what solves M x = b of a single body, for columns b (dofs, k)."""
+
+    @abstractmethod
     def mass_center(self) -> Array:
         """Return where the mass centre is, (..., 3) in m."""
 
@@ -232,12 +238,29 @@ class Body(ABC):
             raise InputError(f"the schemes of a {self.kind} body are {known}; got {name!r}")
         self._scheme = name
 
-    @staticmethod
-    def _checked_damping(value: float) -> float:
+    @property
+    def damping(self) -> float:
+        """Stiffness-proportional damping η in s, ≥ 0."""
+        return self._damping
+
+    @damping.setter
+    def damping(self, value: float) -> None:
         damping = finite(value, "a damping")
         if damping.ndim or damping < 0:
             raise InputError(f"a damping must be one number of seconds, ≥ 0; got {value}")
-        return float(damping)
+        self._damping = float(damping)
+
+    @property
+    def tolerance(self) -> float:
+        """Relative size of the last Newton step of an implicit scheme, 0 … 1; 0 stands for round-off."""
+        return self._tolerance
+
+    @tolerance.setter
+    def tolerance(self, value: float) -> None:
+        tolerance = finite(value, "a tolerance")
+        if tolerance.ndim or not 0 <= tolerance < 1:
+            raise InputError(f"a tolerance must be one number from 0 to less than 1; got {value}")
+        self._tolerance = float(tolerance)
 
     # ---- loads and constraints -------------------------------------------------------------------
 
@@ -263,8 +286,11 @@ class Body(ABC):
         MeshError
             If a point lies outside the body.
         """
+        if not hasattr(constraint, "bind") or not hasattr(constraint, "gaps"):
+            raise InputError(f"a constraint such as FixPoint is needed; got {type(constraint).__name__}")
         constraint.bind(self)
         self.constraints.append(constraint)
+        self.marched = None
 
     def external_load(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None

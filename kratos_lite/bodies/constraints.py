@@ -9,17 +9,22 @@ Source: Solfec-1.0 user manual, constraints; its velocity-level laws are replace
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import points_of, vector_of
-from kratos_lite.bodies.loads import one_point
+from kratos_lite.bodies.given import one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.series import Factor, function_of, integral_of
 
 Array = NDArray[np.float64]
+Points: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
+"""Points (3,) or (m, 3) in m of the undeformed body; or nodes by a part of the mesh or a predicate."""
+SHORT = 1e-3
+"""Share of a step over which the slope of a displacement is taken."""
 
 
 class Constraint(ABC):
@@ -36,11 +41,18 @@ class Constraint(ABC):
     positional = True
     turning = False
 
-    def __init__(self, points: ArrayLike) -> None:
-        self.points = np.atleast_2d(points_of(points))
-        self.reactions = np.zeros_like(self.points)
+    def __init__(self, points: Points) -> None:
+        self._where = points if isinstance(points, str) or callable(points) else None
+        self._hold(np.zeros((1, 3)) if isinstance(points, str) or callable(points) else points_of(points))
         self._body: Body | None = None
         self._rows: Array | None = None
+
+    def _hold(self, points: Array) -> None:
+        """Take note of the points."""
+        self.points = np.atleast_2d(points)
+        if not len(self.points):
+            raise InputError(f"a {type(self).__name__} needs one point at least; got none")
+        self.reactions = np.zeros_like(self.points)
 
     def bind(self, body: Body) -> None:
         """Take hold of a body where it is now.
@@ -56,6 +68,10 @@ class Constraint(ABC):
             raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
         if self._body is not None and self._body is not body:
             raise ModelError("this constraint holds another body already; make one for each body")
+        if self._where is not None:
+            if body.mesh is None:
+                raise ModelError("nodes are chosen from a mesh, and this body has none; give points (m, 3)")
+            self._hold(body.mesh.points[body.mesh.nodes(self._where)])
         body.find(self.points)
         self._body, self._start = body, body.position(self.points)
 
@@ -72,6 +88,13 @@ class Constraint(ABC):
 
         Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
         """
+
+    def speeds(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocities along the directions with which points start, (m, r) in m/s.
+
+        `v` (m, r) are those that they have, at a time, before steps of h s.
+        """
+        return np.zeros_like(v)
 
     def entries(self, body: Body, q: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return rows, dofs and values of H (m r, dofs): points move along their directions with H u."""
@@ -118,7 +141,8 @@ class FixPoint(Constraint):
 
     Parameters
     ----------
-    points : (3,) or (m, 3) m, in the undeformed body.
+    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
+        predicate on its points (n, 3), for the nodes there.
     """
 
     @property
@@ -140,11 +164,12 @@ class Along(Constraint):
 
     Parameters
     ----------
-    points : (3,) or (m, 3) m, in the undeformed body.
+    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
+        predicate on its points (n, 3), for the nodes there.
     direction : (3,), of any length but 0.
     """
 
-    def __init__(self, points: ArrayLike, direction: ArrayLike) -> None:
+    def __init__(self, points: Points, direction: ArrayLike) -> None:
         super().__init__(points)
         n = vector_of(direction, "a direction")
         length = float(np.linalg.norm(n))
@@ -174,22 +199,23 @@ class SetDisplacement(Along):
     Parameters
     ----------
     points, direction : as for `FixDirection`.
-    displacement : m, number, `TimeSeries` or function of the time; the points move by its change since the
-        constraint was made.
+    displacement : m, number, `TimeSeries` or function of the time: by how much the points are moved from
+        where they were when the constraint was made.  A motion starts where the body is; a body at rest
+        (`equilibrium`) may be moved by a number.
     """
 
-    def __init__(self, points: ArrayLike, direction: ArrayLike, displacement: Factor) -> None:
+    def __init__(self, points: Points, direction: ArrayLike, displacement: Factor) -> None:
         super().__init__(points, direction)
         self.displacement = function_of(displacement, "a displacement")
 
-    def bind(self, body: Body) -> None:
-        """Take hold of a body where it is now; see `Constraint.bind`."""
-        super().bind(body)
-        self._origin = self.displacement(body.time)
-
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
         """Return by how much the points are off; see `Constraint.gap`."""
-        return (self._moved(x) - (self.displacement(time) - self._origin)) * (2 / h)
+        return (self._moved(x) - self.displacement(time)) * (2 / h)
+
+    def speeds(self, v: Array, time: float, h: float) -> Array:
+        """Return the slope of the displacement at a time; see `Constraint.speeds`."""
+        short = SHORT * h
+        return np.full_like(v, (self.displacement(time + short) - self.displacement(time)) / short)
 
 
 class SetVelocity(Along):
@@ -203,13 +229,17 @@ class SetVelocity(Along):
 
     positional = False
 
-    def __init__(self, points: ArrayLike, direction: ArrayLike, velocity: Factor) -> None:
+    def __init__(self, points: Points, direction: ArrayLike, velocity: Factor) -> None:
         super().__init__(points, direction)
         self.speed = function_of(velocity, "a velocity")
 
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
         """Return the velocity that is missing; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self.speed(time)
+
+    def speeds(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocity at a time; see `Constraint.speeds`."""
+        return np.full_like(v, self.speed(time))
 
 
 class SetAcceleration(Along):
@@ -223,7 +253,7 @@ class SetAcceleration(Along):
 
     positional = False
 
-    def __init__(self, points: ArrayLike, direction: ArrayLike, acceleration: Factor) -> None:
+    def __init__(self, points: Points, direction: ArrayLike, acceleration: Factor) -> None:
         super().__init__(points, direction)
         function_of(acceleration, "an acceleration")
         self.acceleration = acceleration
@@ -236,6 +266,10 @@ class SetAcceleration(Along):
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
         """Return the velocity that is missing; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self._target
+
+    def speeds(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocities as they are; see `Constraint.speeds`."""
+        return v
 
 
 class RigidLink(Constraint):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.rotations import hat, polar
 
@@ -47,10 +47,13 @@ def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
     """
     if kind not in (RigidBody, PseudoRigidBody, FiniteElementBody):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
+    if isinstance(body, Obstacle):
+        raise ModelError("an obstacle has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
     F, rate = affine(body)
-    center, velocity = body.mass_center(), body.linear_momentum() / body.mass
+    center = body.mass_center() + F @ (body.center - _own_center(body))
+    velocity = body.linear_momentum() / body.mass
     other = kind(body.mesh, body.material, **options)
     if isinstance(other, FiniteElementBody):
         arms = other.points - body.center
@@ -74,10 +77,16 @@ def affine(body: Body) -> tuple[Array, Array]:
     if isinstance(body, PseudoRigidBody):
         return body.deformation.copy(), body.u[:9].reshape(3, 3).copy()
     assert isinstance(body, FiniteElementBody)
-    arms = body.points - body.center
+    arms = body.points - _own_center(body)
     weighted = body.times_mass(arms.ravel()).reshape(-1, 3)
     inverse = np.linalg.inv(weighted.T @ arms)
-    return (
-        np.eye(3) + (body.displacement - body.mass_center() + body.center).T @ weighted @ inverse,
-        (body.u.reshape(-1, 3)).T @ weighted @ inverse,
-    )
+    moved = body.displacement - body.displacement.mean(axis=0)
+    rate = body.u.reshape(-1, 3) - body.u.reshape(-1, 3).mean(axis=0)
+    return np.eye(3) + moved.T @ weighted @ inverse, rate.T @ weighted @ inverse
+
+
+def _own_center(body: Body) -> Array:
+    """Return the mass centre of the undeformed body as its mass has it: lumped mass may shift it."""
+    if isinstance(body, FiniteElementBody):
+        return body.reference_center()
+    return body.center

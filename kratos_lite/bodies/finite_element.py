@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Pattern
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.bodies.closing import allowed
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.forms import FORMS, Form, Modal
-from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.given import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mass import Mass
@@ -149,15 +150,16 @@ class FiniteElementBody(Deformable):
 
     def turn(self, rotation: ArrayLike) -> None:
         """Set q = (Λ - 1)(X - X̄) and leave the mass centre where it is; see `Body.turn`."""
+        R = fitting(check_rotation(rotation), (), 2, "a rotation")
         arms = self.points - self._shares @ self.points
-        self.q = (arms @ check_rotation(rotation).T - arms + self._shares @ self.displacement).ravel()
+        self.q = (arms @ R.T - arms + self._shares @ self.displacement).ravel()
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set v + ω × (x - x̄) at the nodes; see `Body.set_velocity`."""
         arms = self.points + self.displacement - self.mass_center()
-        w = vector_of(angular, "an angular velocity", ())
-        v = vector_of(linear, "a velocity", ()) + np.cross(w, arms)
-        self.u = v.ravel()
+        v = fitting(vector_of(linear, "a velocity"), (), 1, "a velocity")
+        w = fitting(vector_of(angular, "an angular velocity"), (), 1, "an angular velocity")
+        self.u = (v + np.cross(w, arms)).ravel()
 
     def find(self, X: Array) -> None:
         """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
@@ -254,11 +256,20 @@ class FiniteElementBody(Deformable):
         return self.form.highest_frequency(self.q)
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
-        """Return the lowest natural frequencies of the free undeformed body, and their shapes.
+        """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
 
-        Frequencies are (count,) in rad/s, shapes (3n, count) with φ^T M φ = 1; six are rigid motions.
+        Returns
+        -------
+        frequencies (count,) in rad/s, ascending; shapes (3n, count) with φ^T M φ = 1.  A body that nothing
+        holds has its six rigid motions first.
         """
-        return modes(self.form.K0.scipy().tocsr(), self._mass.matrix(), count)
+        K, M = self.form.K0.scipy().tocsr(), self._mass.matrix()
+        held = [c.rows(self, np.zeros(self.dofs)) for c in self.constraints]
+        if not held:
+            return modes(K, M, count)
+        T = allowed(np.concatenate(held))
+        omega, shapes = modes((T.T @ K @ T).tocsr(), (T.T @ M @ T).tocsr(), count)
+        return omega, np.asarray(T @ shapes)
 
     # ---- momenta ---------------------------------------------------------------------------------
 
@@ -270,12 +281,16 @@ class FiniteElementBody(Deformable):
         """Return x̄ (3,) in m."""
         return np.asarray(self._shares @ (self.points + self.displacement))
 
+    def reference_center(self) -> Array:
+        """Return the mass centre (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
+        return np.asarray(self._shares @ self.points)
+
     def linear_momentum(self) -> Array:
         """Return Σ (M u)_a, (3,) in kg m/s."""
         return np.asarray(self._mass.nodal @ self.u.reshape(-1, 3))
 
     def angular_momentum(self, about: ArrayLike | None = None) -> Array:
         """Return Σ (x_a - about) × (M u)_a, (3,) in kg m²/s; see `Body`."""
-        origin = self.mass_center() if about is None else vector_of(about, "a point", ())
+        origin = self.mass_center() if about is None else one_point(about)
         arms = self.points + self.displacement - origin
         return np.asarray(np.cross(arms, self.times_mass(self.u).reshape(-1, 3)).sum(axis=0))

@@ -28,9 +28,7 @@ def elements_of(mesh: Mesh, material: Material) -> list[Batch]:
     MeshError, ModelError, InputError
         If the mesh is broken or inverted, or elements have no material.
     """
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
-    kinds = [element_class(mesh, block) for block in mesh.blocks]
+    kinds = [element_class(mesh, block) for block in mesh_of(mesh).blocks]
     checks.check_blocks(mesh, kinds)
     checks.check_points(mesh)
     checks.check_repeated_nodes(mesh)
@@ -52,11 +50,37 @@ def points_of(X: ArrayLike) -> Array:
     return points
 
 
-def vector_of(value: ArrayLike, what: str, lead: tuple[int, ...] | None = None) -> Array:
-    """Return a vector (..., 3) as floats; if leading axes are given, one that fits them."""
+def one_point(X: ArrayLike) -> Array:
+    """Return one point (3,) as floats."""
+    point = points_of(X)
+    if point.ndim != 1:
+        raise InputError(f"one point (3,) is needed; got shape {point.shape}")
+    return point
+
+
+def vector_of(value: ArrayLike, what: str) -> Array:
+    """Return a vector (..., 3) as floats."""
     vector = finite(value, what)
     if vector.shape[-1:] != (3,):
         raise InputError(f"{what} must have three components; got shape {vector.shape}")
-    if lead is not None and vector.shape[:-1] not in ((), lead):
-        raise InputError(f"{what} must have shape {(*lead, 3)} or (3,); got {vector.shape}")
     return vector
+
+
+def fitting(value: Array, lead: tuple[int, ...], tail: int, what: str) -> Array:
+    """Return a value with `tail` axes of its own if its other axes broadcast to those of the bodies."""
+    own = value.shape[: value.ndim - tail]
+    try:
+        fits = np.broadcast_shapes(own, lead) == lead
+    except ValueError:
+        fits = False
+    if not fits:
+        bodies = f"bodies of shape {lead}" if lead else "a single body"
+        raise InputError(f"{what} of shape {value.shape} does not fit {bodies}")
+    return value
+
+
+def mesh_of(mesh: Mesh) -> Mesh:
+    """Return a mesh; InputError if it is none."""
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
+    return mesh

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.closing import start
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.many import together
@@ -99,10 +100,13 @@ def _states(
     until: Callable[[State], bool] | None,
     progress: Progress | None,
 ) -> Iterator[State]:
+    if body.constraints and (body.marched is None or not np.array_equal(body.u, body.marched)):
+        start(body, h / parts)
     done = 0
     while done < count:
         chunk = min(every - done % every, count - done)
         _advance(body, h, chunk, parts)
+        body.marched = body.u.copy() if body.constraints else None
         done += chunk
         if progress:
             progress("march", done / count)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.given import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.bodies.linear_algebra import apply, transposed
 from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
 from kratos_lite.characteristics import Characteristics
@@ -76,8 +76,7 @@ class PseudoRigidBody(Deformable):
         if characteristics is None:
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its characteristics")
-            elements = elements_of(mesh, material)
-            characteristics = Characteristics.of(mesh.points, elements)
+            characteristics = Characteristics.of(mesh_of(mesh).points, elements_of(mesh, material))
         characteristics.check_deformable()
         lead = np.shape(characteristics.mass)
         q = np.zeros((*lead, 12))
@@ -121,14 +120,15 @@ class PseudoRigidBody(Deformable):
 
     def turn(self, rotation: ArrayLike) -> None:
         """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
-        R = check_rotation(rotation)
+        R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
         self.q[..., :9] = R.reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
-        spin = hat(vector_of(angular, "an angular velocity", self.q.shape[:-1])) @ self.deformation
-        self.u[..., 9:] = vector_of(linear, "a velocity", self.q.shape[:-1])
-        self.u[..., :9] = spin.reshape(*spin.shape[:-2], 9)
+        lead = self.q.shape[:-1]
+        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
+        self.u[..., 9:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
+        self.u[..., :9] = (hat(w) @ self.deformation).reshape(*lead, 9)
 
     # ---- forces ----------------------------------------------------------------------------------
 
@@ -190,6 +190,10 @@ class PseudoRigidBody(Deformable):
         A = self.mass_matrix() + c * self.stiffness(q)
         return lambda b: np.concatenate([np.linalg.solve(A, b[:9]), b[9:] / self.mass])
 
+    def mass_solver(self) -> Solve:
+        """Return what solves M x = b; see `Body`."""
+        return self.solver(self.q, 0.0)
+
     def coast(self, h: float, count: int) -> None:
         """Take steps of h s under constant loads alone, all at once."""
         acceleration, spatial, _ = self.constant_loads()
@@ -230,7 +234,9 @@ class PseudoRigidBody(Deformable):
         spin = 2 * axial(H)
         if about is None:
             return np.asarray(spin)
-        return np.asarray(spin + np.cross(self.q[..., 9:] - finite(about, "a point"), self.linear_momentum()))
+        return np.asarray(
+            spin + np.cross(self.q[..., 9:] - vector_of(about, "a point"), self.linear_momentum())
+        )
 
 
 def gradient_of(q: Array) -> Array:

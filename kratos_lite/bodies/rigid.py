@@ -5,6 +5,7 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import ClassVar
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import Material, elements_of, points_of, vector_of
+from kratos_lite.bodies.given import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
@@ -70,8 +71,7 @@ class RigidBody(Body):
         if characteristics is None:
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its characteristics")
-            elements = elements_of(mesh, material)
-            characteristics = Characteristics.of(mesh.points, elements)
+            characteristics = Characteristics.of(mesh_of(mesh).points, elements_of(mesh, material))
         lead = np.shape(characteristics.mass)
         q = np.zeros((*lead, 12))
         q[..., [0, 4, 8]] = 1.0
@@ -120,13 +120,14 @@ class RigidBody(Body):
 
     def turn(self, rotation: ArrayLike) -> None:
         """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
-        R = check_rotation(rotation)
+        R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
         self.q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
-        w = vector_of(angular, "an angular velocity", self.q.shape[:-1])
-        self.u[..., 3:] = vector_of(linear, "a velocity", self.q.shape[:-1])
+        lead = self.q.shape[:-1]
+        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
+        self.u[..., 3:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
         self.u[..., :3] = (np.swapaxes(self.rotation, -1, -2) @ w[..., None])[..., 0]
 
     # ---- forces ----------------------------------------------------------------------------------
@@ -169,6 +170,10 @@ class RigidBody(Body):
         """Return inertia, its inverse and mass, as `steps` take them."""
         return self.characteristics.inertia, self._inverse, self.characteristics.mass
 
+    def mass_solver(self) -> Callable[[Array], Array]:
+        """Return what solves M x = b; see `Body`."""
+        return self.apart
+
     def apart(self, b: Array) -> Array:
         """Return M^-1 b of columns (6, k): torques and forces answer apart."""
         return np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
@@ -192,7 +197,9 @@ class RigidBody(Body):
         spin = (self.rotation @ self.times_mass(self.u)[..., :3, None])[..., 0]
         if about is None:
             return np.asarray(spin)
-        return np.asarray(spin + np.cross(self.q[..., 9:] - finite(about, "a point"), self.linear_momentum()))
+        return np.asarray(
+            spin + np.cross(self.q[..., 9:] - vector_of(about, "a point"), self.linear_momentum())
+        )
 
 
 class Obstacle(RigidBody):
@@ -216,7 +223,9 @@ class Obstacle(RigidBody):
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
         from kratos_lite.materials import Isotropic3D
 
-        shape = Characteristics.of(mesh.points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0)))
+        shape = Characteristics.of(
+            mesh_of(mesh).points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))
+        )
         super().__init__(mesh, material, characteristics=shape)
 
     @property

@@ -37,7 +37,8 @@ def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Parameters
     ----------
-    body : pseudo-rigid or finite-element.
+    body : pseudo-rigid or finite-element; constraints must hold it, for the tangent is that of the body
+        alone: springs and pressures that follow count as loads, and must be weak beside its stiffness.
     progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
 
     Returns
@@ -83,7 +84,8 @@ def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
         return iterations
     body.q = start
     raise SolveError(
-        f"no equilibrium was found: {failed}; is the body held, and are the loads not too large?"
+        f"no equilibrium was found: {failed}; is the body held by constraints "
+        "(springs alone do not hold it), and are the loads not too large?"
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, ModelError
 
 KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
 SOFT = (
@@ -106,3 +106,87 @@ def test_a_damper_is_of_second_order(kind, scheme):
         errors.append(abs(body.mass_center()[0] - 0.1 - (1 - np.exp(-1))))
     assert errors[1] < 1e-6
     assert errors[0] / errors[1] == pytest.approx(4, abs=0.2)
+
+
+# ---- wrong input -----------------------------------------------------------------------------------
+
+X = (0.5, 0.5, 0.5)
+WRONG = [
+    (lambda b: b.set_velocity(linear=np.ones((8, 3))), r"a velocity of shape .* does not fit a single body"),
+    (lambda b: b.set_velocity(angular=np.ones((8, 3))), "an angular velocity of shape"),
+    (lambda b: b.turn(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
+    (lambda b: b.add(kl.Force(X, np.ones((2, 3)))), "a force of shape"),
+    (lambda b: b.add(kl.Spring(X, (1, 0, 0), [1, 2])), "the stiffness of a spring must be one number"),
+    (lambda b: b.add(kl.Spring(X, (1, 0, 0), 1, damping=[1, 2])), "the damping of a spring must be one"),
+    (lambda b: b.add(kl.Spring(X, (1, 0, 0), 1, length=-1)), "the length of a spring must be one number"),
+    (lambda b: b.add(kl.Spring(X, (1, 0, 0), 1, length="long")), "the length of a spring must be made of"),
+    (lambda b: b.constrain(kl.FixPoint(np.zeros((0, 3)))), "a FixPoint needs one point at least"),
+    (
+        lambda b: b.constrain(kl.Gravity((0, 0, -9.81))),
+        "a constraint such as FixPoint is needed; got Gravity",
+    ),
+    (lambda b: setattr(b, "damping", float("nan")), "a damping must be finite"),
+    (lambda b: setattr(b, "damping", -1.0), "a damping must be one number"),
+    (lambda b: setattr(b, "tolerance", float("nan")), "a tolerance must be finite"),
+    (lambda b: setattr(b, "tolerance", -1.0), "a tolerance must be one number"),
+    (lambda b: type(b)(b.mesh, b.material, scheme=""), "the schemes of a"),
+    (lambda b: type(b)("box.msh", b.material), "a Mesh is needed"),
+    (lambda b: b.angular_momentum((1, 2)), r"three components|shape"),
+]
+
+
+@each_kind
+@pytest.mark.parametrize(("mistake", "text"), WRONG)
+def test_wrong_input_is_told(kind, mistake, text):
+    body = kind(kl.box(), RUBBER)
+    with pytest.raises(InputError, match=text):
+        mistake(body)
+
+
+@pytest.mark.parametrize("value", ["much", None, float("nan")])
+def test_a_callback_that_returns_no_numbers_is_told(value):
+    body = kl.RigidBody(kl.box(), RUBBER)
+    body.add(kl.Callback(lambda q, u, t: value))
+    with pytest.raises(InputError, match=r"what a callback returns at t = 0\.05 s must be"):
+        march(body, 0.1, 1)
+
+
+@pytest.mark.parametrize("modes", [6.5, "many", True])
+def test_modes_are_counted(modes):
+    with pytest.raises(InputError, match="modes must be a whole number"):
+        kl.FiniteElementBody(kl.box(), RUBBER, form="BC-MODAL", modes=modes)
+
+
+def test_a_form_is_named():
+    with pytest.raises(InputError, match="unknown form of a finite-element body 3"):
+        kl.FiniteElementBody(kl.box(), RUBBER, form=3)
+
+
+def test_an_obstacle_has_a_mesh_and_stays_one():
+    with pytest.raises(InputError, match="a Mesh is needed"):
+        kl.Obstacle(None)
+    with pytest.raises(ModelError, match="an obstacle has no mass"):
+        kl.convert(kl.Obstacle(kl.box(), RUBBER), kl.RigidBody)
+
+
+def test_each_of_many_bodies_may_have_its_own_force_and_torque():
+    many = kl.RigidBody(characteristics=kl.Characteristics.box(np.ones((3, 3)), density=2.0))
+    force = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
+    many.add(kl.Force((0, 0, 0), force))
+    many.add(kl.Torque(force))
+    march(many, 0.5, 2)
+    np.testing.assert_allclose(many.linear_momentum(), force, atol=1e-14)
+    np.testing.assert_allclose(many.angular_momentum(), force, atol=1e-14)
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_a_tapered_body_stays_undeformed_when_converted(lumped):
+    """Lumped mass has its centre elsewhere, which must not look like deformation."""
+    mesh = kl.box(element="KinematicLinear3D20N")
+    mesh.points[:, 1:] *= 1 + mesh.points[:, :1]
+    soft = kl.FiniteElementBody(mesh, RUBBER, lumped=lumped)
+    soft.q, soft.u = np.tile([1.0, 2, 3], 20), np.tile([4.0, 5, 6], 20)
+    body = kl.convert(soft, kl.PseudoRigidBody)
+    np.testing.assert_allclose(body.deformation, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(body.mass_center(), body.center + np.array([1, 2, 3]), atol=1e-14)
+    np.testing.assert_allclose(body.u, np.repeat([0, 4, 5, 6], [9, 1, 1, 1]), atol=1e-13)

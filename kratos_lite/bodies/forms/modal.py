@@ -29,6 +29,8 @@ class Modal(Corotational):
 
     def __init__(self, points: Array, batches: Sequence[Batch], mass: Mass, count: int) -> None:
         super().__init__(points, batches, mass)
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)):
+            raise InputError(f"modes must be a whole number; got {count!r}")
         if count < 6:
             raise InputError(f"modes must be at least 6, for the rigid motions are modes too; got {count}")
         self._Z = points - mass.nodal @ points / mass.nodal.sum()  # momenta are about the mass centre

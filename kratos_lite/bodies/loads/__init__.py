@@ -4,7 +4,7 @@ A load is bound to a body when it is added; what is bound gives the generalised 
 Loads of models (gravity, tractions, dead pressure, …) act through their nodal forces, on every kind of body.
 """
 
-from kratos_lite.bodies.loads.base import BodyLoad, Bound, bind, one_point
+from kratos_lite.bodies.loads.base import BodyLoad, Bound, bind
 from kratos_lite.bodies.loads.callback import Callback
 from kratos_lite.bodies.loads.forces import Force, Spring, Torque
 from kratos_lite.bodies.loads.pressure import FollowerPressure
@@ -18,5 +18,4 @@ __all__ = [
     "Spring",
     "Torque",
     "bind",
-    "one_point",
 ]

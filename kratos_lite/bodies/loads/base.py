@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.given import elements_of, points_of
+from kratos_lite.bodies.given import elements_of
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Gravity, Load
@@ -144,14 +144,6 @@ def _dead(load: Load, body: Body, factor: Callable[[float], float], steady: bool
     return Bound(
         lambda q, u, t: body.push_nodes(f, q), factor, steady, spatial=spatial, potential_energy=potential
     )
-
-
-def one_point(X: ArrayLike) -> Array:
-    """Return one point (3,) as floats."""
-    point = points_of(X)
-    if point.ndim != 1:
-        raise InputError(f"one point (3,) is needed; got shape {point.shape}")
-    return point
 
 
 def upright(body: Body) -> Array:

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import vector_of
-from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, one_point, upright
+from kratos_lite.bodies.given import fitting, one_point, vector_of
+from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, upright
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.errors import InputError, ModelError
@@ -34,7 +34,7 @@ class Force(BodyLoad):
 
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
-        X, f = self.point, self.force
+        X, f = self.point, fitting(self.force, body.q.shape[:-1], 1, "a force")
         body.find(X)
         if self.frame == "convected":
             fixed = body.push(X, f, upright(body)) if isinstance(body, RigidBody) else None
@@ -70,13 +70,13 @@ class Torque(BodyLoad):
             raise ModelError(
                 f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces at two points"
             )
-        zero, t = np.zeros(3), self.torque
-        fixed = np.broadcast_to(np.concatenate([t, zero]), body.u.shape)
+        t = fitting(self.torque, body.q.shape[:-1], 1, "a torque")
+        fixed = np.broadcast_to(np.concatenate([t, np.zeros_like(t)], axis=-1), body.u.shape)
         if self.frame == "convected":
             return Bound(lambda q, u, time: fixed, factor, steady, convected=fixed)
 
         def generalised(q: Array, u: Array, time: float) -> Array:
-            T = (np.swapaxes(rotation(q), -1, -2) @ t[:, None])[..., 0]
+            T = (np.swapaxes(rotation(q), -1, -2) @ t[..., None])[..., 0]
             return np.concatenate([T, np.zeros_like(T)], axis=-1)
 
         return Bound(generalised, factor, steady, spatial=fixed)
