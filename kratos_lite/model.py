@@ -276,7 +276,7 @@ class Model:
         if self.motion is not None:
             from kratos_lite.dynamics.steady import solve_steady
 
-            return solve_steady(self, tolerance, progress)
+            return solve_steady(self, solver, tolerance, progress)
         return solve_static(self, solver, tolerance, progress)
 
     def system(

@@ -88,6 +88,8 @@ class StaticSystem:
         if progress is not None and not callable(progress):
             raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
         solvers.choose(solver, 0)
+        if model.motion is not None:
+            raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance, self.progress = model, solver, tolerance, progress
         self._phase = Phases()
         self._prepare()

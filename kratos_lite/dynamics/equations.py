@@ -90,6 +90,7 @@ class EquationsOfMotion:
                 model.motion, self.system.points, self.system.batches, self.system.pattern, self.mass
             )
         self._kept: tuple[Any, Solve] | None = None
+        self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
 
     # ---- loads and supports ------------------------------------------------------------------------------
 
@@ -246,8 +247,8 @@ class EquationsOfMotion:
     def times_damping(self, v: Array, time: float) -> Array:
         """Return C v at a time."""
         out = self.rayleigh[1] * (self.K @ v) if self.rayleigh[1] else np.zeros_like(v)
-        if (scalar := self.damping_terms(time)) is not None:
-            out = out + self._scalar_times(scalar, v)
+        if (scalar := self._scalars(time)[1]) is not None:
+            out = out + (scalar @ v.reshape(-1, 3)).ravel()
         if self.dashpots is not None:
             out = out + self.dashpots @ v
         return np.asarray(out)
@@ -255,17 +256,24 @@ class EquationsOfMotion:
     def times_stiffness(self, u: Array, time: float) -> Array:
         """Return K u with what the motion adds, at a time."""
         out = self.K @ u
-        if (scalar := self.stiffness_terms(time)) is not None:
-            out = out + self._scalar_times(scalar, u)
+        if (scalar := self._scalars(time)[0]) is not None:
+            out = out + (scalar @ u.reshape(-1, 3)).ravel()
         return np.asarray(out)
 
-    def _scalar_times(self, data: Array, v: Array) -> Array:
+    def _scalars(self, time: float) -> tuple[Any, Any]:
+        """Return what the motion adds to K and C as sparse (a, a), or None; kept for the same rates."""
         from scipy.sparse import csr_array
 
-        pattern = self.system.pattern
-        n = pattern.n_nodes
-        matrix = csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
-        return np.asarray(matrix @ v.reshape(-1, 3)).ravel()
+        key = self.rates(time)
+        if self._scalar_kept is None or self._scalar_kept[0] != key:
+            pattern = self.system.pattern
+            n = pattern.n_nodes
+            pair = [
+                None if data is None else csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+                for data in (self.stiffness_terms(time), self.damping_terms(time))
+            ]
+            self._scalar_kept = key, (pair[0], pair[1])
+        return self._scalar_kept[1]
 
     def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
         """Return m M + c C + k K at a time, (3a, 3a)."""

@@ -117,10 +117,8 @@ class Transient:
             raise ModelError("central differences do not take constraints; use newmark()")
         self.time, self.step = 0.0, 0
         self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
-        start = self.equations.prescribed(0.0)
-        held = self._held
-        self.u[held] = start[held]
-        self.v[held] = self._speed(0.0)[held] if velocity is None else self.v[held]
+        self.u = self._allowed(self.u, self.equations.prescribed(0.0))
+        self.v = self._allowed(self.v, self._speed(0.0))
         self.a = self._initial_acceleration()
 
     @property
@@ -128,6 +126,13 @@ class Transient:
         held = np.ones(self.equations.size, dtype=bool)
         held[self.equations.system.reduced.free] = False
         return held
+
+    def _allowed(self, x: Array, prescribed: Array) -> Array:
+        """Return vectors (3a,) whose held components follow from supports and constraints."""
+        reduced = self.equations.system.reduced
+        if reduced.T is not None:
+            return np.asarray(reduced.T @ x[reduced.free] + prescribed)
+        return np.where(self._held, prescribed, x)
 
     def _given(self, values: ArrayLike | None, what: str) -> Array:
         n = self.equations.system.n_nodes

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
-from kratos_lite.loads import Gravity
+from kratos_lite.loads import Gravity, Varying
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model import Model
@@ -29,9 +29,16 @@ def document_from(model: Model) -> Document:
     Every material becomes a Properties block, gravity on the whole body its VOLUME_ACCELERATION;
     all other loads become the point loads that they put on the nodes.
     """
-    for what, given in (("prestress", model.prestress), ("initial displacement", model.initial_displacement)):
-        if given is not None:
-            raise InputError(f"a {what} cannot be written to .mdpa")
+    unwritten = {
+        "a prestress": model.prestress is not None,
+        "an initial displacement": model.initial_displacement is not None,
+        "a motion of the material": model.motion is not None,
+        "a support that moves in time": bool(model.movements),
+        "a load that changes in time": any(isinstance(load, Varying) for load in model.loads),
+    }
+    for what, given in unwritten.items():
+        if given:
+            raise InputError(f"{what} cannot be written to .mdpa")
     mesh = model.mesh
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
