@@ -50,9 +50,10 @@ def _outputs(path: Path, output: Any) -> dict[str, str]:
 
 
 def _run(path: Path) -> dict[str, Any]:
-    """Run a file beside its own modules; an error in it ends in one line with its place."""
-    folder = str(path.parent.absolute())
+    """Run a file beside its own modules; it gets no arguments, and an error has its place in one line."""
+    folder, words = str(path.parent.absolute()), sys.argv
     sys.path.insert(0, folder)
+    sys.argv = [str(path)]
     try:
         return runpy.run_path(str(path), run_name="scene")
     except SyntaxError as error:
@@ -64,3 +65,4 @@ def _run(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}{line}: {kind}{error}") from error
     finally:
         sys.path.remove(folder)
+        sys.argv = words
