@@ -12,6 +12,8 @@ from kratos_lite.errors import InputError, nearest
 T = TypeVar("T")
 P = ParamSpec("P")
 R = TypeVar("R")
+FEW = 12
+"""Names that are all listed where none is near to an unknown one."""
 
 
 def remembered(function: Callable[P, R]) -> Callable[P, R]:
@@ -45,7 +47,10 @@ class Registry(Generic[T]):
         key = name if name in self._items else self._aliases.get(name, name)
         if key not in self._items:
             known = [*self._items, *self._aliases]
-            raise InputError(f"unknown {self.kind} {name!r}.{nearest(name, known)}")
+            hint = nearest(name, known) if isinstance(name, str) else ""
+            if not hint and 0 < len(known) <= FEW:
+                hint = f" There are {', '.join(known)}"
+            raise InputError(f"unknown {self.kind} {name!r}.{hint}")
         return self._items[key]
 
     def __contains__(self, name: object) -> bool:

@@ -34,7 +34,7 @@ def run_script(path: Path) -> BodyScene:
         raise InputError(f"{path}: body must be a body such as kl.RigidBody, or a list of them; got {body!r}")
     given = {name: names[name] for name in OPTIONAL if name in names}
     given["output"] = _outputs(path, given.get("output", {}))
-    return BodyScene(body, names["dt"], names["steps"], files=[path], **given)
+    return BodyScene(body, names["dt"], names["steps"], files=[path], place=str(path), **given)
 
 
 def _outputs(path: Path, output: Any) -> dict[str, str]:
