@@ -133,8 +133,9 @@ class Series:
     - ``.csv``: a table with a line for each state: time, energies, mass centre, momenta (`COLUMNS`).
     - ``.npz``: arrays ``time``, ``step``, ``q``, ``u``, ``external_work`` with a row for each state.
 
-    Every file is written as a whole or not at all.  Index, table and arrays come at the end, also when the
-    loop ends early or by an error: then they hold the states up to there.
+    The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, table and
+    arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
+    there.
 
     Parameters
     ----------
@@ -166,11 +167,18 @@ class Series:
 
     def __init__(self, path: str | Path, body: Body, *, mode: str = "binary") -> None:
         check_ending(path)
+        if not isinstance(body, Body):
+            raise InputError(
+                f"{path}: a series holds the states of one body, such as kl.RigidBody; "
+                f"got {type(body).__name__}; make one series for each body"
+            )
         self.body, self.count = body, 0
         self._writer = self.kinds[Path(path).suffix.lower()](Path(path), body, mode)
 
     def add(self, state: State | None = None) -> None:
         """Take a state, or the body as it is if none is given."""
+        if not self.count:
+            make_folder(self._writer.path)
         self._writer.add(State.of(self.body) if state is None else state)
         self.count += 1
 
@@ -186,6 +194,14 @@ class Series:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def make_folder(path: Path) -> None:
+    """Make the folder of a file if it is missing; InputError if that cannot be done."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: its folder cannot be made: {error.strerror}") from error
 
 
 def check_ending(path: str | Path) -> None:

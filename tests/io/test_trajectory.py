@@ -90,6 +90,23 @@ def test_an_error_leaves_what_there_is(tmp_path, name):
         assert np.load(tmp_path / name)["step"].tolist() == [1, 2, 3]
 
 
+def test_a_missing_folder_is_made_with_the_first_state(tmp_path):
+    for name in ("a.pvd", "a.csv", "a.npz"):
+        with kl.Series(tmp_path / "new" / name[2:] / name, thrown(kl.RigidBody)) as series:
+            assert not (tmp_path / "new" / name[2:]).exists()
+            series.add()
+        assert (tmp_path / "new" / name[2:] / name).is_file()
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(kl.InputError, match=r"a\.csv: its folder cannot be made"):
+        kl.Series(tmp_path / "taken" / "a.csv", thrown(kl.RigidBody)).add()
+
+
+def test_a_series_is_of_one_body(tmp_path):
+    body = thrown(kl.RigidBody)
+    with pytest.raises(kl.InputError, match=r"a\.pvd: a series holds the states of one body.*got list"):
+        kl.Series(tmp_path / "a.pvd", [body, body])
+
+
 def test_no_state_no_file(tmp_path):
     with kl.Series(tmp_path / "a.csv", thrown(kl.RigidBody)) as series:
         assert series.count == 0
