@@ -84,7 +84,7 @@ def _draw_curves(below: Any, times: Floats, curves: Mapping[str, Floats], unit: 
 
 
 def _label_times(axes: Any, positions: Sequence[Floats], times: Floats, near: float) -> None:
-    """Write the times of the first and the last position beneath them; as one text where they lie together."""
+    """Write the times of the first and the last position beneath them; as one text if these are one."""
     ends = [x @ ISOMETRIC[:2].T for x in (positions[0], positions[-1])]
     feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{times[i]:.3g} s" for i in (0, -1)]
     if np.abs(ends[0] - ends[1]).max() < near:
