@@ -82,14 +82,14 @@ class Body(ABC):
         damping: float = 0.0,
     ) -> None:
         self.mesh, self.material, self.characteristics = mesh, material, characteristics
+        for doubt in self.doubts():
+            _log.warning("%s", doubt)
         self.q, self.u = q, u
         self.clock = Clock()
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
-        for doubt in self.doubts():
-            _log.warning("%s", doubt)
         self.scheme = scheme or self.default_scheme()
         self.damping = self._checked_damping(damping)
 
