@@ -83,6 +83,8 @@ class Body(ABC):
         damping: float = 0.0,
     ) -> None:
         self.mesh, self.material, self.characteristics = mesh, material, characteristics
+        for doubt in self.doubts():
+            _log.warning("%s", doubt)
         self.q, self.u = q, u
         self.clock = Clock()
         self.external_work: Array = np.zeros(q.shape[:-1])
@@ -90,8 +92,6 @@ class Body(ABC):
         self.constraints: list[Constraint] = []
         self.marched: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
-        for doubt in self.doubts():
-            _log.warning("%s", doubt)
         self.scheme = self.default_scheme() if scheme is None else scheme
         self.damping = damping
 

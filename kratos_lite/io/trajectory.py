@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar
@@ -33,6 +34,10 @@ COLUMNS = (
 """Columns of a table: energy is the sum of the three before it, angular momentum about the mass centre."""
 SHOWN = 6
 """Positions in a picture."""
+CANDIDATES = 400
+"""States, evenly spread, among which they are chosen."""
+ALIKE = 0.02
+"""Share of its size that a body moves between positions that are worth drawing."""
 
 
 def row_of(body: Body, state: State) -> Array:
@@ -219,14 +224,15 @@ def trajectory_picture(
     title: str = "",
     size: tuple[float, float] = (8, 8),
 ) -> None:
-    """Draw a body along its path, and its energies against time beneath.
+    """Draw a body along its path, and its energies against time beneath if there is more than one state.
 
     Parameters
     ----------
     path : picture to write; .png, .pdf or .svg.
     body : a single body with a mesh.
     states : in the order of time.
-    shown : how many positions are drawn, evenly spread over the states; the later the stronger.
+    shown : how many positions are drawn at most: the first, the last, and those that differ most from each
+        other, such as turning points; the later the stronger.
     title : above the picture.
     size : largest width and height in inches, at 150 dots per inch.
 
@@ -258,8 +264,7 @@ def trajectory_picture(
     if not kept:
         raise InputError(f"{path}: there is no state to draw")
     table = np.array(rows)
-    chosen = np.unique(np.linspace(0, len(kept) - 1, max(shown, 1)).round().astype(int))
-    positions = [body.position(body.mesh.points, kept[i]) for i in chosen]
+    positions = [body.position(body.mesh.points, kept[i]) for i in _telling(body, kept, shown)]
     names = ("kinetic", "internal", "potential", "sum")
     curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
     motion_picture(
@@ -273,3 +278,23 @@ def trajectory_picture(
         unit="energy in J",
         size=size,
     )
+
+
+def _telling(body: Body, kept: list[Array], shown: int) -> list[int]:
+    """Return the states to draw: first and last, then again and again the one farthest from those chosen."""
+    assert body.mesh is not None
+    X = body.mesh.points
+    corners = np.unique([np.argmax(X @ side) for side in product((-1, 1), repeat=3)])
+    rows = np.unique(np.linspace(0, len(kept) - 1, CANDIDATES).round().astype(int))
+    places = np.array([body.position(X, kept[row])[corners] for row in rows])
+
+    def away(i: int) -> Array:
+        return np.asarray(((places - places[i]) ** 2).sum(axis=(1, 2)))
+
+    chosen = [len(rows) - 1, 0][: max(shown, 1)]
+    distance = np.min([away(i) for i in chosen], axis=0)
+    alike = (ALIKE * np.ptp(X, axis=0).max()) ** 2 * len(corners)
+    while len(chosen) < shown and distance.max() > alike:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, away(chosen[-1]))
+    return sorted({int(rows[i]) for i in chosen})
