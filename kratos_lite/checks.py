@@ -5,7 +5,7 @@ Each check either raises one clear error or returns warnings for the report.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from kratos_lite.batches import Batch
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, MeshError, SolveError
+from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -22,6 +23,8 @@ from kratos_lite.supports import Supports
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+SLOWEST, QUICKEST = 1.0, 2e4
+"""Speeds of waves in m/s: jelly is above the one, diamond below the other."""
 FOLD = 0.2
 """Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
 
@@ -205,7 +208,23 @@ def check_scales(mesh: Mesh, batches: Sequence[Batch]) -> list[str]:
         warnings.append(
             f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
         )
-    return warnings
+    return warnings + check_wave_speeds(batch.material for batch in batches)
+
+
+def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
+    """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
+    warnings = []
+    for material in materials:
+        if not material.density > 0:
+            continue
+        E = 1 / float(np.linalg.inv(material.C).diagonal()[:3].min())
+        speed = float(np.sqrt(E / material.density))
+        if not SLOWEST <= speed <= QUICKEST:
+            warnings.append(
+                f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "
+                f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
+            )
+    return list(dict.fromkeys(warnings))
 
 
 def _is_near_half(C: Array) -> bool:

@@ -12,6 +12,8 @@ from kratos_lite.errors import InputError, nearest
 T = TypeVar("T")
 P = ParamSpec("P")
 R = TypeVar("R")
+FEW = 12
+"""Names that are all listed where none is near to an unknown one."""
 
 
 def remembered(function: Callable[P, R]) -> Callable[P, R]:
@@ -46,6 +48,8 @@ class Registry(Generic[T]):
         if key not in self._items:
             known = [*self._items, *self._aliases]
             hint = nearest(name, known) if isinstance(name, str) else ""
+            if not hint and 0 < len(known) <= FEW:
+                hint = f" There are {', '.join(known)}"
             raise InputError(f"unknown {self.kind} {name!r}.{hint}")
         return self._items[key]
 

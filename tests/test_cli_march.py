@@ -83,8 +83,30 @@ def test_a_summary_with_the_numbers(run, folder):
     # ½ m v² + 1160.047 J of the spin + m g z
     assert rows["sum of energies"] == f"{120 * 14 + 1160.047 + 240 * 9.81 * 0.5:.7g} J"
     assert abs(float(rows["energy drift"].split()[0])) < 1e-13
+    fallen = 3 * 0.1 - 9.81 / 200
+    assert rows["external work"].startswith(f"{-240 * 9.81 * fallen:.7g} J, of all loads")
+    assert "dissipated" not in rows
     assert re.match(r"\S+ s, \S+ s in all", rows["time per step"])
     assert names(folder) == ["box.json"]
+
+
+def test_with_damping_the_loss_is_no_drift(run, folder):
+    write(body={"kind": "pseudo-rigid", "damping": 1e-3}, loads=[])
+    scene, rows = run("info", "box.json").rows, run("march", "box.json").rows
+    lost = float(scene["energy"].split()[0]) - float(rows["sum of energies"].split()[0])
+    assert lost > 1
+    assert float(rows["dissipated"].split()[0]) == pytest.approx(lost, rel=1e-3)
+    assert "energy drift" not in rows
+
+
+def test_missing_folders_are_made_by_a_march_alone(run, folder):
+    words = ("box.json", "--csv", "a/b/o.csv", "--state", "c/end.npz", "-q")
+    write(output={"csv": "x/o.csv"})
+    assert run("check", "box.json").code == 0
+    assert names(folder) == ["box.json"]
+    assert run("march", *words).code == 0
+    assert names(folder) == ["a", "box.json", "c"]
+    assert (folder / "a" / "b" / "o.csv").is_file()
 
 
 def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
@@ -214,6 +236,20 @@ def test_a_script_is_a_scene(run, folder):
     assert "1000 kg" in run("info", "spin.py").out
 
 
+def test_a_script_sees_no_options_of_the_command(run, folder, monkeypatch):
+    with open("spin.py", "w") as file:
+        file.write(
+            "import sys\nimport kratos_lite as kl\n"
+            "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1000.0))\n"
+            "assert sys.argv == ['spin.py'], sys.argv\n"
+            "dt, steps = 0.1, 2\n"
+        )
+    words = ["kratos-lite", "march", "spin.py"]
+    monkeypatch.setattr(sys, "argv", words)
+    assert run("march", "spin.py").err == ""
+    assert sys.argv is words
+
+
 def test_many_bodies_of_a_script(run, folder):
     with open("many.py", "w") as file:
         file.write(
@@ -231,7 +267,8 @@ def test_many_bodies_of_a_script(run, folder):
 
 def test_bad_targets_are_refused_before_the_march(run, folder):
     write(time={"step": 1e-9, "steps": 10**9})
-    assert run("march", "box.json", "--pvd", "none/o.pvd").refuses("the folder none does not exist")
+    assert run("march", "box.json", "--pvd", "box.json/o.pvd").refuses("the folder box.json does not exist")
+    assert run("march", "box.json", "--pvd", "none/o.txt").refuses("the ending of pvd must be .pvd")
     assert run("march", "box.json", "--pvd", "o.vtu").refuses("the ending of pvd must be .pvd")
     assert run("march", "box.json", "--state", "o.csv").refuses("the ending of state must be .npz")
     assert run("march", "box.json", "--npz", "o.npz", "--state", "o.npz").refuses("another output already")
@@ -261,3 +298,11 @@ def test_help_names_every_output(run):
     assert done.code == 0
     for word in ("--pvd", "--csv", "--npz", "--picture", "--state", "--restart", "examples:"):
         assert word in done.out
+    assert "give them new names" in " ".join(done.out.split())
+
+
+@pytest.mark.parametrize("command", ["info", "check"])
+def test_help_of_other_commands_names_scenes(run, command):
+    text = " ".join(run(command, "--help").out.split())
+    assert "a .json file with a body, or a .py script with body, dt and steps" in text
+    assert re.search(rf"kratos-lite {command} examples/bodies/\w+\.json", text)

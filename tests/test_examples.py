@@ -130,6 +130,28 @@ def test_the_pendulum_is_back_after_its_period(tmp_path):
     assert abs(number(r"energy drift +(\S+)", out)) < 1e-12
 
 
+def test_a_scene_in_python_is_marched(tmp_path):
+    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "thrown_box.py", "--csv", "out/box.csv")
+    out = run(*march, cwd=tmp_path)
+    rows = [
+        list(map(float, row.split(","))) for row in (tmp_path / "out/box.csv").read_text().splitlines()[1:]
+    ]
+    assert len(rows) == 51
+    # with the drag 2 |w| w, w = wind - v, of the mass centre alone, by a Runge-Kutta method of high order
+    from scipy.integrate import solve_ivp
+
+    def rate(t, y):
+        flow = [-6.0 - y[3], -y[4], -y[5]]
+        drag = [2.0 * sum(w * w for w in flow) ** 0.5 * w / 24.0 for w in flow]
+        return [*y[3:], drag[0], drag[1], drag[2] - 9.81]
+
+    end = solve_ivp(rate, (0, 1), [0.2, 0.3, 0.5, 6.0, 0.0, 4.905], rtol=1e-10, atol=1e-10).y[:3, -1]
+    assert rows[-1][6:9] == pytest.approx(end.tolist(), abs=1e-5)
+    assert rows[-1][12:] == pytest.approx([0.136, 23.2, 0.052], rel=1e-9)  # J ω: drag has no torque
+    assert abs(number(r"energy drift +(\S+)", out)) < 1e-6
+    assert "examples/bodies/thrown_box.py" in (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+
+
 def test_both_forms_of_the_spinning_bar_stretch_alike():
     out = run(sys.executable, BODIES / "rotating_bar.py")
     # Solfec-1.0: 7.038e-4 m and 7.035e-4 m

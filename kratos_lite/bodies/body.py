@@ -7,6 +7,7 @@ stands on the few methods that a kind defines.
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Gauge: TypeAlias = Callable[[Array], Array]
 
+_log = logging.getLogger("kratos_lite")
 BODIES: Registry[type[Body]] = Registry("kind of body")
 """Every kind of body by its class name and by its `kind`."""
 
@@ -81,6 +83,8 @@ class Body(ABC):
         damping: float = 0.0,
     ) -> None:
         self.mesh, self.material, self.characteristics = mesh, material, characteristics
+        for doubt in self.doubts():
+            _log.warning("%s", doubt)
         self.q, self.u = q, u
         self.clock = Clock()
         self.external_work: Array = np.zeros(q.shape[:-1])
@@ -214,6 +218,10 @@ class Body(ABC):
     def step(self, value: int) -> None:
         self.clock = replace(self.clock, step=int(value))
 
+    def doubts(self) -> list[str]:
+        """Return what is allowed, but may be a mistake; it is also logged when the body is made."""
+        return []
+
     # ---- characteristics -------------------------------------------------------------------------
 
     @property
@@ -273,8 +281,11 @@ class Body(ABC):
             …), which acts on the nodes as on the undeformed mesh and keeps its direction in space.
         factor : number, `TimeSeries`, or function of the time in s, by which it is multiplied.
         """
+        from kratos_lite.bodies.constraints import Constraint
         from kratos_lite.bodies.loads import bind
 
+        if isinstance(load, Constraint):
+            raise InputError(f"a {type(load).__name__} is a constraint, no load: body.constrain takes it")
         self.loads.append(bind(load, self, factor))
         self._constant = None
 
@@ -285,9 +296,16 @@ class Body(ABC):
         ------
         MeshError
             If a point lies outside the body.
+        InputError
+            If it is no constraint.
         """
-        if not hasattr(constraint, "bind") or not hasattr(constraint, "gaps"):
-            raise InputError(f"a constraint such as FixPoint is needed; got {type(constraint).__name__}")
+        from kratos_lite.bodies.constraints import Constraint
+
+        if not isinstance(constraint, Constraint):
+            raise InputError(
+                f"a constraint such as FixPoint is needed; got {type(constraint).__name__}; "
+                "loads are for body.add"
+            )
         constraint.bind(self)
         self.constraints.append(constraint)
         self.marched = None

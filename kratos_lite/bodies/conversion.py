@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.body import BODIES, Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
@@ -18,7 +18,11 @@ Array = NDArray[np.float64]
 Kind = TypeVar("Kind", RigidBody, PseudoRigidBody, FiniteElementBody)
 
 
-def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
+@overload
+def convert(body: Body, kind: type[Kind], **options: Any) -> Kind: ...
+@overload
+def convert(body: Body, kind: str, **options: Any) -> Body: ...
+def convert(body: Body, kind: Any, **options: Any) -> Any:
     """Return the body as another kind, in the motion that this kind can have.
 
     A rigid one gets the rotation by polar decomposition, and keeps both momenta; a pseudo-rigid one the
@@ -28,7 +32,7 @@ def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
     Parameters
     ----------
     body : a single body with a mesh and a material.
-    kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`.
+    kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`, or its word such as ``"rigid"``.
     options : further arguments of the kind, such as ``form="BC"``.
 
     Raises
@@ -45,6 +49,8 @@ def convert(body: Body, kind: type[Kind], **options: Any) -> Kind:
     >>> print(f"{rigid.kinetic_energy():.3f} J, {soft.kinetic_energy():.3f} J")
     1160.047 J, 1160.047 J
     """
+    if isinstance(kind, str):
+        kind = BODIES[kind]
     if kind not in (RigidBody, PseudoRigidBody, FiniteElementBody):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
     if isinstance(body, Obstacle):

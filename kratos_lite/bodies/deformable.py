@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
+from kratos_lite.checks import check_wave_speeds
 
 Array = NDArray[np.float64]
 Solve: TypeAlias = Callable[[Array], Array]
@@ -29,6 +30,12 @@ class Deformable(Body):
     def default_scheme(self) -> str:
         """Return ``ENERGY_MOMENTUM``."""
         return "ENERGY_MOMENTUM"
+
+    def doubts(self) -> list[str]:
+        """Return materials whose waves are so slow or quick that their units may be wrong."""
+        given = self.material
+        materials = given.values() if isinstance(given, Mapping) else [] if given is None else [given]
+        return check_wave_speeds(materials)
 
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:

@@ -88,7 +88,8 @@ def _alike(members: Sequence[Body]) -> Body:
                 )
         if body.constraints or not all(load.is_constant for load in body.loads):
             raise ModelError(
-                f"body {row} has constraints or loads that change; only bodies with constant loads advance "
+                f"body {row} has constraints or loads that change with the time, or as it turns, as the "
+                "moment of a spatial force off the mass centre does; only bodies with constant loads advance "
                 "together: march it alone"
             )
     if len({id(body) for body in members}) < len(members):

@@ -82,8 +82,8 @@ class State:
             kind, step, time = str(values["kind"]), int(values["step"]), float(values["time"])
         except FileNotFoundError:
             raise InputError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
-            raise InputError(f"{path}: not a state that State.save wrote ({error})") from None
+        except (OSError, ValueError, KeyError, TypeError, EOFError):
+            raise InputError(f"{path}: not a state that State.save wrote") from None
         return cls(kind, values["q"], values["u"], time, step, values["external_work"])
 
 

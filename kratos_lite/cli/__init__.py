@@ -47,15 +47,16 @@ def build_parser() -> argparse.ArgumentParser:
     _add(
         commands,
         "info",
-        "describe a file without solving it",
-        "kratos-lite info beam.mdpa",
-    ).add_argument("input", help=INPUT)
+        "describe a file without solving it, or a scene of a body without marching it",
+        "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
+    ).add_argument("input", help=f"{INPUT}; or {SCENE}")
     _add(
         commands,
         "check",
-        "report every problem of a file, or of the elements and materials in a Python file",
-        "kratos-lite check beam.mdpa\n  kratos-lite check my_element.py",
-    ).add_argument("input", help="an input file or scene, or a .py file that defines elements or materials")
+        "report every problem of a file or scene, or of the elements and materials in a Python file",
+        "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+        "  kratos-lite check my_element.py",
+    ).add_argument("input", help=f"an input file; {SCENE}; or a .py file that defines elements or materials")
     convert = _add(
         commands,
         "convert",
@@ -71,16 +72,21 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 INPUT = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
+SCENE = "a scene: a .json file with a body, or a .py script with body, dt and steps"
 SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve ProjectParameters.json --json result.json
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
 
 
+RESTART = (
+    "go on from a state that --state wrote; series and picture then hold the rest of the march only, and "
+    "replace those of the same name, so give them new names"
+)
 MARCH_EXAMPLES = """kratos-lite march examples/bodies/tumbling_box.json
-  kratos-lite march box.json --pvd box.pvd --csv box.csv --picture box.png
-  kratos-lite march box.json --steps 500 --state half.npz
-  kratos-lite march box.json --steps 500 --restart half.npz"""
+  kratos-lite march box.json --pvd out/box.pvd --csv out/box.csv --picture out/box.png
+  kratos-lite march box.json --steps 500 --csv first.csv --state half.npz
+  kratos-lite march box.json --steps 500 --csv second.csv --restart half.npz"""
 
 
 def _add(commands: object, name: str, text: str, example: str) -> argparse.ArgumentParser:
@@ -142,9 +148,7 @@ def _add_solve(commands: object) -> None:
 
 def _add_march(commands: object) -> None:
     march = _add(commands, "march", "let a body move through time and print a summary", MARCH_EXAMPLES)
-    march.add_argument(
-        "input", metavar="SCENE", help="a .json scene, or a .py script with body, dt and steps"
-    )
+    march.add_argument("input", metavar="SCENE", help=SCENE)
     out = march.add_argument_group("output (instead of the files that the scene names)")
     for key, text in (
         ("pvd", "states for ParaView: an index, and OUT_00000.vtu … beside it"),
@@ -157,7 +161,7 @@ def _add_march(commands: object) -> None:
         out.add_argument(f"--{key}", metavar=f"OUT.{ending}", help=text)
     how = march.add_argument_group("march")
     how.add_argument("--steps", type=int, metavar="N", help="number of steps, instead of that of the scene")
-    how.add_argument("--restart", metavar="STATE.npz", help="go on from a state that --state wrote")
+    how.add_argument("--restart", metavar="STATE.npz", help=RESTART)
     how.add_argument(
         "--progress", action="store_true", help="show the share done, also where not on a terminal"
     )

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.results import check_picture
 from kratos_lite.io.scenes.describe import body_lines, line, vector
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene, read_scene
-from kratos_lite.io.trajectory import Series, trajectory_picture
+from kratos_lite.io.trajectory import Series, make_folder, trajectory_picture
 
 SERIES = ("pvd", "csv", "npz")
 
@@ -51,7 +50,11 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
             scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " ")
         )
     if not options.quiet:
-        print("\n".join([*body_lines(scene), *_summary(start, _Totals(body), largest, seconds)]))
+        print(
+            "\n".join(
+                [*body_lines(scene), *_summary(start, _Totals(body), largest, seconds, body.damping > 0)]
+            )
+        )
         for path in scene.output.values():
             print(line("written", path))
     return 0
@@ -79,11 +82,13 @@ def _apply(scene: BodyScene, options: Namespace) -> None:
             raise InputError(f"--steps {options.steps}: a number of steps, 1 or more, is needed")
         scene.steps = options.steps
     _check_outputs(scene, scene.output, files)
+    for path in scene.output.values():
+        make_folder(Path(path))
 
 
 def _check_outputs(scene: BodyScene, output: dict[str, str], read: list[Path]) -> None:
     """Raise KratosLiteError for an output that cannot be written."""
-    check_targets(read, output.values())
+    check_targets(read, output.values(), new_folders=True)
     for key, path in output.items():
         ending = Path(path).suffix.lower()
         wanted = ".npz" if key == "state" else f".{key}"
@@ -121,22 +126,26 @@ class _Totals:
         )
 
 
-def _summary(start: _Totals, end: _Totals, largest: float, seconds: float) -> list[str]:
-    """Return the lines of the table that say how the march went."""
+def _summary(start: _Totals, end: _Totals, largest: float, seconds: float, damped: bool) -> list[str]:
+    """Return the lines of the table that say how the march went.
+
+    What kinetic and internal energy gain beyond the external work is an error of the scheme, unless damping
+    takes it; potential energy stays out of this, as its loss is external work already.
+    """
     steps = end.step - start.step
     gained = end.kinetic - start.kinetic + end.internal - start.internal - (end.work - start.work)
     share = gained / largest if largest else 0.0
-    rows: list[tuple[str, Any]] = [
+    balance = ("energy drift", f"{share:+.1e} of the largest energy: kinetic + internal less external work")
+    if damped:
+        balance = ("dissipated", f"{-gained:.7g} J, by damping and the scheme")
+    rows: list[tuple[str, str]] = [
         ("time", f"{start.time:.6g} … {end.time:.6g} s, {steps} steps"),
         ("kinetic energy", f"{end.kinetic:.7g} J"),
         ("internal energy", f"{end.internal:.7g} J"),
         ("potential energy", f"{end.potential:.7g} J"),
         ("sum of energies", f"{end.kinetic + end.internal + end.potential:.7g} J"),
-        ("work of loads", f"{end.work - start.work:.7g} J"),
-        (
-            "energy drift",
-            f"{share:+.1e} of the largest energy, with the work of loads",
-        ),
+        ("external work", f"{end.work - start.work:.7g} J, of all loads, gravity too, and of reactions"),
+        balance,
         ("linear momentum", f"{vector(end.linear)} kg m/s"),
         ("angular momentum", f"{vector(end.angular)} kg m²/s about the mass centre"),
     ]

@@ -13,8 +13,11 @@ KEYS_READ = ("model", "input_filename", "materials_filename", "input_file_name")
 """Keys of run files that name files to be read."""
 
 
-def check_targets(read: Iterable[Path], targets: Iterable[str | None]) -> None:
-    """Refuse, before any work is done, a target that is read, given twice, or cannot be written."""
+def check_targets(read: Iterable[Path], targets: Iterable[str | None], *, new_folders: bool = False) -> None:
+    """Refuse, before any work is done, a target that is read, given twice, or cannot be written.
+
+    Where `new_folders` are made for the targets, a folder may be missing.
+    """
     taken = {os.path.realpath(path) for path in read}
     for target in targets:
         if target is None:
@@ -22,7 +25,7 @@ def check_targets(read: Iterable[Path], targets: Iterable[str | None]) -> None:
         if not target:
             raise InputError("an output has an empty name; give a file name such as out.vtu")
         folder = Path(target).parent
-        if not folder.is_dir():
+        if not folder.is_dir() and not (new_folders and not folder.exists()):
             raise InputError(f"{target}: the folder {folder} does not exist")
         for path in _set_of(Path(target)):
             real, name = os.path.realpath(path), target if path == Path(target) else str(path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar
@@ -33,6 +34,10 @@ COLUMNS = (
 """Columns of a table: energy is the sum of the three before it, angular momentum about the mass centre."""
 SHOWN = 6
 """Positions in a picture."""
+CANDIDATES = 400
+"""States, evenly spread, among which they are chosen."""
+ALIKE = 0.02
+"""Share of its size that a body moves between positions that are worth drawing."""
 
 
 def row_of(body: Body, state: State) -> Array:
@@ -133,8 +138,9 @@ class Series:
     - ``.csv``: a table with a line for each state: time, energies, mass centre, momenta (`COLUMNS`).
     - ``.npz``: arrays ``time``, ``step``, ``q``, ``u``, ``external_work`` with a row for each state.
 
-    Every file is written as a whole or not at all.  Index, table and arrays come at the end, also when the
-    loop ends early or by an error: then they hold the states up to there.
+    The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, table and
+    arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
+    there.
 
     Parameters
     ----------
@@ -166,11 +172,18 @@ class Series:
 
     def __init__(self, path: str | Path, body: Body, *, mode: str = "binary") -> None:
         check_ending(path)
+        if not isinstance(body, Body):
+            raise InputError(
+                f"{path}: a series holds the states of one body, such as kl.RigidBody; "
+                f"got {type(body).__name__}; make one series for each body"
+            )
         self.body, self.count = body, 0
         self._writer = self.kinds[Path(path).suffix.lower()](Path(path), body, mode)
 
     def add(self, state: State | None = None) -> None:
         """Take a state, or the body as it is if none is given."""
+        if not self.count:
+            make_folder(self._writer.path)
         self._writer.add(State.of(self.body) if state is None else state)
         self.count += 1
 
@@ -188,6 +201,14 @@ class Series:
         self.close()
 
 
+def make_folder(path: Path) -> None:
+    """Make the folder of a file if it is missing; InputError if that cannot be done."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: its folder cannot be made: {error.strerror}") from error
+
+
 def check_ending(path: str | Path) -> None:
     """Raise InputError for a path whose ending is none of a series."""
     if Path(path).suffix.lower() not in Series.kinds:
@@ -203,14 +224,15 @@ def trajectory_picture(
     title: str = "",
     size: tuple[float, float] = (8, 8),
 ) -> None:
-    """Draw a body along its path, and its energies against time beneath.
+    """Draw a body along its path, and its energies against time beneath if there is more than one state.
 
     Parameters
     ----------
     path : picture to write; .png, .pdf or .svg.
     body : a single body with a mesh.
     states : in the order of time.
-    shown : how many positions are drawn, evenly spread over the states; the later the stronger.
+    shown : how many positions are drawn at most: the first, the last, and those that differ most from each
+        other, such as turning points; the later the stronger.
     title : above the picture.
     size : largest width and height in inches, at 150 dots per inch.
 
@@ -242,8 +264,7 @@ def trajectory_picture(
     if not kept:
         raise InputError(f"{path}: there is no state to draw")
     table = np.array(rows)
-    chosen = np.unique(np.linspace(0, len(kept) - 1, max(shown, 1)).round().astype(int))
-    positions = [body.position(body.mesh.points, kept[i]) for i in chosen]
+    positions = [body.position(body.mesh.points, kept[i]) for i in _telling(body, kept, shown)]
     names = ("kinetic", "internal", "potential", "sum")
     curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
     motion_picture(
@@ -257,3 +278,23 @@ def trajectory_picture(
         unit="energy in J",
         size=size,
     )
+
+
+def _telling(body: Body, kept: list[Array], shown: int) -> list[int]:
+    """Return the states to draw: first and last, then again and again the one farthest from those chosen."""
+    assert body.mesh is not None
+    X = body.mesh.points
+    corners = np.unique([np.argmax(X @ side) for side in product((-1, 1), repeat=3)])
+    rows = np.unique(np.linspace(0, len(kept) - 1, CANDIDATES).round().astype(int))
+    places = np.array([body.position(X, kept[row])[corners] for row in rows])
+
+    def away(i: int) -> Array:
+        return np.asarray(((places - places[i]) ** 2).sum(axis=(1, 2)))
+
+    chosen = [len(rows) - 1, 0][: max(shown, 1)]
+    distance = np.min([away(i) for i in chosen], axis=0)
+    alike = (ALIKE * np.ptp(X, axis=0).max()) ** 2 * len(corners)
+    while len(chosen) < shown and distance.max() > alike:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, away(chosen[-1]))
+    return sorted({int(rows[i]) for i in chosen})

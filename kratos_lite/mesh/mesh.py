@@ -154,10 +154,9 @@ class Mesh:
             return self.parts[ends[0]]
         if ends:
             raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
-        have = ", ".join(self.parts) or "none"
-        raise MeshError(
-            f"there is no part {name!r}; have {have} and the sides x- … z+.{nearest(name, self.parts)}"
-        )
+        have = ", ".join(part for part in self.parts if part not in SIDES)
+        have = f"have {have} and" if have else "have"
+        raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, self.parts)}")
 
     def _side(self, axis: int, end: int) -> Ints:
         x = self.points[:, axis]

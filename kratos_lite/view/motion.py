@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Floats, Mesh
-from kratos_lite.view.canvas import new_figure_with_curves, save_figure
+from kratos_lite.view.canvas import new_figure, new_figure_with_curves, save_figure
 from kratos_lite.view.surface import ISOMETRIC, PLAIN, draw, fineness, visible
 
 FADED = 0.25
@@ -31,6 +31,9 @@ def motion_picture(
     size: tuple[float, float] = (8, 8),
 ) -> None:
     """Draw positions of a body in one isometric view, later ones stronger, and curves against time.
+
+    The first and the last position have their times beneath them; a triad of axes shows directions and scale.
+    One time alone has no curves.
 
     Parameters
     ----------
@@ -53,21 +56,56 @@ def motion_picture(
     """
     if not mesh.boundary or not len(positions):
         raise InputError("there is nothing to draw: no position, or no element of a known shape")
-    figure, axes, below = new_figure_with_curves(size)
+    figure, axes, below = new_figure_with_curves(size) if len(times) > 1 else (*new_figure(size), None)
     n, edged = fineness(len(positions) * sum(map(len, mesh.boundary)))
     for strength, x in zip(np.linspace(FADED, 1, len(positions)), positions, strict=True):
         _body(axes, mesh, x, float(strength) if len(positions) > 1 else 1.0, n, edged)
     axes.plot(*(centers @ ISOMETRIC[:2].T).T, color=PATH, lw=1.2, zorder=3)
     axes.plot(*(centers[[0, -1]] @ ISOMETRIC[:2].T).T, ".", color=PATH, ms=6, zorder=3)
+    corners = np.concatenate([*positions, centers]) @ ISOMETRIC[:2].T
+    _label_times(axes, positions, times, 0.05 * float(np.ptp(corners, axis=0).max()))
+    _triad(axes, corners)
     axes.autoscale_view()
     axes.set_title(title, fontsize=11)
+    if below is not None:
+        _draw_curves(below, times, curves, unit)
+    save_figure(path, figure)
+
+
+def _draw_curves(below: Any, times: Floats, curves: Mapping[str, Floats], unit: str) -> None:
+    """Draw curves against time; a sum is dashed, as it may lie on one of its parts."""
     for name, values in curves.items():
-        below.plot(times, values, lw=1.4, label=name)
+        style = {"ls": (0, (4, 3)), "color": "0.15", "lw": 1.2} if name == "sum" else {"lw": 1.8}
+        below.plot(times, values, label=name, **style)
     below.set_xlabel("time in s")
     below.set_ylabel(unit)
     if curves:
         below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    save_figure(path, figure)
+
+
+def _label_times(axes: Any, positions: Sequence[Floats], times: Floats, near: float) -> None:
+    """Write the times of the first and the last position beneath them; as one text if these are one."""
+    ends = [x @ ISOMETRIC[:2].T for x in (positions[0], positions[-1])]
+    feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{times[i]:.3g} s" for i in (0, -1)]
+    if np.abs(ends[0] - ends[1]).max() < near:
+        feet, texts = feet[1:], [" and ".join(dict.fromkeys(texts))]
+    box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
+    for foot, text in zip(feet, texts, strict=True):
+        axes.annotate(
+            text, foot, (0, -4), textcoords="offset points", ha="center", va="top", size=9, bbox=box, zorder=4
+        )
+
+
+def _triad(axes: Any, drawn: Floats) -> None:
+    """Draw the three axes, of one length that is written to them, left of and below what is drawn."""
+    (left, low), extent = drawn.min(axis=0), float(np.ptp(drawn, axis=0).max())
+    power = 10.0 ** np.floor(np.log10(0.2 * extent))
+    length = power * max(step for step in (1, 2, 5) if step * power <= 0.2 * extent * (1 + 1e-9))
+    start = np.array([left - 1.1 * length, low + 0.41 * length])
+    for name, along in zip("xyz", ISOMETRIC[:2].T, strict=True):
+        axes.plot(*np.array([start, start + length * along]).T, color="0.35", lw=1.0, zorder=3)
+        axes.text(*(start + 1.18 * length * along), name, ha="center", va="center", size=9, color="0.25")
+    axes.text(*(start - (0, 0.5 * length)), f"{length:g} m", ha="center", va="top", size=9, color="0.25")
 
 
 def _body(axes: Any, mesh: Mesh, x: Floats, strength: float, n: int, edged: bool) -> None:

@@ -1,5 +1,7 @@
 """What bodies refuse: one clear error each, and the body stays as it was."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -313,6 +315,37 @@ def test_series_that_are_none(times, values, words):
 )
 def test_constraints_that_are_refused(kind, constraint, error, words, refused):
     refused(body_of(kind), lambda body: body.constrain(constraint()), error, words)
+
+
+@pytest.mark.parametrize("load", [kl.Gravity((0, 0, 1)), kl.Force((0, 0, 0), (1, 0, 0)), "hold", None])
+def test_a_load_is_no_constraint(load, refused):
+    words = f"a constraint such as FixPoint is needed; got {type(load).__name__}; loads are for body.add"
+    refused(body_of(kl.RigidBody), lambda body: body.constrain(load), kl.InputError, words)
+
+
+def test_a_constraint_is_no_load(refused):
+    words = "a FixPoint is a constraint, no load: body.constrain takes it"
+    refused(body_of(kl.RigidBody), lambda body: body.add(kl.FixPoint((0, 0, 0))), kl.InputError, words)
+
+
+@each_kind
+@pytest.mark.parametrize(
+    ("E", "density", "speed"), [(210.0, 7850.0, "0.164 m/s"), (2.1e5, 7.85e-9, "5.17e\\+06 m/s")]
+)
+def test_units_that_may_be_wrong_are_told(kind, E, density, speed, caplog):
+    body = kind(kl.box(), kl.Isotropic3D(E, 0.3, density))
+    if kind is kl.RigidBody:  # has no waves
+        assert not caplog.records
+        return
+    assert re.search(f"is {speed} in Isotropic3D.* E in Pa and the density in kg/m³", caplog.messages[0])
+    assert body.doubts() == caplog.messages
+
+
+@pytest.mark.parametrize(("E", "density"), [(1e3, 1000.0), (1050e9, 3510.0), (1.0, 0.0)])  # jelly, diamond
+def test_sound_units_leave_no_doubt(E, density):
+    from kratos_lite.checks import check_wave_speeds
+
+    assert check_wave_speeds([kl.Isotropic3D(E, 0.2, density)]) == []
 
 
 def test_a_constraint_holds_one_body(refused):

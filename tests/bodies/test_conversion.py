@@ -83,10 +83,20 @@ def test_the_other_body_is_another(brick):
     assert not np.shares_memory(body.u, other.u)
 
 
-@pytest.mark.parametrize("target", [kl.Obstacle, "rigid", None])
+@pytest.mark.parametrize("target", [kl.Obstacle, "obstacle", None])
 def test_a_kind_that_is_none_is_refused(target, brick):
     with pytest.raises(kl.InputError, match="becomes a RigidBody, PseudoRigidBody or FiniteElementBody"):
         kl.convert(brick(kl.RigidBody), target)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_word_is_a_kind_too(kind, brick):
+    body = spinning(brick, kl.RigidBody)
+    found, expected = kl.convert(body, kind.kind), kl.convert(body, kind)
+    assert type(found) is kind
+    np.testing.assert_array_equal(found.u, expected.u)
+    with pytest.raises(kl.InputError, match=r"unknown kind of body 'rigit'. Did you mean rigid"):
+        kl.convert(body, "rigit")
 
 
 def test_a_body_without_a_mesh_stays_what_it_is():

@@ -121,6 +121,11 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(scheme):
             "body 1 has constraints or loads that change",
         ),
         (
+            lambda b: b[1].add(kl.Force((0.1, 0.1, 0.1), (0, 0, 1.0))),
+            kl.ModelError,
+            "or as it turns, as the moment of a spatial force off the mass centre does",
+        ),
+        (
             lambda b: b.append(kl.FiniteElementBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
             kl.ModelError,
             "only single rigid and pseudo-rigid bodies",

@@ -197,6 +197,7 @@ MISTAKES = [
     ({"time": {"step": 0.1, "steps": 1, "substeps": "some"}}, "must be an integer; got 'some'"),
     ({"body": None}, "key 'body' is missing"),
     ({"body": "rigit"}, "unknown kind of body 'rigit'. Did you mean rigid"),
+    ({"body": "car"}, r"unknown kind of body 'car'. There are (?=.*, rigid\b)(?=.*, finite-element\b)"),
     ({"body": {"kind": "rigid", "form": "TL"}}, r"unknown key 'body\.form'"),
     ({"body": {"kind": "rigid", "scheme": "DEF_LIM"}}, "schemes of a rigid body are RIG_NEG"),
     ({"body": {"kind": "finite-element", "form": "TLL"}}, "unknown form of a finite-element body 'TLL'"),
@@ -257,6 +258,16 @@ def test_the_line_is_that_of_the_key(tmp_path):
         read_scene(path)
 
 
+def test_a_step_that_is_too_long_has_its_place(tmp_path, script):
+    body = {"kind": "pseudo-rigid", "scheme": "DEF_EXP"}
+    path = written(tmp_path, body=body, time={"step": 0.1, "steps": 1})
+    line = next(i for i, text in enumerate(path.read_text().splitlines(), 1) if '"step"' in text)
+    with pytest.raises(kl.InputError, match=rf"scene\.json:{line}:\d+: DEF_EXP is not stable"):
+        read_scene(path).march()
+    with pytest.raises(kl.InputError, match=r"swing\.py: a step must be one number of seconds > 0"):
+        read_scene(script(SCRIPT + "dt = 0\n")).march()
+
+
 def test_all_problems_come_together(tmp_path):
     path = written(
         tmp_path,
@@ -267,6 +278,12 @@ def test_all_problems_come_together(tmp_path):
     with pytest.raises(kl.InputError) as caught:
         read_scene(path)
     assert len(str(caught.value).splitlines()) == 4
+
+
+def test_a_description_says_what_is_doubtful(scene):
+    heavy = {"E": 210.0, "nu": 0.3, "density": 7850.0}
+    text = describe_scene(scene(body="pseudo-rigid", material=heavy))
+    assert re.search(r"^doubtful +the speed of waves .* 0\.164 m/s", text, flags=re.MULTILINE)
 
 
 def test_a_description_says_what_there_is(scene):

@@ -90,6 +90,23 @@ def test_an_error_leaves_what_there_is(tmp_path, name):
         assert np.load(tmp_path / name)["step"].tolist() == [1, 2, 3]
 
 
+def test_a_missing_folder_is_made_with_the_first_state(tmp_path):
+    for name in ("a.pvd", "a.csv", "a.npz"):
+        with kl.Series(tmp_path / "new" / name[2:] / name, thrown(kl.RigidBody)) as series:
+            assert not (tmp_path / "new" / name[2:]).exists()
+            series.add()
+        assert (tmp_path / "new" / name[2:] / name).is_file()
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(kl.InputError, match=r"a\.csv: its folder cannot be made"):
+        kl.Series(tmp_path / "taken" / "a.csv", thrown(kl.RigidBody)).add()
+
+
+def test_a_series_is_of_one_body(tmp_path):
+    body = thrown(kl.RigidBody)
+    with pytest.raises(kl.InputError, match=r"a\.pvd: a series holds the states of one body.*got list"):
+        kl.Series(tmp_path / "a.pvd", [body, body])
+
+
 def test_no_state_no_file(tmp_path):
     with kl.Series(tmp_path / "a.csv", thrown(kl.RigidBody)) as series:
         assert series.count == 0
@@ -125,10 +142,47 @@ def test_a_picture_shows_path_and_energies(tmp_path, kind):
     pytest.importorskip("matplotlib")
     body = thrown(kind)
     kl.trajectory_picture(tmp_path / "a.svg", body, kl.march(body, 0.01, 20, every=2), title="a throw")
-    words = re.findall("<!-- (.*?) -->", (tmp_path / "a.svg").read_text())
+    words = words_of(tmp_path / "a.svg")
     assert {"a throw", "kinetic", "potential", "sum", "time in s", "energy in J"} <= set(words)
     assert ("internal" in words) == (kind is not kl.RigidBody)
     assert body.step == 20
+
+
+def words_of(path):
+    return re.findall("<!-- (.*?) -->", path.read_text())
+
+
+def test_a_picture_of_one_state_has_no_curves(tmp_path):
+    pytest.importorskip("matplotlib")
+    body = thrown(kl.RigidBody)
+    kl.trajectory_picture(tmp_path / "a.svg", body, [kl.State.of(body)], title="at rest")
+    words = words_of(tmp_path / "a.svg")
+    assert {"at rest", "0 s", "0.2 m", "x", "y", "z"} <= set(words)
+    assert not {"time in s", "sum"} & set(words)
+
+
+def test_a_picture_says_when_a_body_starts_and_ends(tmp_path):
+    pytest.importorskip("matplotlib")
+    body = thrown(kl.RigidBody)
+    kl.trajectory_picture(tmp_path / "a.svg", body, [kl.State.of(body), *kl.march(body, 0.01, 20)])
+    assert {"0 s", "0.2 s"} <= set(words_of(tmp_path / "a.svg"))
+    body = kl.RigidBody(kl.box(), RUBBER)
+    body.set_velocity(angular=(0, 0, 2 * np.pi))
+    states = [kl.State.of(body), *kl.march(body, 0.01, 100)]  # once around
+    kl.trajectory_picture(tmp_path / "b.svg", body, states)
+    assert "0 s and 1 s" in words_of(tmp_path / "b.svg")
+
+
+def test_turning_points_are_among_the_positions_drawn():
+    from kratos_lite.io.trajectory import _telling
+
+    body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
+    body.constrain(kl.SetDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
+    q = [kl.State.of(body).q, *(state.q for state in kl.march(body, 0.01, 100))]
+    assert _telling(body, q, 4) == [0, 25, 75, 100]
+    assert _telling(body, q[:1], 6) == [0]
+    assert _telling(body, q, 1) == [100]
+    assert _telling(body, [q[0]] * 5, 6) == [0, 4]
 
 
 def test_a_picture_without_states_is_refused(tmp_path):

@@ -28,7 +28,7 @@ def body_lines(scene: BodyScene) -> list[str]:
         lines.append(line("mass", f"{float(body.mass):.7g} kg"))
     if isinstance(body, Deformable) and body.damping:
         lines.append(line("damping", f"{body.damping:g} s"))
-    return lines
+    return lines + [line("doubtful", doubt) for doubt in body.doubts()]
 
 
 def describe_scene(scene: BodyScene) -> str:

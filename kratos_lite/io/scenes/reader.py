@@ -105,7 +105,8 @@ def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
     if "restart" in settings:
         collect(_restart, settings, path.parent, files, body)
     collect.problems.raise_if_any()
-    return BodyScene(body, **time, output=output, files=files)
+    line, column = settings.section("time").values.places["step"]
+    return BodyScene(body, **time, output=output, files=files, place=f"{path}:{line}:{column}")
 
 
 def _time(settings: Settings) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from kratos_lite.assembly import Progress
 from kratos_lite.bodies import Body, State, march
@@ -25,6 +26,7 @@ class BodyScene:
     steps, every, substeps : as for `march`.
     output : files to write by the keys `OUTPUTS`.
     files : files that were read.
+    place : of the step, for messages: file, line and column.
     """
 
     body: Body
@@ -34,12 +36,15 @@ class BodyScene:
     substeps: int | str = 1
     output: dict[str, str] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
+    place: str = ""
 
     def march(self, progress: Progress | None = None) -> Iterator[State]:
         """March the body; what can be checked is checked before the first step."""
-        return march(
-            self.body, self.dt, self.steps, every=self.every, substeps=self.substeps, progress=progress
-        )
+        options: dict[str, Any] = {"every": self.every, "substeps": self.substeps, "progress": progress}
+        try:
+            return march(self.body, self.dt, self.steps, **options)
+        except InputError as error:
+            raise InputError(f"{self.place}: {error}" if self.place else str(error)) from None
 
 
 def read_scene(path: str | Path, *, strict: bool = True) -> BodyScene:

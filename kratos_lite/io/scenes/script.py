@@ -34,7 +34,7 @@ def run_script(path: Path) -> BodyScene:
         raise InputError(f"{path}: body must be a body such as kl.RigidBody, or a list of them; got {body!r}")
     given = {name: names[name] for name in OPTIONAL if name in names}
     given["output"] = _outputs(path, given.get("output", {}))
-    return BodyScene(body, names["dt"], names["steps"], files=[path], **given)
+    return BodyScene(body, names["dt"], names["steps"], files=[path], place=str(path), **given)
 
 
 def _outputs(path: Path, output: Any) -> dict[str, str]:
@@ -50,9 +50,10 @@ def _outputs(path: Path, output: Any) -> dict[str, str]:
 
 
 def _run(path: Path) -> dict[str, Any]:
-    """Run a file beside its own modules; an error in it ends in one line with its place."""
-    folder = str(path.parent.absolute())
+    """Run a file beside its own modules; it gets no arguments, and an error has its place in one line."""
+    folder, words = str(path.parent.absolute()), sys.argv
     sys.path.insert(0, folder)
+    sys.argv = [str(path)]
     try:
         return runpy.run_path(str(path), run_name="scene")
     except SyntaxError as error:
@@ -64,3 +65,4 @@ def _run(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}{line}: {kind}{error}") from error
     finally:
         sys.path.remove(folder)
+        sys.argv = words
