@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from kratos_lite import ale
     from kratos_lite.bodies import (
         BODIES,
         Body,
@@ -36,6 +37,17 @@ if TYPE_CHECKING:
         march,
     )
     from kratos_lite.characteristics import Characteristics
+    from kratos_lite.dynamics import (
+        CentralDifference,
+        Moment,
+        Transient,
+        critical_rate,
+        generalised_alpha,
+        hht,
+        material_velocity,
+        newmark,
+        reaction_resultant,
+    )
     from kratos_lite.elements import (
         ELEMENTS,
         KinematicLinear,
@@ -60,7 +72,16 @@ if TYPE_CHECKING:
     from kratos_lite.generate import annulus, box
     from kratos_lite.io.files import read, write
     from kratos_lite.io.trajectory import Series, trajectory_picture
-    from kratos_lite.loads import BodyForce, Gravity, LineLoad, NodalForces, PointLoad, Pressure, Traction
+    from kratos_lite.loads import (
+        BodyForce,
+        Gravity,
+        LineLoad,
+        NodalForces,
+        PointLoad,
+        Pressure,
+        Traction,
+        Varying,
+    )
     from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
     from kratos_lite.mesh import Block, Mesh, Part
     from kratos_lite.model import Model
@@ -77,6 +98,10 @@ _HOME = {
         "TimeSeries Torque convert equilibrium march"
     ),
     "kratos_lite.characteristics": "Characteristics",
+    "kratos_lite.dynamics": (
+        "CentralDifference Moment Transient critical_rate generalised_alpha hht material_velocity newmark "
+        "reaction_resultant"
+    ),
     "kratos_lite.elements": (
         "ELEMENTS KinematicLinear KinematicLinear3D4N KinematicLinear3D5N KinematicLinear3D6N "
         "KinematicLinear3D8N KinematicLinear3D10N KinematicLinear3D13N KinematicLinear3D15N "
@@ -86,7 +111,7 @@ _HOME = {
     "kratos_lite.generate": "annulus box",
     "kratos_lite.io.files": "read write",
     "kratos_lite.io.trajectory": "Series trajectory_picture",
-    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Traction",
+    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Traction Varying",
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",
     "kratos_lite.model": "Model",
@@ -103,6 +128,7 @@ __all__ = [
     "Body",
     "BodyForce",
     "Callback",
+    "CentralDifference",
     "Characteristics",
     "FiniteElementBody",
     "FixDirection",
@@ -130,6 +156,7 @@ __all__ = [
     "MeshError",
     "Model",
     "ModelError",
+    "Moment",
     "NodalForces",
     "Obstacle",
     "Orthotropic3D",
@@ -151,14 +178,23 @@ __all__ = [
     "TimeSeries",
     "Torque",
     "Traction",
+    "Transient",
+    "Varying",
     "__version__",
+    "ale",
     "annulus",
     "box",
     "convert",
+    "critical_rate",
     "element_picture",
     "equilibrium",
+    "generalised_alpha",
+    "hht",
     "march",
+    "material_velocity",
+    "newmark",
     "picture",
+    "reaction_resultant",
     "read",
     "trajectory_picture",
     "write",
@@ -166,6 +202,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "ale":
+        return import_module("kratos_lite.ale")
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'kratos_lite' has no attribute {name!r}")
     value = getattr(import_module(_MODULE_OF[name]), name)
@@ -174,4 +212,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_MODULE_OF})
+    return sorted({*globals(), *_MODULE_OF, "ale"})

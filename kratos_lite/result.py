@@ -48,6 +48,7 @@ class Report:
     warnings, notes : what the checks and the reader found.
     skipped : what this solution did without, as it would have changed nothing.
     kernels : what computed, compiled kernels and their threads or NumPy.
+    motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
     """
 
     unknowns: int
@@ -65,6 +66,28 @@ class Report:
     notes: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
     kernels: str = ""
+    motion: dict[str, Any] = field(default_factory=dict)
+
+    def motion_rows(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary about the motion of the material; none without one."""
+        m = self.motion
+        if not m:
+            return []
+        unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
+        force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
+        spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
+        rows = [
+            (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
+            ("critical rate", f"about {m['critical_rate']:.4g} {unit}, margin {m['margin']:.1%}"),
+            ("force of supports", f"{force} N"),
+        ]
+        return rows + ([("moment of supports", f"{moment} N m")] if m["kind"] == "rotation" else [])
+
+
+def vector(v: Array, size: float = 0.0) -> str:
+    """Return a vector for a summary; what is left of forces that cancel is shown as the 0 it stands for."""
+    small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
+    return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"
 
 
 class Result:
@@ -187,11 +210,6 @@ class Result:
         energy, mises, row = self._totals
         kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block))
 
-        def vector(v: Array, size: float = 0.0) -> str:
-            # What is left of forces that cancel is rounding, and is shown as the 0 that it stands for.
-            small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
-            return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"
-
         forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
         rows = [
             ("nodes", f"{mesh.n_nodes}"),
@@ -216,6 +234,7 @@ class Result:
             ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
             ("kernels", report.kernels),
         ]
+        rows += report.motion_rows()
         if report.skipped:
             rows.append(("skipped", "; ".join(report.skipped)))
         rows += [("warning", text) for text in report.warnings]

@@ -24,6 +24,7 @@ FLOORS = [
     {"system"},
     {"bodies", "ale"},
     {"io.mdpa", "io.elem", "io.vtu", "io.bridge"},
+    {"io.moments"},
     {"io.results", "io.documents", "io.trajectory"},
     {"result"},
     {"statics"},

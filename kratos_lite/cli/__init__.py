@@ -75,6 +75,8 @@ INPUT = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or
 SCENE = "a scene: a .json file with a body, or a .py script with body, dt and steps"
 SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve ProjectParameters.json --json result.json
+  kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
+  kratos-lite solve bridge.mdpa --modes 10
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
 
@@ -139,11 +141,32 @@ def _add_solve(commands: object) -> None:
         ("--point-load", "PART:X,Y,Z", "force in N on each node of the part"),
     ):
         given.add_argument(option, metavar=meta, help=text, **repeat)  # type: ignore[arg-type]
+    _add_motion(solve)
     how = solve.add_argument_group("solver")
+    how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def _add_motion(solve: argparse.ArgumentParser) -> None:
+    ale = solve.add_argument_group("motion of the material through the mesh (one at most; docs/ale.md)")
+    ale.add_argument(
+        "--rotation", metavar="AXIS:RATE[:ACCELERATION]", help="about x, y, z or X,Y,Z, in rad/s and rad/s²"
+    )
+    ale.add_argument("--centre", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
+    ale.add_argument(
+        "--stiffening", action="store_true", help="add the stiffness that the centrifugal stress gives"
+    )
+    ale.add_argument(
+        "--translation", metavar="AXIS:RATE[:ACCELERATION]", help="of the window, in m/s and m/s²"
+    )
+    ale.add_argument(
+        "--ends",
+        choices=("absorbing", "periodic", "fixed", "natural"),
+        help="what the cut faces of the window do (absorbing)",
+    )
 
 
 def _add_march(commands: object) -> None:
@@ -242,10 +265,11 @@ def _discard_output() -> None:
 
 
 def _join_negative(arguments: Sequence[str]) -> list[str]:
-    """Join ``--gravity -9.81,0,0`` to one word, which argparse would take for another option."""
+    """Join ``--gravity -9.81,0,0`` and the like to one word, which argparse would take for another option."""
+    numeric = ("--gravity", "--centre", "--rotation", "--translation")
     joined: list[str] = []
     for word in arguments:
-        if joined and joined[-1] == "--gravity" and word[:1] == "-":
+        if joined and joined[-1] in numeric and word[:1] == "-":
             joined[-1] += "=" + word
         else:
             joined.append(word)

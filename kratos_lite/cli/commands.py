@@ -95,6 +95,8 @@ def _solve(options: Namespace, clock: float) -> int:
     _targets(options, {}, read)
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
+    if options.modes is not None and (options.output or options.json or options.picture):
+        raise InputError("--modes prints a table; it writes no files")
     targets = _targets(options, scene.output, read)
     if options.vtu and "output" not in targets:
         raise InputError(f"--vtu {options.vtu}: there is no output to write so; add -o OUT.vtu")
@@ -103,6 +105,11 @@ def _solve(options: Namespace, clock: float) -> int:
     solver, tolerance = options.solver or scene.solver, scene.tolerance
     if options.tolerance is not None:
         tolerance = options.tolerance
+    if options.modes is not None:
+        from kratos_lite.cli.modes import modes_table
+
+        print(modes_table(scene.model, options.modes))
+        return 0
     progress = TerminalProgress()
     try:
         result = scene.model.solve(solver, tolerance, progress)

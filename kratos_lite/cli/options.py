@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from kratos_lite.errors import InputError
 
 if TYPE_CHECKING:
+    from kratos_lite.ale import Motion
     from kratos_lite.materials import LinearMaterial
     from kratos_lite.model import Model
 
@@ -96,6 +97,37 @@ def _where(model: Model, part: str | None) -> str | int | None:
     raise InputError(f"--material: unknown law or part {part!r}; laws are {laws}, parts are {parts}.{hint}")
 
 
+def motion(options: Namespace) -> Motion | None:
+    """Return the motion of the material that the options give, or None."""
+    from kratos_lite.ale import Rotation, Translation
+
+    turns, passes = options.rotation, options.translation
+    if turns and passes:
+        raise InputError("--rotation and --translation: a model has one motion; give one of them")
+    for option, owner in (("centre", "rotation"), ("stiffening", "rotation"), ("ends", "translation")):
+        if getattr(options, option) and not getattr(options, owner):
+            raise InputError(f"--{option} belongs to --{owner}; give that too")
+    if turns:
+        centre = vector(options.centre, "--centre") if options.centre else (0.0, 0.0, 0.0)
+        return Rotation(*_rates(turns, "--rotation"), centre=centre, stiffening=options.stiffening)
+    if passes:
+        return Translation(*_rates(passes, "--translation"), ends=options.ends or "absorbing")
+    return None
+
+
+def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
+    """Return axis, rate and acceleration of ``AXIS:RATE[:ACCELERATION]``.
+
+    >>> _rates("z:-30:2.5", "--rotation")
+    ('z', -30.0, 2.5)
+    """
+    axis, *numbers = text.split(":")
+    if not axis or len(numbers) not in (1, 2):
+        raise InputError(f"{option}: expected AXIS:RATE[:ACCELERATION] such as z:30; got {text!r}")
+    rate, acceleration = (number(word, option) for word in (*numbers, "0")[:2])
+    return vector(axis, option) if "," in axis else axis, rate, acceleration
+
+
 def apply(model: Model, options: Namespace) -> None:
     """Add the materials, supports and loads of the command line to a model."""
     from kratos_lite.loads import Gravity, PointLoad, Pressure, Traction
@@ -120,3 +152,5 @@ def apply(model: Model, options: Namespace) -> None:
     for text in options.point_load:
         part, rest = split_part(text, "--point-load", "PART:X,Y,Z")
         model.add(PointLoad(part, vector(rest, "--point-load")))
+    if (given_motion := motion(options)) is not None:
+        model.add(given_motion)

@@ -12,6 +12,7 @@ from kratos_lite.ale.guards import warnings_of
 from kratos_lite.assembly import Progress
 from kratos_lite.checks import equilibrium
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
 from kratos_lite.native import described
 from kratos_lite.result import Report, Result, peak_memory
@@ -73,4 +74,6 @@ def solve_steady(
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
         kernels=described(),
     )
-    return Result(model.mesh, e.system.batches, e.system.whole(u), reactions, nodal, report)
+    result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report)
+    report.motion = motion_summary(e, result)
+    return result

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.finite_strain import highest_frequency
@@ -295,8 +296,22 @@ class Transient:
         out[~e.model.supports.fixed] = 0.0
         return out
 
-    def energy(self) -> float:
-        """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping."""
-        e = self.equations
-        kinetic = self.v @ e.times_mass(self.v)
-        return float(kinetic + self.u @ e.times_stiffness(self.u, self.time)) / 2
+    def energy(self, moment: Moment | None = None) -> float:
+        """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.
+
+        It is that of now, or of a moment.
+        """
+        e, (u, v, time) = self.equations, self._at(moment)
+        return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
+
+    def material_velocity(self, moment: Moment | None = None) -> Array:
+        """Return the velocity of the material in space, now or at a moment; see `material_velocity`."""
+        e, (u, v, time) = self.equations, self._at(moment)
+        return e.system.whole(velocity_of_material(e, u, v, time))
+
+    def _at(self, moment: Moment | None) -> tuple[Array, Array, float]:
+        """Return u, v (3a,) and the time, of now or of a moment."""
+        if moment is None:
+            return self.u, self.v, self.time
+        local = self.equations.system.local
+        return local(moment.u), local(moment.v), moment.time

@@ -112,6 +112,7 @@ def summary(result: Result) -> dict[str, Any]:
         "seconds": report.seconds,
         "peak_memory": report.peak_memory,
         "kernels": report.kernels,
+        **({"motion": report.motion} if report.motion else {}),
         "skipped": report.skipped,
         "warnings": report.warnings,
         "notes": report.notes,

@@ -1,14 +1,12 @@
-"""Trajectories: the states of a body as files for ParaView, as tables and as pictures."""
+"""Trajectories: the states of a body or a model in time as files for ParaView, as tables and as pictures."""
 
 from __future__ import annotations
 
-import io
-from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
 from types import TracebackType
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +14,10 @@ from numpy.typing import NDArray
 from kratos_lite.bodies import Body, State
 from kratos_lite.bodies.state import at
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.io.output import write_whole
-from kratos_lite.io.vtu import check_mode, write_pvd, write_vtu
+from kratos_lite.io.moments import MOMENT_WRITERS, Arrays, Frames, Table, Writer
+
+if TYPE_CHECKING:
+    from kratos_lite.dynamics import Moment, Transient
 
 Array = NDArray[np.float64]
 COLUMNS = (
@@ -51,78 +51,47 @@ def row_of(body: Body, state: State) -> Array:
         return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
 
 
-class _Writer(ABC):
-    """One kind of file of a series."""
+class _BodyFrames(Frames):
+    """DISPLACEMENT and VELOCITY on the nodes of a body."""
 
-    def __init__(self, path: Path, body: Body, mode: str) -> None:
-        self.path, self.body, self.mode = path, body, mode
+    owner: Body
 
-    @abstractmethod
-    def add(self, state: State) -> None:
-        """Take one state."""
-
-    @abstractmethod
-    def write(self) -> None:
-        """Write what all states together make, as a whole or not at all."""
-
-
-class _Frames(_Writer):
-    """Meshes, one for each state, and their index."""
-
-    def __init__(self, path: Path, body: Body, mode: str) -> None:
-        super().__init__(path, body, mode)
-        check_mode(mode)
-        _check_single(body, path)
-        if body.mesh is None:
+    def __init__(self, path: Path, owner: Body, mode: str) -> None:
+        super().__init__(path, owner, mode)
+        _check_single(owner, path)
+        if owner.mesh is None:
             raise ModelError(f"{path}: this body has no mesh to be shown; write .csv or .npz")
-        self.frames: list[tuple[float, str]] = []
 
     def add(self, state: State) -> None:
-        mesh, body = self.body.mesh, self.body
+        mesh, body = self.owner.mesh, self.owner
         assert mesh is not None
-        name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         with at(body, state):
             moved = body.position(mesh.points) - mesh.points
-            data = {"DISPLACEMENT": moved, "VELOCITY": body.velocity(mesh.points)}
-        write_vtu(self.path.with_name(name), mesh, {**data, "NODE_ID": mesh.node_ids}, mode=self.mode)
-        self.frames.append((state.time, name))
-
-    def write(self) -> None:
-        write_pvd(self.path, self.frames)
+            self.frame(state.time, mesh, {"DISPLACEMENT": moved, "VELOCITY": body.velocity(mesh.points)})
 
 
-class _Table(_Writer):
-    """Energies, momenta and the mass centre as text, one line for each state."""
+class _BodyTable(Table):
+    """Energies, momenta and the mass centre."""
 
-    def __init__(self, path: Path, body: Body, mode: str) -> None:
-        super().__init__(path, body, mode)
-        _check_single(body, path)
-        self.rows: list[Array] = []
+    owner: Body
+    columns = COLUMNS
+
+    def __init__(self, path: Path, owner: Body, mode: str) -> None:
+        super().__init__(path, owner, mode)
+        _check_single(owner, path)
 
     def add(self, state: State) -> None:
-        self.rows.append(row_of(self.body, state))
-
-    def write(self) -> None:
-        lines = [",".join(COLUMNS), *(",".join(map(repr, row.tolist())) for row in self.rows)]
-        write_whole(self.path, ("\n".join(lines) + "\n").encode())
+        self.rows.append(row_of(self.owner, state))
 
 
-class _Arrays(_Writer):
-    """Configurations and velocities as arrays, one row for each state."""
+class _BodyArrays(Arrays):
+    """Configurations and velocities."""
 
-    def __init__(self, path: Path, body: Body, mode: str) -> None:
-        super().__init__(path, body, mode)
-        self.states: list[State] = []
+    owner: Body
+    names = ("time", "step", "q", "u", "external_work")
 
-    def add(self, state: State) -> None:
-        self.states.append(state)
-
-    def write(self) -> None:
-        names = ("time", "step", "q", "u", "external_work")
-        arrays = {name: np.array([getattr(state, name) for state in self.states]) for name in names}
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, kind=np.array(self.body.kind), **arrays)
-        write_whole(self.path, buffer.getvalue())
+    def extra(self) -> dict[str, Any]:
+        return {"kind": np.array(self.owner.kind)}
 
 
 def _check_single(body: Body, path: Path) -> None:
@@ -134,9 +103,11 @@ class Series:
     """The states of a march as files; what they are is said by the ending of the path.
 
     - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
-      DISPLACEMENT (m) and VELOCITY (m/s) on its nodes.
-    - ``.csv``: a table with a line for each state: time, energies, mass centre, momenta (`COLUMNS`).
-    - ``.npz``: arrays ``time``, ``step``, ``q``, ``u``, ``external_work`` with a row for each state.
+      DISPLACEMENT (m) and VELOCITY (m/s) on its nodes; of a transient also ACCELERATION (m/s²), REACTION (N).
+    - ``.csv``: a table with a line for each state: time, energies, mass centre, momenta (`COLUMNS`); of a
+      transient time, energy, largest displacement, total reaction (`MOMENT_COLUMNS`).
+    - ``.npz``: arrays with a row for each state: ``time``, ``step``, and ``q``, ``u``, ``external_work`` of a
+      body, or ``u``, ``v``, ``a``, ``reactions`` of a transient.
 
     The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, table and
     arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
@@ -145,7 +116,7 @@ class Series:
     Parameters
     ----------
     path : the file to write.
-    body : the body whose states come; many at once only as ``.npz``.
+    owner : the body whose states come, many at once only as ``.npz``; or the transient whose moments come.
     mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
 
     Raises
@@ -168,23 +139,26 @@ class Series:
     ['spin.pvd', 'spin_00000.vtu', 'spin_00001.vtu', 'spin_00002.vtu']
     """
 
-    kinds: ClassVar[dict[str, type[_Writer]]] = {".pvd": _Frames, ".csv": _Table, ".npz": _Arrays}
+    kinds: ClassVar[dict[str, type[Writer]]] = {".pvd": _BodyFrames, ".csv": _BodyTable, ".npz": _BodyArrays}
 
-    def __init__(self, path: str | Path, body: Body, *, mode: str = "binary") -> None:
+    def __init__(self, path: str | Path, owner: Body | Transient, *, mode: str = "binary") -> None:
         check_ending(path)
-        if not isinstance(body, Body):
+        if not (isinstance(owner, Body) or hasattr(owner, "moment")):
             raise InputError(
-                f"{path}: a series holds the states of one body, such as kl.RigidBody; "
-                f"got {type(body).__name__}; make one series for each body"
+                f"{path}: a series holds the states of one body, such as kl.RigidBody, or of a transient; "
+                f"got {type(owner).__name__}; make one series for each body"
             )
-        self.body, self.count = body, 0
-        self._writer = self.kinds[Path(path).suffix.lower()](Path(path), body, mode)
+        self.owner, self.count = owner, 0
+        kinds = self.kinds if isinstance(owner, Body) else MOMENT_WRITERS
+        self._writer = kinds[Path(path).suffix.lower()](Path(path), owner, mode)
 
-    def add(self, state: State | None = None) -> None:
-        """Take a state, or the body as it is if none is given."""
+    def add(self, state: State | Moment | None = None) -> None:
+        """Take a state or moment, or body or transient as it is if none is given."""
         if not self.count:
             make_folder(self._writer.path)
-        self._writer.add(State.of(self.body) if state is None else state)
+        if state is None:
+            state = State.of(self.owner) if isinstance(self.owner, Body) else self.owner.moment()
+        self._writer.add(state)
         self.count += 1
 
     def close(self) -> None:

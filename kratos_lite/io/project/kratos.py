@@ -11,6 +11,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Document
 from kratos_lite.io.documents import read_document
 from kratos_lite.io.kratos.to_model import check_elements, model_from
+from kratos_lite.io.project.ale import add_motion
 from kratos_lite.io.project.case import Case, module_of, times_of
 from kratos_lite.io.project.checks import CHECKS, Check
 from kratos_lite.io.project.materials import materials_of
@@ -19,7 +20,7 @@ from kratos_lite.io.project.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.model import Model
 
-ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes")
+ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
     "solver_type model_part_name domain_size echo_level buffer_size analysis_type model_import_settings "
     "material_import_settings time_stepping rotation_dofs reform_dofs_at_each_step compute_reactions "
@@ -71,6 +72,7 @@ def read_kratos_project(
     )
     for number, material in (materials or {}).items():
         model.assign(material, number)
+    add_motion(model, settings)
     model.notes += notes
     return model, checks
 

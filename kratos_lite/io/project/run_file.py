@@ -10,6 +10,7 @@ from typing import Any
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.io.project.ale import add_motion
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
@@ -24,7 +25,7 @@ LOADS: dict[str, Callable[[str, Any], Load]] = {
     "pressure": Pressure,
     "point_load": PointLoad,
 }
-KEYS = ("model", "material", "fix", "gravity", *LOADS, "solver", "tolerance", *OUTPUTS)
+KEYS = ("model", "material", "fix", "gravity", *LOADS, "ale", "solver", "tolerance", *OUTPUTS)
 
 
 def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
@@ -32,8 +33,9 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
 
     Our own has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
     for each part), `fix` (``{part: "xyz"}`` or ``{part: {"x": 0.001}}``, m), `gravity` (m/s²),
-    `traction` and `pressure` by part (Pa), `point_load` by part (N on each node), `solver`
-    (``{"type", "tolerance"}``), `tolerance`, and the files to write: `output`, `json`, `picture`.
+    `traction` and `pressure` by part (Pa), `point_load` by part (N on each node), `ale` (a motion of the
+    material, see `add_motion`), `solver` (``{"type", "tolerance"}``), `tolerance`, and the files to
+    write: `output`, `json`, `picture`.
 
     Parameters
     ----------
@@ -90,6 +92,7 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
             collect(_load, model, sections[key], part, load)
     if gravity is not None:
         _add_gravity(model, gravity)
+    collect(add_motion, model, settings)
     collect.problems.raise_if_any()
     return Scene(model, solver, tolerance, output)
 

@@ -1,0 +1,80 @@
+"""The section ``ale`` of run files: the motion of the material through the mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kratos_lite.ale import Motion, Rotation, Translation
+from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.project.settings import Settings
+from kratos_lite.io.project.strict_json import Object
+from kratos_lite.model import Model
+from kratos_lite.series import TimeSeries
+
+COMMON = ("rate", "acceleration", "damping")
+KEYS = {
+    "rotation": ("axis", "centre", "skew", "stiffening", *COMMON),
+    "translation": ("direction", "ends", *COMMON),
+}
+
+
+def add_motion(model: Model, settings: Settings) -> None:
+    """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
+
+    It is ``{"rotation": {"axis", "rate", "acceleration", "centre", "skew", "stiffening", "damping"}}`` or
+    ``{"translation": {"direction", "rate", "acceleration", "ends", "damping"}}`` with the arguments of
+    `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.
+
+    Raises
+    ------
+    InputError
+        With file, line and column of what is wrong, also where the motion does not fit the model.
+    """
+    if "ale" not in settings:
+        return
+    section = settings.section("ale")
+    section.check_keys(KEYS)
+    if len(section.values) != 1:
+        raise section.error("", "ale: one of 'rotation' and 'translation' is needed")
+    (kind,) = section.values
+    inner = section.section(kind)
+    try:
+        model.add(read_motion(inner, kind))
+    except InputError:
+        raise
+    except KratosLiteError as error:
+        raise section.error(kind, f"{inner.path}: {error}") from None
+
+
+def read_motion(section: Settings, kind: str) -> Motion:
+    """Return the motion of an object, of the kind ``rotation`` or ``translation``."""
+    section.check_keys(KEYS[kind])
+    section.get("rate")
+    given: dict[str, Any] = {}
+    for key in section.values:
+        if key in ("axis", "direction"):
+            given[key] = section.text(key) if isinstance(section.values[key], str) else section.vector(key)
+        elif key == "centre":
+            given[key] = section.vector(key)
+        elif key in ("skew", "stiffening"):
+            given[key] = section.flag(key)
+        elif key == "ends":
+            given[key] = section.text(key)
+        else:
+            given[key] = section.number(key) if key == "damping" else _series(section, key)
+    try:
+        return Rotation(**given) if kind == "rotation" else Translation(**given)
+    except InputError as error:
+        raise section.error("", f"{section.path}: {error}") from None
+
+
+def _series(section: Settings, key: str) -> float | TimeSeries:
+    """Return a number, or a time series of an object."""
+    if not isinstance(section.values[key], Object):
+        return section.number(key)
+    table = section.section(key)
+    table.check_keys(("times", "values"))
+    try:
+        return TimeSeries(table.numbers("times"), table.numbers("values"))
+    except InputError as error:
+        raise section.error(key, f"{table.path}: {error}") from None

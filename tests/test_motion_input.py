@@ -1,0 +1,173 @@
+"""Motions of the material from run files and from the command line, and tables of modes."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.cli import main
+from kratos_lite.io.project import read_project
+
+RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return a folder, the current one, with the meshes of a wheel and of a bar."""
+    monkeypatch.chdir(tmp_path)
+    meshes = {
+        "wheel": kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)),
+        "bar": kl.box((4.0, 0.5, 0.5), cells=(8, 1, 1)),
+    }
+    for name, mesh in meshes.items():
+        mesh.parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
+        kl.write(f"{name}.mdpa", mesh)
+    return tmp_path
+
+
+def run(*words):
+    return main(["solve", *words])
+
+
+def write(folder, name="run.json", **content):
+    (folder / name).write_text(json.dumps({"material": RUBBER, **content}, indent=1))
+    return folder / name
+
+
+def wheel(**motion):
+    model = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)), kl.Isotropic3D(**RUBBER))
+    model.fix("inner")
+    model.add(kl.Pressure("outer", 1e3))
+    model.add(kl.ale.Rotation(**motion))
+    return model
+
+
+WORDS = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--pressure", "outer:1e3", "-q")
+
+
+def test_a_rotation_in_words_in_a_run_file_and_in_python_are_the_same(folder):
+    motion = {"rate": 8.0, "acceleration": 3.0, "centre": [0, 0, 0.5], "stiffening": True}
+    expected = wheel(axis="z", **motion).solve().u
+    turned = ("--rotation", "z:8:3", "--centre", "0,0,0.5", "--stiffening")
+    assert run("wheel.mdpa", *WORDS, *turned, "--json", "words.json") == 0
+    path = write(
+        folder,
+        model="wheel.mdpa",
+        fix={"inner": "xyz"},
+        pressure={"outer": 1e3},
+        ale={"rotation": {"axis": "z", "damping": 0.0, "skew": True, **motion}},
+        json="file.json",
+    )
+    assert run(str(path), "-q") == 0
+    for name in ("words.json", "file.json"):
+        result = json.loads((folder / name).read_text())
+        found = np.array(list(result["displacement"].values()))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+        assert result["motion"]["rate"] == 8.0
+        assert result["motion"]["acceleration"] == 3.0
+        assert 0 < result["motion"]["margin"] < 1
+
+
+def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, capsys):
+    words = [word for word in WORDS if word != "-q"]
+    assert run("wheel.mdpa", *words, "--rotation", "0,0,-1:-8") == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^rotation +-8 rad/s \(0, 0, -1\)$", out, re.M)
+    assert re.search(r"^critical rate +about 18\.\d+ rad/s, margin 5\d\.\d%$", out, re.M)
+    assert re.search(r"^force of supports +\(.*\) N$", out, re.M)
+    assert re.search(r"^moment of supports +\(.*\) N m$", out, re.M)
+
+
+def test_a_translation_in_words_and_in_a_run_file_are_the_same(folder):
+    common = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "y-:xyz", "--traction", "y+:1e3,0,0")
+    assert run("bar.mdpa", *common, "--translation", "x:-5", "--ends", "fixed", "--json", "a.json", "-q") == 0
+    path = write(
+        folder,
+        model="bar.mdpa",
+        fix={"y-": "xyz"},
+        traction={"y+": [1e3, 0, 0]},
+        ale={"translation": {"direction": [1, 0, 0], "rate": -5, "ends": "fixed"}},
+        json="b.json",
+    )
+    assert run(str(path), "-q") == 0
+    first, second = (json.loads((folder / name).read_text()) for name in ("a.json", "b.json"))
+    assert first["displacement"] == second["displacement"]
+    assert first["motion"]["kind"] == "translation"
+    ends = [first["displacement"][str(i + 1)] for i in kl.read("bar.mdpa").mesh.nodes("x+")]
+    assert np.abs(ends).max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--rotation", "z"), "expected AXIS:RATE"),
+        (("--rotation", "z:1:2:3"), "expected AXIS:RATE"),
+        (("--rotation", "w:1"), "an axis is 'x', 'y', 'z' or a vector; got 'w'"),
+        (("--rotation", "z:fast"), "--rotation: 'fast' is not a finite number"),
+        (("--rotation", "z:1", "--translation", "x:1"), "a model has one motion"),
+        (("--centre", "-1,0,0"), "--centre belongs to --rotation"),
+        (("--stiffening", "--translation", "x:1"), "--stiffening belongs to --rotation"),
+        (("--ends", "fixed"), "--ends belongs to --translation"),
+        (("--rotation", "x:1"), "not one of revolution about the axis"),
+        (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
+    ],
+)
+def test_options_that_are_wrong_end_in_one_line(folder, capsys, words, message):
+    assert run("wheel.mdpa", *WORDS, *words) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("ale", "message"),
+    [
+        ({}, "one of 'rotation' and 'translation' is needed"),
+        ({"rotation": {"rate": 1}, "translation": {"rate": 1}}, "one of 'rotation' and 'translation'"),
+        ({"rotation": {"rat": 1}}, "unknown key 'ale.rotation.rat'"),
+        ({"rotation": {"axis": "z"}}, "key 'ale.rotation.rate' is missing"),
+        ({"rotation": {"rate": "1"}}, "ale.rotation.rate must be a number"),
+        ({"rotation": {"rate": 1, "axis": [0, 0]}}, "ale.rotation.axis must be a list of three numbers"),
+        ({"rotation": {"rate": 1, "axis": "q"}}, "ale.rotation: an axis is 'x', 'y', 'z'"),
+        ({"rotation": {"rate": 1, "axis": "x"}}, "ale.rotation: the body is not one of revolution"),
+        ({"rotation": {"rate": 1, "skew": 1}}, "ale.rotation.skew must be true or false"),
+        ({"rotation": {"rate": 1, "damping": -1}}, "ale.rotation: a damping must be"),
+        ({"rotation": {"rate": {"times": [0, 0], "values": [1, 2]}}}, "ale.rotation.rate: times of a series"),
+        ({"translation": {"rate": 1, "ends": "open"}}, "ale.translation: ends must be one of absorbing"),
+    ],
+)
+def test_a_wrong_section_is_refused_with_its_line(folder, ale, message):
+    path = write(folder, model="wheel.mdpa", fix={"inner": "xyz"}, ale=ale)
+    with pytest.raises(kl.KratosLiteError, match=r"run\.json:\d+:\d+") as caught:
+        read_project(path)
+    assert message in str(caught.value)
+
+
+def test_a_rate_may_be_a_table(folder):
+    table = {"times": [0, 2], "values": [0, 10]}
+    path = write(folder, model="wheel.mdpa", ale={"rotation": {"rate": table, "acceleration": 5}})
+    motion = read_project(path).model.motion
+    assert motion.rate(1.0) == 5.0
+    assert motion.acceleration(1.0) == 5.0
+    assert not motion.steady
+
+
+def test_modes_are_those_of_python(folder, capsys):
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--modes", "4")
+    assert run("wheel.mdpa", *held) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert rows[0] == ["mode", "frequency", "Hz", "rad/s"]
+    model = kl.Model(kl.read("wheel.mdpa").mesh, kl.Isotropic3D(**RUBBER))
+    model.fix("inner")
+    omega, _ = model.modes(4)
+    found = np.array([[float(word) for word in row[1:]] for row in rows[1:]])
+    np.testing.assert_allclose(found[:, 1], omega, rtol=1e-7)
+    np.testing.assert_allclose(found[:, 0] * 2 * np.pi, omega, rtol=1e-7)
+    assert run("wheel.mdpa", *held, "--rotation", "z:5") == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    model.add(kl.ale.Rotation("z", rate=5.0))
+    values, _ = model.complex_modes(4)
+    found = np.array([[float(word) for word in row[1:]] for row in rows[1:]])
+    assert rows[0][-2:] == ["growth", "1/s"]
+    np.testing.assert_allclose(np.sort(found[:, 1]), np.sort(values.imag), rtol=1e-6)
+    assert np.abs(found[:, 2]).max() < 1e-6 * np.abs(values).max()
