@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import fields
-from kratos_lite.assembly import Pattern, assemble_scalar
+from kratos_lite.assembly import Pattern
 from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.inertia import inertia_matrices
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.banded import add_scalar
 
@@ -40,13 +41,15 @@ class Mass:
     @cached_property
     def scalar(self) -> csr_array[Any, Any]:
         """Mass for each pair of nodes, (n, n) sparse in kg; a diagonal for lumped mass."""
-        from scipy.sparse import diags_array
+        from scipy.sparse import csr_array, diags_array
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        return assemble_scalar(
-            self._points, self._batches, self.pattern, lambda element, m: element.scalar_mass(m.density)
+        made = inertia_matrices(
+            self._points, self._batches, self.pattern, "M", lambda element: element.mass_rule
         )
+        n = self.pattern.n_nodes
+        return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
 
     @cached_property
     def nodal(self) -> Array:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import fields
 from kratos_lite.ale.motion import Motion, Rotation
-from kratos_lite.assembly import Pattern, assemble_scalar
+from kratos_lite.assembly import Pattern
 from kratos_lite.batches import Batch
-from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.inertia import inertia_matrices
 from kratos_lite.mass import Mass
-from kratos_lite.materials import LinearMaterial
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
@@ -53,39 +50,39 @@ class MotionMatrices:
     ) -> None:
         self.motion, self.points, self.batches = motion, points, batches
         self.pattern, self.mass = pattern, mass
+        self._made: dict[str, Array] = {}
 
-    def _assembled(self, kernel: Any) -> Array:
-        matrix = assemble_scalar(self.points, self.batches, self.pattern, kernel)
-        return np.asarray(matrix.data)
+    def make(self, names: str) -> None:
+        """Make G, H or both, of those not made before, in one pass over the elements."""
+        missing = "".join(name for name in names if name not in self._made)
+        if missing:
+            points, velocity = self._flow()
+            self._made |= inertia_matrices(
+                points,
+                self.batches,
+                self.pattern,
+                missing,
+                lambda element: exact_rule(element.shape),
+                velocity,
+            )
 
-    def _along(self, element: KinematicLinear) -> tuple[Array, Array, Array]:
-        """Return N (g, n), c·grad N (..., g, n) and dV (..., g) by the exact rule."""
-        rule = exact_rule(element.shape)
-        fine = type(element)(element.X, rule)
-        dV, D = fine._gauss
-        c = self.motion.field(fine.gauss_points())
-        return tabulate(element.shape, rule)[0], (c[..., None, :] @ D)[..., 0, :], dV
+    def _flow(self) -> tuple[Array, Array]:
+        """Return the points and (3, 4): A and b of the velocity c = A X + b at them."""
+        if isinstance(self.motion, Rotation):  # from the axis on, where no digits are lost
+            return self.points - self.motion.centre, np.column_stack([self.motion.A, np.zeros(3)])
+        return self.points, np.column_stack([np.zeros((3, 3)), self.motion.field(np.zeros(3))])
 
-    @cached_property
+    @property
     def G(self) -> Array:
         """∫ ρ N_i c·grad N_j in kg/s for the rate 1."""
+        self.make("G")
+        return self._made["G"]
 
-        def kernel(element: KinematicLinear, material: LinearMaterial) -> Array:
-            N, along, dV = self._along(element)
-            return np.asarray((N.T * (material.density * dV)[..., None, :]) @ along)
-
-        return self._assembled(kernel)
-
-    @cached_property
+    @property
     def H(self) -> Array:
         """∫ ρ (c·grad N_i)(c·grad N_j) in kg/s² for the rate 1."""
-
-        def kernel(element: KinematicLinear, material: LinearMaterial) -> Array:
-            _, along, dV = self._along(element)
-            weighted = along * (material.density * dV)[..., None]
-            return np.asarray(np.swapaxes(weighted, -1, -2) @ along)
-
-        return self._assembled(kernel)
+        self.make("H")
+        return self._made["H"]
 
     @cached_property
     def S(self) -> Array:

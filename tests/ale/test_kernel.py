@@ -1,0 +1,180 @@
+"""M, G and H: compiled as in NumPy for every element, whatever the threads and the instruction set."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import inertia
+from kratos_lite.ale import MotionMatrices, Rotation, Translation
+from kratos_lite.ale.matrices import exact_rule
+from kratos_lite.assembly import Pattern
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.inertia import inertia_matrices
+from kratos_lite.mass import Mass
+from kratos_lite.native import kernels
+
+compiled = pytest.mark.skipif(kernels("inertia") is None, reason="the compiled kernels were not built")
+KINDS = (4, 5, 6, 8, 10, 13, 15, 20, 27)
+VELOCITY = np.random.default_rng(1).uniform(-1, 1, (3, 4))
+
+
+def parts(kind, cells=(3, 2, 3), amount=0.05):
+    """Return points, batches and pattern of a distorted box of two materials."""
+    mesh = kl.box((1.1, 0.9, 1.3), cells, f"KinematicLinear3D{kind}N")
+    mesh.points += amount / max(cells) * np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    light, heavy = (kl.Isotropic3D(E=1.0, nu=0.3, density=density) for density in (2.0, 700.0))
+    block = mesh.blocks[0]
+    block.properties[len(block.nodes) // 3 :] = 2
+    model = kl.Model(mesh, {1: light, 2: heavy})
+    batches = model.batches()
+    assert len(batches) == 2
+    return mesh.points, batches, Pattern(mesh.n_nodes, [batch.nodes for batch in batches])
+
+
+def fine(element):
+    return exact_rule(element.shape)
+
+
+def numpy_matrices(monkeypatch, *arguments):
+    with monkeypatch.context() as patch:
+        patch.setattr(inertia, "kernels", lambda name: None)
+        return inertia_matrices(*arguments)
+
+
+def assert_close(ours, theirs, tolerance):
+    assert ours.keys() == theirs.keys()
+    for name, expected in theirs.items():
+        assert np.abs(ours[name] - expected).max() <= tolerance * np.abs(expected).max(), name
+
+
+@compiled
+@pytest.mark.parametrize("kind", KINDS)
+def test_compiled_is_numpy(kind, monkeypatch):
+    arguments = (*parts(kind), "MGH", fine, VELOCITY)
+    assert_close(inertia_matrices(*arguments), numpy_matrices(monkeypatch, *arguments), 1e-14)
+
+
+@compiled
+@pytest.mark.parametrize("kind", KINDS)
+def test_threads_change_no_bit(kind):
+    arguments, module = (*parts(kind, (7, 3, 4)), "MGH", fine, VELOCITY), kernels("inertia")
+    found = []
+    for count in (1, 2, 3, 5):
+        module.set_threads(count)
+        found.append(inertia_matrices(*arguments))
+    module.set_threads(2)
+    for other in found[1:]:
+        for name in "MGH":
+            np.testing.assert_array_equal(other[name], found[0][name])
+
+
+@pytest.mark.parametrize("names", ["M", "G", "H", "MG", "GH"])
+def test_only_what_is_asked_for_is_made_and_nothing_else_changes(names):
+    points, batches, pattern = parts(8)
+    every = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
+    some = inertia_matrices(points, batches, pattern, names, fine, VELOCITY)
+    assert "".join(some) == names
+    for name in names:
+        np.testing.assert_array_equal(some[name], every[name])
+
+
+@compiled
+@pytest.mark.parametrize("isa", ["base", "avx2", "avx512"])
+def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
+    kinds = (4, 8, 13, 27)
+    code = (
+        "import sys, numpy as np\nfrom tests.ale.test_kernel import *\n"
+        f"made = {{f'{{kind}}{{name}}': data for kind in {kinds}\n"
+        "        for name, data in inertia_matrices(*parts(kind), 'MGH', fine, VELOCITY).items()}\n"
+        "np.savez(sys.argv[1], **made)"
+    )
+    environment = {**os.environ, "KRATOS_LITE_ISA": isa, "PYTHONPATH": os.getcwd()}
+    subprocess.run([sys.executable, "-c", code, tmp_path / "made.npz"], check=True, env=environment)
+    with np.load(tmp_path / "made.npz") as made:
+        for kind in kinds:
+            here = inertia_matrices(*parts(kind), "MGH", fine, VELOCITY)
+            assert_close({name: made[f"{kind}{name}"] for name in "MGH"}, here, 1e-14)
+
+
+@pytest.mark.parametrize("changed", ["scalar_mass", "_gauss", "gauss_points"])
+def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed, monkeypatch):
+    base = KinematicLinear
+    points, batches, pattern = parts(8)
+    plain = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
+    ways = {
+        "scalar_mass": lambda self, density=1.0: 2 * base.scalar_mass(self, density),
+        "_gauss": property(lambda self: (2 * base._gauss.func(self)[0], *base._gauss.func(self)[1:])),
+        "gauss_points": lambda self: base.gauss_points(self) + 5.0,
+    }
+    factors = {"scalar_mass": (2, 1, 1), "_gauss": (1, 2, 2), "gauss_points": (1, None, None)}[changed]
+    monkeypatch.setattr(kl.KinematicLinear3D8N, changed, ways[changed])
+    own = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
+    for name, factor in zip("MGH", factors, strict=True):
+        if factor:
+            assert_close({name: own[name]}, {name: factor * plain[name]}, 1e-14)
+        else:
+            assert np.abs(own[name] - plain[name]).max() > 0.1 * np.abs(plain[name]).max()
+
+
+def test_velocity_is_linear_in_its_numbers():
+    points, batches, pattern = parts(10)
+
+    def made(velocity):
+        return inertia_matrices(points, batches, pattern, "GH", fine, velocity)
+
+    moved = VELOCITY.copy()
+    moved[:, 3] += VELOCITY[:, :3] @ (1.0, 2.0, 3.0)
+    again = inertia_matrices(points - (1.0, 2.0, 3.0), batches, pattern, "GH", fine, moved)
+    assert_close(again, made(VELOCITY), 1e-13)
+    assert_close(made(-2 * VELOCITY), {"G": -2 * made(VELOCITY)["G"], "H": 4 * made(VELOCITY)["H"]}, 1e-14)
+
+
+@pytest.mark.parametrize(
+    "motion", [Rotation("z", 1.0, centre=(1e3, 2e3, 0.0)), Translation((1.0, 2.0, 2.0), 1.0)]
+)
+def test_matrices_of_a_motion_act_on_linear_fields_as_they_must(motion):
+    points, batches, pattern = parts(27, amount=0.0)
+    terms = MotionMatrices(motion, points, batches, pattern, Mass(points, batches, pattern, False))
+    c, mass = motion.field(points), terms.mass.scalar
+    np.testing.assert_allclose(
+        terms.times(terms.G, points), mass @ c, rtol=0, atol=1e-12 * abs(mass @ c).max()
+    )
+    twice = points.T @ terms.times(terms.H, points)
+    np.testing.assert_allclose(twice, c.T @ (mass @ c), rtol=0, atol=1e-12 * abs(twice).max())
+
+
+def test_both_matrices_of_a_motion_are_made_in_one_pass(monkeypatch):
+    points, batches, pattern = parts(8)
+    terms = MotionMatrices(
+        Rotation("z", 1.0), points, batches, pattern, Mass(points, batches, pattern, False)
+    )
+    asked = []
+
+    def counted(*arguments):
+        asked.append(arguments[3])
+        return inertia_matrices(*arguments)
+
+    monkeypatch.setattr("kratos_lite.ale.matrices.inertia_matrices", counted)
+    terms.make("GH")
+    assert terms.G is not terms.H
+    terms.make("H")
+    assert asked == ["GH"]
+
+
+@compiled
+def test_wrong_arguments_are_refused():
+    points, _, pattern = parts(8)
+    one = np.zeros((3, 8))
+    nodes = np.zeros((1, 8), dtype=np.int32)
+    rest = (np.zeros(3), VELOCITY, pattern.indptr, pattern.indices)
+    add = kernels("inertia").add
+    with pytest.raises(ValueError, match=r"dN must be \(g, k, 3\)"):
+        add(points, nodes, one, np.zeros((3, 7, 3)), *rest)
+    with pytest.raises(ValueError, match="rows of points"):
+        add(points, nodes - 1, one, np.zeros((3, 8, 3)), *rest)
+    with pytest.raises(ValueError, match=r"data must be float \(nnz,\)"):
+        add(points, nodes, one, np.zeros((3, 8, 3)), *rest, M=np.zeros(3))
