@@ -211,3 +211,29 @@ def test_turntable_moves_as_it_is_told(tmp_path):
         end = file["q"][-1]
     np.testing.assert_allclose(end[:9], [0, 1, 0, -1, 0, 0, 0, 0, 1], atol=1e-12)
     assert end[11] == pytest.approx(0.15)
+
+
+def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path):
+    pytest.importorskip("matplotlib")
+    out = run(sys.executable, EXAMPLES / "rotating_wheel.py", tmp_path / "wheel.png")
+    for rate, dent in ((0, 2.068909634465), (30, 2.120223003867), (60, 2.314713545843)):
+        assert number(rf"{rate} rad/s: .* by (\S+) mm", out) == pytest.approx(dent, rel=6e-3)
+    sides = [number(rf"{word} (\S+) ", out) for word in ("side:", "and")]
+    assert sides == pytest.approx([0.01354089404349, 0.01952175037520], rel=2e-2)
+    # c_R / 1 m, and the contact is ∫ p cos(angle) dA
+    assert number(r"critical rate about (\S+) rad/s", out) == pytest.approx(95.4813, abs=0.05)
+    contact = 4e3 * 0.25 * 0.15 * (2 * 3.141592653589793) ** 0.5 * 2.718281828459045 ** (-(0.15**2) / 2)
+    assert number(r"the hub carries (\S+) kN", out) == pytest.approx(-contact, rel=1e-4)
+    assert (tmp_path / "wheel.png").stat().st_size > 10_000
+
+
+def test_the_pulse_leaves_the_window(tmp_path):
+    pytest.importorskip("matplotlib")
+    out = run(sys.executable, EXAMPLES / "translated_bar.py", tmp_path / "pulse.png")
+    assert number(r"not faster than (\S+) m/s", out) < 1e-3
+    wrong = dict(re.findall(r"t = (\S+) s: .* wrong by (\S+)", out))
+    # Hexahedra of 8 nodes, 0.2 m and 0.4 ms, against d'Alembert's solution
+    for time, error in (("0.04", 1.4e-2), ("0.08", 2.8e-2), ("0.16", 8.1e-4)):
+        assert float(wrong[time]) == pytest.approx(error, rel=0.05)
+    assert number(r"energy left (\S+)", out) < 1e-4
+    assert (tmp_path / "pulse.png").stat().st_size > 10_000
