@@ -198,7 +198,7 @@ def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
     with np.load(tmp_path / "s.npz") as file:
         F = file["q"][:, :9].reshape(-1, 3, 3)
     stretch = np.linalg.svd(F, compute_uv=False)
-    # the strain at rest in its spin, σ = ρ ω² c² / 12; let go at once it overshoots, though it spins slower then
+    # the strain at rest in its spin, σ = ρ ω² c² / 12; let go at once it overshoots, and spins slower then
     at_rest = (1000 * 81 / 12) * (1.0**2 - 0.3 * 0.6**2) / 5e4
     assert 1 + at_rest < stretch[:, 0].max() < 1 + 2 * at_rest
     assert stretch.min() > 0.8
