@@ -58,7 +58,7 @@ print(f"with damping, 45° to each side: {before:.4f} and {behind:.4f} mm per MP
 model, result = wheel(60.0)
 force, _ = kl.reaction_resultant(model, result, "inner")
 m = result.report.motion
-print(f"critical rate about {m['critical_rate']:.1f} rad/s, margin {m['margin']:.0%}")
+print(f"critical rate about {m['critical_rate_of_waves']:.1f} rad/s, margin {m['margin']:.0%}")
 print(f"the hub carries {force[2] / 1e3:.2f} kN")
 
 # %%
