@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A rotating wheel with a contact fixed in space
 #
-# A rubber wheel turns on a rigid hub and is pressed from below.  Its mesh stands still while the material runs
-# through it, so that the contact stays where it is and the state is steady: one linear solution.
+# A rubber wheel turns on a rigid hub and is pressed from below.  Its mesh stands still while the material
+# runs through it, so that the contact stays where it is and the state is steady: one linear solution.
 
 # %%
 import sys
@@ -36,8 +36,8 @@ def wheel(rate, pressed=True, damping=0.0):
 
 
 # %% [markdown]
-# What the contact does is what remains without the centrifugal growth.  The faster the wheel, the softer it is
-# against a load that stands still, and with damping the dent is carried along: it is no longer symmetric.
+# What the contact does is what remains without the centrifugal growth.  The faster the wheel, the softer it
+# is against a load that stands still, and with damping the dent is carried along and no longer symmetric.
 
 
 # %%
@@ -58,7 +58,7 @@ print(f"with damping, 45° to each side: {before:.4f} and {behind:.4f} mm per MP
 model, result = wheel(60.0)
 force, _ = kl.reaction_resultant(model, result, "inner")
 m = result.report.motion
-print(f"critical rate about {m['critical_rate']:.1f} rad/s, margin {m['margin']:.0%}")
+print(f"critical rate about {m['critical_rate_of_waves']:.1f} rad/s, margin {m['margin']:.0%}")
 print(f"the hub carries {force[2] / 1e3:.2f} kN")
 
 # %%

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A pulse in a moving window
 #
-# A window of 20 m moves with 0.4 c along an endless bar.  A bump of 1 mm that is let go splits into two waves:
-# seen from the window one is slow, the other fast.  Both leave through absorbing ends.
+# A window of 20 m moves with 0.4 c along an endless bar.  A bump of 1 mm that is let go splits into two
+# waves: seen from the window one is slow, the other fast.  Both leave through absorbing ends.
 
 # %%
 import sys
@@ -31,7 +31,8 @@ u, v = np.zeros((2, bar.n_nodes, 3))
 u[:, 0] = bump(x)
 v[:, 0] = -rate * x / 0.8**2 * bump(x)  # the material is at rest: u' = rate du/dx
 transient = model.transient(displacement=u, velocity=v)
-print(f"material at first not faster than {np.abs(transient.material_velocity()).max():.4f} m/s")
+fastest = np.abs(transient.material_velocity()).max()
+print(f"u' at first {np.abs(v).max() * 1e3:.1f} mm/s, of the material {fastest * 1e3:.2f} mm/s")
 
 # %%
 moments = [transient.moment(), *transient.march(dt=0.0004, steps=400, every=50)]
@@ -48,7 +49,7 @@ print(f"energy left {transient.energy() / transient.energy(moments[0]):.1e}")
 # %%
 if len(sys.argv) > 1:
     count, block = len(moments), bar.blocks[0]
-    points = np.vstack([bar.points + (0, 2.0 * k, 0) for k in range(count)])
+    points = np.vstack([bar.points + np.array((0, 2.0 * k, 0)) for k in range(count)])
     nodes = np.vstack([block.nodes + k * bar.n_nodes for k in range(count)])
     ids = np.arange(1, len(nodes) + 1)
     mesh = kl.Mesh(points, [kl.Block(block.name, nodes, ids, np.ones_like(ids), block.shape)])

@@ -43,7 +43,10 @@ def test_python_of_the_readme_runs(number, tmp_path):
         assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
 
 
-@pytest.mark.parametrize("page", ["users.md", "add-an-element.md", "formats.md", "exercises.md", "bodies.md"])
+@pytest.mark.parametrize(
+    "page",
+    ["users.md", "add-an-element.md", "formats.md", "exercises.md", "bodies.md", "dynamics.md", "ale.md"],
+)
 def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
     assert blocks
@@ -230,7 +233,7 @@ def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path
 def test_the_pulse_leaves_the_window(tmp_path):
     pytest.importorskip("matplotlib")
     out = run(sys.executable, EXAMPLES / "translated_bar.py", tmp_path / "pulse.png")
-    assert number(r"not faster than (\S+) m/s", out) < 1e-3
+    assert number(r"of the material (\S+) mm/s", out) < 1e-3 * number(r"at first (\S+) mm/s", out)
     wrong = dict(re.findall(r"t = (\S+) s: .* wrong by (\S+)", out))
     # Hexahedra of 8 nodes, 0.2 m and 0.4 ms, against d'Alembert's solution
     for time, error in (("0.04", 1.4e-2), ("0.08", 2.8e-2), ("0.16", 8.1e-4)):

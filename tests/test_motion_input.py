@@ -75,7 +75,7 @@ def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, c
     assert run("wheel.mdpa", *words, "--rotation", "0,0,-1:-8") == 0
     out = capsys.readouterr().out
     assert re.search(r"^rotation +-8 rad/s \(0, 0, -1\)$", out, re.M)
-    assert re.search(r"^critical rate +about 18\.\d+ rad/s, margin 5\d\.\d%$", out, re.M)
+    assert re.search(r"^critical rate +of waves about 18\.\d+ rad/s, margin 5\d\.\d%$", out, re.M)
     assert re.search(r"^force of supports +\(.*\) N$", out, re.M)
     assert re.search(r"^moment of supports +\(.*\) N m$", out, re.M)
 
@@ -97,6 +97,52 @@ def test_a_translation_in_words_and_in_a_run_file_are_the_same(folder):
     assert first["motion"]["kind"] == "translation"
     ends = [first["displacement"][str(i + 1)] for i in kl.read("bar.mdpa").mesh.nodes("x+")]
     assert np.abs(ends).max() == 0.0
+
+
+def test_the_section_stands_in_run_files_of_kratos_too(folder):
+    materials = {
+        "model_part_name": "Structure",
+        "properties_id": 1,
+        "Material": {
+            "constitutive_law": {"name": "LinearElastic3DLaw"},
+            "Variables": {"DENSITY": 1000.0, "YOUNG_MODULUS": 1e6, "POISSON_RATIO": 0.3},
+        },
+    }
+    (folder / "materials.json").write_text(json.dumps({"properties": [materials]}))
+    clamp = {
+        "python_module": "assign_vector_variable_process",
+        "Parameters": {
+            "model_part_name": "Structure.inner",
+            "variable_name": "DISPLACEMENT",
+            "value": [0.0, 0.0, 0.0],
+        },
+    }
+    content = {
+        "problem_data": {"start_time": 0.0, "end_time": 1.0},
+        "solver_settings": {
+            "solver_type": "static",
+            "model_part_name": "Structure",
+            "domain_size": 3,
+            "model_import_settings": {"input_type": "mdpa", "input_filename": "wheel"},
+            "material_import_settings": {"materials_filename": "materials.json"},
+            "time_stepping": {"time_step": 1.0},
+        },
+        "processes": {"constraints_process_list": [clamp]},
+        "ale": {"rotation": {"axis": "z", "rate": 8.0}},
+    }
+    path = folder / "ProjectParameters.json"
+    path.write_text(json.dumps(content, indent=1))
+    model = read_project(path).model
+    expected = kl.Model(model.mesh, kl.Isotropic3D(**RUBBER))
+    expected.fix("inner")
+    expected.add(kl.ale.Rotation("z", 8.0))
+    u = expected.solve().u
+    np.testing.assert_allclose(model.solve().u, u, rtol=0, atol=1e-12 * np.abs(u).max())
+    assert not any("ale" in note for note in model.notes)
+    content["ale"]["rotation"]["speed"] = 1.0
+    path.write_text(json.dumps(content, indent=1))
+    with pytest.raises(kl.InputError, match=r"json:\d+:\d+: unknown key 'ale.rotation.speed'"):
+        read_project(path)
 
 
 @pytest.mark.parametrize(

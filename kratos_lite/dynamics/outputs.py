@@ -136,7 +136,7 @@ def motion_summary(e: EquationsOfMotion, of: Reacting) -> dict[str, Any]:
         "direction": e.terms.motion.direction.tolist(),
         "rate": rate,
         "acceleration": e.rates(0.0)[1],
-        "critical_rate": limit,
+        "critical_rate_of_waves": limit,
         "margin": 1 - abs(rate) / limit,
         "support_force": force.tolist(),
         "support_moment": moment.tolist(),
