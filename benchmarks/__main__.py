@@ -1,6 +1,6 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
-Sets: ``kratos error growth assembly parse skips cube1 motion``.
+Sets: ``kratos error growth assembly parse skips cube1 motion ale``.
 
 ``report`` makes docs/benchmarks.md and its picture from the results kept; ``references`` makes the energies
 of the scenes without an exact field.  See benchmarks/README.md.
@@ -80,6 +80,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "skips": lambda options, folder: sets.skip_runs(options.programs, (options.cells or (32,))[0]),
     "cube1": lambda options, folder: sets.cube1_runs(options.programs),
     "motion": lambda options, folder: sets.motion_runs(options.programs),
+    "ale": lambda options, folder: sets.ale_runs(options.programs),
 }
 REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1}
 

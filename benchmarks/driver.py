@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import errors, scenes
+from benchmarks import ale, errors, scenes
 from benchmarks.programs import HELPERS, PROGRAMS, Program
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -157,7 +157,9 @@ class Driver:
         if run.scene.endswith(".mdpa"):
             return Path(run.scene.removesuffix(".mdpa"))
         if run.place not in self.stems:
-            if run.n < LARGE:
+            if run.task == "ale":
+                self.stems[run.place] = ale.write(self.folder, run.kind, run.n)
+            elif run.n < LARGE:
                 self.stems[run.place] = scenes.make(*run.place).write(self.folder)
             else:
                 words = [*map(str, run.place), str(self.folder)]

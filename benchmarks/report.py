@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import ale
 from benchmarks.curves import cheapest, starts, time_to_error
 from benchmarks.motion import MOTIONS
 from benchmarks.tables import OURS, THEIRS, Row, ratio, seconds, table
@@ -210,6 +211,43 @@ def motions(rows: Sequence[Row]) -> str:
     return table(head, body)
 
 
+def wheels(rows: Sequence[Row]) -> str:
+    """Return seconds of M, G, H and K beside GetFEM's, and how far the entries are from each other's."""
+    body = []
+    for place, found in by_place(rows).items():
+        ours, theirs = (shortest(found.get(program)) for program in (OURS, "GetFEM"))
+        numpy, pattern = shortest(found.get("kratos_lite NumPy")), ours.get("pattern", 0.0)
+        difference = found.get("GetFEM", {}).get("errors", {}).get("difference")
+        for name in ale.NAMES:
+            if name not in ours:
+                continue
+            body.append(
+                [
+                    label(place),
+                    name,
+                    seconds(ours[name]),
+                    seconds(numpy.get(name)),
+                    seconds(theirs.get(name)),
+                    ratio(ours[name], theirs.get(name)),
+                    ratio(pattern + ours[name], theirs.get(name)),
+                    "" if difference is None else f"{difference:.0e}",
+                ]
+            )
+    head = ["mesh", "matrix", "kratos_lite s", "NumPy s", "GetFEM s", "ratio", "with pattern", "difference"]
+    return table(head, body)
+
+
+def shortest(row: Row | None) -> dict[str, float]:
+    """Return the shortest of the times of each phase of a row.
+
+    >>> shortest({"phases": {"K": 2.0, "K, again": 1.0, "read": 3.0}})
+    {'K': 1.0, 'read': 3.0}
+    """
+    phases = row["phases"] if row else {}
+    names = [name for name in phases if not name.endswith(", again")]
+    return {name: min(phases[name], phases.get(f"{name}, again", phases[name])) for name in names}
+
+
 def micro(seconds: float | None) -> str:
     """Return seconds as microseconds in three digits.
 
@@ -229,6 +267,7 @@ SECTIONS = {
     "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
     "skips": ("What need not be computed", skips),
     "motion": ("Bodies in motion: time of one step of one body", motions),
+    "ale": ("Matrices of a wheel in flow", wheels),
 }
 """Title and table of each group of rows."""
 NOTES = {
@@ -246,6 +285,11 @@ NOTES = {
     "motion": "Solfec-1.0 was timed apart, on a machine like this (see `benchmarks/motion.py`); goals: "
     "at most its time for finite-element bodies, and 1 µs for one of many. Drifts are relative, over all "
     "steps of the run; energy is counted without the work of loads.",
+    "ale": "Mass M, convective matrices G and H (one number for each pair of nodes) and stiffness K of a "
+    "hollow cylinder of n × 8n × n elements, by Gauss rules of 3³ points (8N) and 4³ points (20N, 27N) in "
+    "every program. Seconds are the shortest of a few. GetFEM makes the sparsity anew with each matrix, "
+    "kratos_lite once for all; `with pattern` counts it to this one. Goal: ratio ≤ 0.25 for M+G+H and for K. "
+    "The difference is the largest of all entries of M, G, H, K, relative to the largest one of the matrix.",
     "skips": "Whole processes; the ratio is to the plain row of the same scene.",
 }
 

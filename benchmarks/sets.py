@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks import ale
 from benchmarks.driver import Run
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
@@ -145,6 +146,18 @@ def motion_runs(programs: Sequence[str]) -> list[Run]:
     return [
         Run("motion", program, name, "", 0, "march", (("motion", name),))
         for name in MOTIONS
+        for program in chosen
+    ]
+
+
+def ale_runs(
+    programs: Sequence[str], sizes: Sequence[tuple[str, int]] = ale.MESHES, repeat: int = 4
+) -> list[Run]:
+    """Return the matrices of a wheel in flow, beside GetFEM."""
+    chosen = [p for p in (*FROM_FILES[:2], "GetFEM") if p in programs]
+    return [
+        Run("ale", program, ale.SCENE, kind, n, "ale", (("repeat", repeat), ("n", n)))
+        for kind, n in sizes
         for program in chosen
     ]
 

@@ -19,6 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks import __main__ as command  # noqa: E402
 from benchmarks import (  # noqa: E402
+    ale,
     cases,
     curves,
     driver,
@@ -214,6 +215,36 @@ def test_motions_have_rows_beside_solfec():
     assert text.count("\n") == 4
 
 
+def wheel_rows(folder, programs):
+    measured = driver.Driver(folder, 1, command.arguments(["ale"]).pythons, tell=lambda line: None)
+    rows = measured.measure(sets.ale_runs(programs, (("8N", 1), ("20N", 1), ("27N", 1)), repeat=2))
+    return rows, measured.absent
+
+
+@pytest.mark.parametrize("name", ["kratos_lite NumPy", "GetFEM"])
+def test_matrices_of_a_wheel_are_the_same_entry_by_entry(name, tmp_path):
+    rows, absent = wheel_rows(tmp_path, ("kratos_lite", name))
+    if name in absent:
+        pytest.skip(f"{name} is absent: {absent[name]}")
+    assert [row.get("failed") for row in rows] == [None] * 6
+    assert [row["program"] for row in rows] == ["kratos_lite", name] * 3
+    for row in rows:
+        assert set(ale.NAMES) <= set(row["phases"])
+        assert row["errors"]["difference"] < 1e-14
+
+
+def test_wheels_have_rows_beside_getfem():
+    common = {"group": "ale", "scene": "wheel", "kind": "8N", "n": 8}
+    times = {"M": 0.03, "M, again": 0.02, "pattern": 0.03, "M+G+H": 0.05, "K": 0.5, "K, again": 1.0}
+    rows = [common | {"program": "kratos_lite", "phases": times}]
+    assert "| wheel 8N n = 8 | M | 0.020 |  |  |  |  |  |" in report.wheels(rows)
+    theirs = {"phases": {"M": 0.2, "M+G+H": 0.5}, "errors": {"difference": 1e-15}}
+    text = report.wheels([*rows, common | {"program": "GetFEM"} | theirs])
+    assert "| wheel 8N n = 8 | M+G+H | 0.050 |  | 0.500 | 0.1 | 0.16 | 1e-15 |" in text
+    assert "| wheel 8N n = 8 | K | 0.500 |  |  |  |  | 1e-15 |" in text
+    assert text.count("\n") == 5
+
+
 # ---- sets, results and report --------------------------------------------------------------------------
 
 
@@ -221,7 +252,7 @@ def test_every_set_names_scenes_and_programs_that_exist(tmp_path):
     for name, make in command.COMMANDS.items():
         runs = make(command.arguments([name, "--cases", str(tmp_path)]), tmp_path)
         assert runs, name
-        assert {run.scene for run in runs} <= {*scenes.SCENES, *motion.MOTIONS}
+        assert {run.scene for run in runs} <= {*scenes.SCENES, *motion.MOTIONS, ale.SCENE}
         assert {run.program for run in runs} <= {*PROGRAMS, *command.HELPERS}
         assert len(set(runs)) == len(runs)
 
@@ -282,7 +313,7 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [curves, tables, meshes, sets, command])
+@pytest.mark.parametrize("module", [curves, tables, meshes, sets, report, command])
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 

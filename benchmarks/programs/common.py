@@ -30,7 +30,7 @@ class Job:
     stem : path of the scene without ending.
     kind : element kind such as ``8N``.
     tolerance : relative residual for iterative solvers.
-    points, nodes, fixed, values, forces, elasticity : the problem as `read` leaves it.
+    points, nodes, fixed, values, forces, elasticity, reference : the problem as `read` leaves it.
     """
 
     points: Array
@@ -40,6 +40,7 @@ class Job:
     values: Array
     forces: Array
     elasticity: Array
+    reference: Array
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.given = given

@@ -25,6 +25,10 @@ def work(job: Job) -> Array | None:
         import getfem
         import scipy.spatial  # noqa: F401
     job.answer["version"] = getattr(getfem, "__version__", "")
+    if job.task == "ale":
+        from benchmarks.programs import getfem_ale
+
+        return getfem_ale.work(job, getfem)
     job.read()
     with job.phase("mesh"):
         _mesh, field, rule, coefficients = make_mesh(job, getfem)

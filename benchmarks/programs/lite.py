@@ -28,6 +28,10 @@ def work(job: Job) -> Array | None:
         job.answer["phases"]["step"] = found.pop("step")
         job.answer["drift"] = found
         return None
+    if job.task == "ale":
+        from benchmarks import ale
+
+        return ale.work(job, kl)
     with job.phase("read"):
         model = kl.read(f"{job.stem}.mdpa")
     if job.task == "parse":
