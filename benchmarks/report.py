@@ -287,8 +287,9 @@ NOTES = {
     "steps of the run; energy is counted without the work of loads.",
     "ale": "Mass M, convective matrices G and H (one number for each pair of nodes) and stiffness K of a "
     "hollow cylinder of n × 8n × n elements, by Gauss rules of 3³ points (8N) and 4³ points (20N, 27N) in "
-    "every program. Seconds are the shortest of a few. GetFEM makes the sparsity anew with each matrix, "
-    "kratos_lite once for all; `with pattern` counts it to this one. Goal: ratio ≤ 0.25 for M+G+H and for K. "
+    "every program. Seconds are the shortest of a few. GetFEM computes on one core, and makes the sparsity "
+    "anew with each matrix, kratos_lite once for all; `with pattern` counts it to this one. Goal: "
+    "ratio ≤ 0.25 for M+G+H and for K. "
     "The difference is the largest of all entries of M, G, H, K, relative to the largest one of the matrix.",
     "skips": "Whole processes; the ratio is to the plain row of the same scene.",
 }

@@ -230,7 +230,7 @@ def test_matrices_of_a_wheel_are_the_same_entry_by_entry(name, tmp_path):
     assert [row["program"] for row in rows] == ["kratos_lite", name] * 3
     for row in rows:
         assert set(ale.NAMES) <= set(row["phases"])
-        assert row["errors"]["difference"] < 1e-14
+        assert row["errors"]["difference"] < 1e-13
 
 
 def test_wheels_have_rows_beside_getfem():
