@@ -94,7 +94,8 @@ def _check_solver(solver: Settings) -> list[str]:
     if kind not in ("Static", "static"):
         raise solver.error(
             "solver_type",
-            f"solver_type {kind!r}: run files are solved statically; use 'static', and in Python transient()",
+            f"solver_type {kind!r}: only static solutions are computed of run files; use 'static', then "
+            "--modes for frequencies, or model.transient() in Python",
         )
     if solver.integer("domain_size") != 3:
         raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
