@@ -160,3 +160,14 @@ def test_the_report_of_a_steady_motion_tells_rate_and_critical_rate():
     assert re.fullmatch(r"of waves about 18\.\d+ rad/s, margin -\d+\.\d%", rows["critical rate"])
     assert {"force of supports", "moment of supports"} <= rows.keys()
     assert "rotation" not in dict(shaken_bar().solve().table())
+
+
+def test_transients_and_steady_motions_warn_alike():
+    model = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1), element="KinematicLinear3D8N"), RUBBER)
+    model.add(kl.ale.Rotation("z", rate=18.0))
+    warnings = model.transient().equations.warnings
+    for words in ("near the critical one", "polygonal rim", "nothing holds the rotation"):
+        assert sum(words in text for text in warnings) == 1, words
+    model.fix("inner")
+    assert model.solve().report.warnings == [text for text in warnings if "nothing holds" not in text]
+    assert ("motion", "Rotation") in model.table()

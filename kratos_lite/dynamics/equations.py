@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite import solvers
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.ends import dashpots
+from kratos_lite.ale.guards import warnings_of
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.blockmatrix import BlockMatrix
@@ -49,7 +50,7 @@ class EquationsOfMotion:
     system : pattern, K and supports.
     mass : M.
     terms : the matrices of the motion, or None.
-    warnings : what the checks of the model found.
+    warnings : what the checks of the model and of its motion at the time 0 found.
 
     Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
     """
@@ -89,6 +90,7 @@ class EquationsOfMotion:
             self.terms = MotionMatrices(
                 model.motion, self.system.points, self.system.batches, self.system.pattern, self.mass
             )
+            self.warnings += warnings_of(self.terms, model)
         self._kept: tuple[Any, Solve] | None = None
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import solvers
-from kratos_lite.ale.guards import warnings_of
 from kratos_lite.assembly import Progress
 from kratos_lite.checks import equilibrium
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
@@ -31,7 +30,7 @@ def solve_steady(
     phase = Phases()
     with phase("check"):
         e = EquationsOfMotion(model, free=False, progress=progress)
-        warnings = e.warnings + warnings_of(e.terms, model)
+        warnings = list(e.warnings)
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.whole(forces).copy()
