@@ -24,11 +24,20 @@ def disk(element: str, radial: int, around: int, hub: str = "clamped") -> kl.Mod
     return model
 
 
-def bar(element: str, n: int, half: float = 10.0) -> kl.Model:
-    """Return a bar -half … half along x that strains in this direction alone."""
+def bar(element: str, n: int, half: float = 10.0, tied: str = "") -> kl.Model:
+    """Return a bar -half … half along x that strains in this direction alone.
+
+    Sections move as one where they are `tied`: "all" of them, or those "below" the upper end, which
+    periodic ends tie.
+    """
     mesh = kl.box((2 * half, 1, 1), (n, 1, 1), f"KinematicLinear3D{element}", origin=(-half, 0, 0))
     model = kl.Model(mesh, STEEL)
     model.fix(lambda X: np.ones(len(X), dtype=bool), "yz")
+    x = np.round(mesh.points[:, 0], 9)
+    for section in np.unique(x) if tied == "all" else np.unique(x)[:-1] if tied else []:
+        first, *others = np.flatnonzero(x == section).tolist()
+        for node in others:
+            model.link((node, "x"), {(first, "x"): 1.0})
     return model
 
 
