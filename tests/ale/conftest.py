@@ -1,0 +1,68 @@
+"""Wheels, bars and scalar matrices that the tests of moving bodies share."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.ale import MotionMatrices
+from kratos_lite.assembly import Pattern
+from kratos_lite.mass import Mass
+
+STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+
+
+def disk(element: str, radial: int, around: int, hub: str = "clamped") -> kl.Model:
+    """Return the annulus 0.3 … 1 m in plane strain."""
+    mesh = kl.annulus(0.3, 1.0, 0.2, cells=(radial, around, 1), element=f"KinematicLinear3D{element}")
+    model = kl.Model(mesh, STEEL)
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "z")
+    if hub == "clamped":
+        model.fix("inner", "xy")
+    return model
+
+
+def bar(element: str, n: int, half: float = 10.0, tied: str = "") -> kl.Model:
+    """Return a bar -half … half along x that strains in this direction alone.
+
+    Sections move as one where they are `tied`: "all" of them, or those "below" the upper end, which
+    periodic ends tie.
+    """
+    mesh = kl.box((2 * half, 1, 1), (n, 1, 1), f"KinematicLinear3D{element}", origin=(-half, 0, 0))
+    model = kl.Model(mesh, STEEL)
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "yz")
+    x = np.round(mesh.points[:, 0], 9)
+    for section in np.unique(x) if tied == "all" else np.unique(x)[:-1] if tied else []:
+        first, *others = np.flatnonzero(x == section).tolist()
+        for node in others:
+            model.link((node, "x"), {(first, "x"): 1.0})
+    return model
+
+
+def matrices(motion: kl.ale.Motion, model: kl.Model) -> SimpleNamespace:
+    """Return M, G, S, H as full matrices (n, n) of the motion in a model, and its loads."""
+    batches, points = model.batches(), model.mesh.points
+    pattern = Pattern(len(points), [batch.nodes for batch in batches])
+    mass = Mass(points, batches, pattern, False)
+    terms = MotionMatrices(motion, points, batches, pattern, mass)
+    unit = np.eye(len(points))
+    full = {name: terms.times(getattr(terms, name), unit) for name in "GSH"}
+    return SimpleNamespace(terms=terms, M=mass.scalar.toarray(), **full)
+
+
+def polar(mesh: kl.Mesh, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return r, angle, and the radial and tangential component of nodal vectors (n, 3)."""
+    x, y = mesh.points[:, 0], mesh.points[:, 1]
+    r = np.hypot(x, y)
+    return r, np.arctan2(y, x), (x * u[:, 0] + y * u[:, 1]) / r, (x * u[:, 1] - y * u[:, 0]) / r
+
+
+@pytest.fixture(scope="session")
+def wheels() -> SimpleNamespace:
+    """Steel, its wave speeds, and the functions of this module."""
+    C, rho = STEEL.C, STEEL.density
+    speeds = {"c_p": np.sqrt(C[0, 0] / rho), "c_s": np.sqrt(C[3, 3] / rho)}
+    tools: dict[str, Callable] = {"disk": disk, "bar": bar, "matrices": matrices, "polar": polar}
+    return SimpleNamespace(steel=STEEL, **speeds, **tools)

@@ -1,0 +1,118 @@
+"""What is refused, and what is doubtful, with its figures."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.ale import Rotation, Translation
+from kratos_lite.ale.guards import leak, rayleigh_speed
+from kratos_lite.errors import InputError, ModelError
+
+
+def spun(model, **options):
+    model.add(Rotation("z", **options))
+    return model.solve().report.warnings
+
+
+def test_a_box_is_no_body_of_revolution(wheels):
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2), origin=(-0.5, -0.5, 0)), wheels.steel)
+    with pytest.raises(ModelError, match=r"not one of revolution about the axis \[0.0, 0.0, 1.0\]: \d+% of"):
+        model.add(Rotation("z", rate=1.0))
+    assert model.motion is None
+
+
+@pytest.mark.parametrize("options", [{"axis": "x"}, {"centre": (0.5, 0.0, 0.0)}])
+def test_the_wrong_axis(options, wheels):
+    with pytest.raises(ModelError, match="give the axis of the body and a point of it, centre="):
+        wheels.disk("8N", 2, 32).add(Rotation(rate=1.0, **options))
+
+
+def test_a_wheel_that_stands_elsewhere(wheels):
+    model = wheels.disk("8N", 2, 48)
+    model.mesh.points[:] = model.mesh.points[:, [2, 0, 1]] + (5.0, -3.0, 8.0)
+    model.add(Rotation("x", rate=1.0, centre=(0.0, -3.0, 8.0)))
+    assert leak(model.motion, model) < 0.06
+
+
+def test_polygonal_rim(wheels):
+    coarse = spun(wheels.disk("8N", 2, 16), rate=10.0)
+    assert any("of the velocity passes through the polygonal rim" in text for text in coarse)
+    assert not any("rim" in text for text in spun(wheels.disk("20N", 2, 24), rate=10.0))
+
+
+def test_rates_near_the_critical_one(wheels):
+    said = {rate: " ".join(spun(wheels.disk("20N", 2, 24), rate=rate)) for rate in (80.0, 87.0, 97.0, -97.0)}
+    assert "critical" not in said[80.0]
+    assert "the rate 87 rad/s is near the critical one, about 95.48 rad/s" in said[87.0]
+    assert "the rate 97 rad/s is above the critical one" in said[97.0]
+    assert "above" in said[-97.0]
+    assert rayleigh_speed(wheels.c_p, wheels.c_s) == pytest.approx(95.481345662, rel=1e-10)
+
+
+def test_windows_near_their_critical_speed(wheels):
+    model = wheels.bar("8N", 10)
+    model.fix("x-", "x")
+    model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1.0, 0, 0)))
+    model.add(Translation("x", rate=0.95 * wheels.c_s, ends="natural"))
+    assert any("m/s is near the critical one, about 103 m/s" in t for t in model.solve().report.warnings)
+
+
+def test_free_rotor(wheels):
+    model = wheels.disk("20N", 2, 24, hub="free")
+    rim = model.mesh.nodes("inner")
+    x = model.mesh.points[rim]
+    model.fix(rim[np.abs(x[:, 1]) < 1e-9], "x")  # works along the radius alone
+    model.fix(rim[np.abs(x[:, 0]) < 1e-9], "y")
+    with pytest.raises(ModelError, match="rotat"):
+        spun(model, rate=5.0)
+    warned = "nothing holds the rotation about the axis"
+    assert not any(warned in text for text in spun(wheels.disk("20N", 2, 24), rate=5.0))
+
+
+def test_anisotropic_materials(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.assign(kl.Orthotropic3D(2e8, 1e8, 1e8, 0.2, 0.2, 0.2, 4e7, 4e7, 4e7, 7620.0))
+    said = spun(model, rate=5.0)
+    assert any("an anisotropic material is not axisymmetric" in text for text in said)
+
+
+def test_no_density():
+    mesh = kl.annulus(0.3, 1.0, 0.2, (2, 24, 1))
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+    model.fix("inner")
+    model.add(Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="density 0, but what moves needs mass"):
+        model.solve()
+
+
+def test_one_motion_to_a_model(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.add(Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="has a motion already"):
+        model.add(Rotation("z", rate=2.0))
+
+
+def test_periodic_ends_need_opposite_nodes(wheels):
+    model = wheels.bar("8N", 4)
+    end = model.mesh.nodes("x+")
+    model.mesh.points[end[0], 1] += 0.2
+    with pytest.raises(ModelError, match="nodes that lie opposite one another; there are 4 and 4"):
+        model.add(Translation("x", rate=1.0, ends="periodic"))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Rotation("w"), "an axis is 'x', 'y', 'z' or a vector; got 'w'"),
+        (lambda: Rotation((0, 0, 0)), "not all 0"),
+        (lambda: Rotation((1, 0)), "three components"),
+        (lambda: Rotation("z", rate=np.nan), "rate"),
+        (lambda: Rotation("z", rate=[1, 2]), "a rate must be a number"),
+        (lambda: Rotation("z", centre=(1, 2)), r"centre of a rotation must have shape \(3,\)"),
+        (lambda: Rotation("z", damping=-1.0), "a damping must be one number in 1/s, ≥ 0; got -1.0"),
+        (lambda: Translation("x", ends="open"), "ends must be one of absorbing, periodic, fixed, natural"),
+    ],
+)
+def test_arguments(make, text):
+    with pytest.raises(InputError, match=text):
+        make()

@@ -1,0 +1,284 @@
+"""Steady motion: what rests in space while its material turns, against closed forms and spectral figures."""
+
+import numpy as np
+import pytest
+from scipy.special import jv, yv
+
+import kratos_lite as kl
+from kratos_lite.ale import Rotation
+from kratos_lite.dynamics import EquationsOfMotion
+from kratos_lite.elements.surface import area_vectors, face_rule
+
+E_PLANE, NU_PLANE = 210e6 / (1 - 0.3**2), 0.3 / 0.7
+A, B, RHO = 0.3, 1.0, 7620.0
+
+
+def spinning_load(r, rate):
+    """Growth of a free plane annulus under the centrifugal load alone (a1)."""
+    n, squares = NU_PLANE, A * A + B * B
+    shape = (3 + n) * (1 - n) * squares + (1 + n) * (3 + n) * (A * B / r) ** 2 - (1 - n * n) * r * r
+    return RHO * rate**2 * r / (8 * E_PLANE) * shape
+
+
+def with_softening(r, rate, c_p, clamped):
+    """Growth with the inertia of the growth itself (a2): u = -r + C1 J1(kr) + C2 Y1(kr)."""
+    lam, mu, k = 1.211538461538462e8, 8.076923076923077e7, rate / c_p
+
+    def stress(f, x):  # of u = f(1, k x)
+        slope = k * f(0, k * x) - f(1, k * x) / x
+        return (lam + 2 * mu) * slope + lam * f(1, k * x) / x
+
+    rows = [[jv(1, k * A), yv(1, k * A)] if clamped else [stress(jv, A), stress(yv, A)]]
+    rows.append([stress(jv, B), stress(yv, B)])
+    right = [A if clamped else 2 * (lam + mu), 2 * (lam + mu)]
+    c1, c2 = np.linalg.solve(rows, right)
+    return -r + c1 * jv(1, k * r) + c2 * yv(1, k * r)
+
+
+def free_hub(wheels, element, radial, around):
+    """Return a wheel held by its symmetry: at four points of the hub along their tangents."""
+    model = wheels.disk(element, radial, around, hub="free")
+    r, angle, *_ = wheels.polar(model.mesh, np.zeros_like(model.mesh.points))
+    for k, axis in enumerate("yxyx"):
+        turned = np.abs(np.angle(np.exp(1j * (angle - k * np.pi / 2)))) < 1e-9
+        model.fix(turned & (r < A + 1e-9), axis)
+    return model
+
+
+def test_the_closed_forms_are_those_of_the_tables(wheels):
+    assert spinning_load(1.0, 30.0) == pytest.approx(6.53796e-3, rel=1e-12)
+    assert spinning_load(0.65, 30.0) == pytest.approx(6.84285525e-3, rel=1e-12)
+    table = {(60.0, 1.0, False): 2.717507462417e-02, (30.0, 0.65, True): 2.814535560453e-03}
+    for (rate, r, clamped), u in table.items():
+        assert with_softening(r, rate, wheels.c_p, clamped) == pytest.approx(u, rel=1e-10)
+
+
+CASES = [("8N", 4, 32, 3.5e-2), ("20N", 2, 16, 9.5e-3), ("20N", 4, 32, 1.05e-3), ("27N", 4, 32, 1.05e-3)]
+
+
+@pytest.mark.parametrize(("element", "radial", "around", "tolerance"), CASES)
+def test_growth_with_a_free_hub(element, radial, around, tolerance, wheels):
+    model = free_hub(wheels, element, radial, around)
+    model.add(Rotation("z", rate=30.0))
+    r, _, radial_u, tangential = wheels.polar(model.mesh, model.solve().u)
+    exact = with_softening(r, 30.0, wheels.c_p, clamped=False)
+    assert np.abs(radial_u / exact - 1).max() < tolerance
+    assert np.abs(tangential).max() < 1e-6 * exact.max() + 1e-4 * tolerance
+
+
+@pytest.mark.parametrize(
+    ("element", "radial", "around", "tolerance"), [("20N", 4, 32, 2e-4), ("27N", 4, 32, 2.7e-4)]
+)
+def test_growth_with_a_clamped_hub(element, radial, around, tolerance, wheels):
+    model = wheels.disk(element, radial, around)
+    model.add(Rotation("z", rate=30.0))
+    r, _, u, _ = wheels.polar(model.mesh, model.solve().u)
+    exact = with_softening(r, 30.0, wheels.c_p, clamped=True)
+    assert np.abs(u - exact).max() < tolerance * exact.max()
+
+
+def test_figures_of_getfem(wheels):
+    """An independent program gives the same numbers on the same meshes."""
+    for element, expected in (("8N", 3.367005917789e-03), ("20N", 3.406360604829e-03)):
+        model = wheels.disk(element, 4, 32)
+        model.use_rule(4 if element == "20N" else 3)
+        model.add(Rotation("z", rate=30.0))
+        tip = model.solve().u[np.argmax(model.mesh.points[:, 0])]
+        assert tip[0] == pytest.approx(expected, rel=2e-11)
+
+
+def test_h_is_there_with_its_sign(wheels):
+    """The load alone (a1) gives 0.95 % less at the rim than the load with -rate² H (a2)."""
+    model = free_hub(wheels, "20N", 4, 32)
+    model.add(Rotation("z", rate=30.0))
+    with_h = model.solve().u
+    load = EquationsOfMotion(model)
+    nodal = load.system.whole(load.inertia_load(0.0))
+    plain = free_hub(wheels, "20N", 4, 32)
+    plain.add(kl.NodalForces(nodal))
+    tip = int(np.argmax(model.mesh.points[:, 0]))
+    alone = plain.solve().u[tip, 0]
+    assert alone == pytest.approx(spinning_load(1.0, 30.0), rel=1.1e-3)
+    gap = with_h[tip, 0] / alone - 1
+    assert gap == pytest.approx(6.600028313133e-03 / 6.53796e-03 - 1, abs=2e-5)
+    assert gap == pytest.approx(0.0095, abs=1e-4)
+
+
+def test_orders_of_growth(wheels):
+    """Halved cells: errors fall by 4 for hex8 (order 2), and by 8 and more for hex20."""
+    for element, sizes, order in (("8N", (4, 8), 1.7), ("20N", (2, 4), 2.8)):
+        errors = []
+        for n in sizes:
+            model = wheels.disk(element, n, 8 * n)
+            model.add(Rotation("z", rate=30.0))
+            r, _, u, _ = wheels.polar(model.mesh, model.solve().u)
+            errors.append(np.abs(u - with_softening(r, 30.0, wheels.c_p, clamped=True)).max())
+        assert np.log2(errors[0] / errors[1]) > order
+
+
+def test_long_cylinder(wheels):
+    """Free ends, the load alone: generalised plane strain, eps_z = -5.34e-3 at 30 rad/s."""
+    mesh = kl.annulus(A, B, 0.2, cells=(4, 24, 1), element="KinematicLinear3D20N")
+    model = kl.Model(mesh, wheels.steel)
+    model.fix("z-", "z")
+    tops = mesh.nodes("z+")
+    for node in tops[1:]:
+        model.link((int(node), "z"), {(int(tops[0]), "z"): 1.0})
+    r, angle, *_ = wheels.polar(mesh, np.zeros_like(mesh.points))
+    for k, axis in enumerate("yxyx"):
+        model.fix((np.abs(np.angle(np.exp(1j * (angle - k * np.pi / 2)))) < 1e-9) & (r < A + 1e-9), axis)
+    spinning = wheels.disk("20N", 4, 24)
+    spinning.add(Rotation("z", rate=30.0))
+    e = EquationsOfMotion(spinning)
+    model.add(kl.NodalForces(e.system.whole(e.inertia_load(0.0))))
+    u = model.solve().u
+    rim = int(np.argmax(mesh.points[:, 0]))
+    assert u[tops[0], 2] / 0.2 == pytest.approx(-5.339442857143e-03, rel=1e-3)
+    assert u[rim, 0] == pytest.approx(8.139792857143e-03, rel=1e-3)
+
+
+# ---- a load fixed in space -----------------------------------------------------------------------------
+
+
+def rim_load(mesh, pressure):
+    """Return the nodal forces of a pressure(angle) on the rim that pushes inward."""
+    total = np.zeros_like(mesh.points)
+    rim = np.zeros(mesh.n_nodes, dtype=bool)
+    rim[mesh.nodes("outer")] = True
+    for block in mesh.boundary:
+        faces = block.nodes[rim[block.nodes].all(axis=1)]
+        if not len(faces):
+            continue
+        rule = face_rule(block.shape)
+        X = mesh.points[faces]
+        N = np.array([block.shape.N(xi) for xi in rule.points])
+        at = N @ X
+        area = area_vectors(block.shape, X, rule)
+        area = np.linalg.norm(area, axis=-1, keepdims=True)
+        inward = -at * (1.0, 1.0, 0.0) / np.hypot(at[..., 0], at[..., 1])[..., None]
+        p = pressure(np.arctan2(at[..., 1], at[..., 0]))[..., None]
+        np.add.at(
+            total, faces, np.swapaxes(np.broadcast_to(N, (len(faces), *N.shape)), 1, 2) @ (p * inward * area)
+        )
+    return total
+
+
+def under_rim_load(wheels, element, radial, around, pressure, rate, damping=0.0):
+    """Return mesh and displacements under a rim load alone: those with it less those without."""
+    found = []
+    for share in (1.0, 0.0):
+        model = wheels.disk(element, radial, around)
+        model.add(kl.NodalForces(share * rim_load(model.mesh, pressure)))
+        model.add(Rotation("z", rate=rate, damping=damping))
+        found.append(model.solve())
+    return model.mesh, found[0].u - found[1].u
+
+
+def amplitudes(wheels, mesh, u, n):
+    """Return the complex amplitudes of e^{i n angle} of u_r and u_phi on the rim, by the corner nodes."""
+    _, angle, radial, tangential = wheels.polar(mesh, u)
+    rim = mesh.nodes("outer")
+    rim = rim[mesh.points[rim, 2] == 0]
+    order = rim[np.argsort(angle[rim])]
+    wave = np.exp(-1j * n * angle[order]) * (1 if n == 0 else 2) / len(order)
+    return radial[order] @ wave, tangential[order] @ wave
+
+
+STEADY = [
+    (1, 30.0, -3.770349508851e-04, 3.897263135332e-04),
+    (2, 0.0, -3.603791304802e-04, 1.177633588963e-04),
+    (2, 30.0, -3.649471916294e-04, 1.166158963367e-04),
+    (2, 60.0, -3.797278135347e-04, 1.122388847937e-04),
+    (3, 30.0, -2.873455284339e-04, 1.736840101475e-05),
+    (4, 60.0, -2.523875356905e-04, -2.239042531887e-05),
+]
+
+
+@pytest.mark.parametrize(("n", "rate", "radial", "tangential"), STEADY)
+def test_pressure_waves_fixed_in_space(n, rate, radial, tangential, wheels):
+    mesh, u = under_rim_load(wheels, "20N", 4, 32, lambda a: 1e5 * np.cos(n * a), rate)
+    u_r, u_phi = amplitudes(wheels, mesh, u, n)
+    assert abs(u_r - radial) < 1.3e-3 * abs(radial)
+    assert abs(u_phi - tangential / 1j) < 1.3e-3 * abs(radial)
+
+
+@pytest.mark.parametrize(("n", "critical"), [(3, 145.8091), (4, 130.5131)])
+def test_the_answer_changes_sign_at_the_critical_rate(n, critical, wheels):
+    found = []
+    for share in (0.995, 1.005):
+        mesh, u = under_rim_load(wheels, "20N", 4, 32, lambda a: 1e5 * np.cos(n * a), share * critical)
+        found.append(amplitudes(wheels, mesh, u, n)[0].real)
+    assert found[0] < -4e-3
+    assert found[1] > 4e-3
+
+
+DAMPED = [
+    (2, -3.649311170858e-04 - 2.265227170042e-06j, 5.883914346038e-07 - 1.166125063553e-04j),
+    (3, -2.873246732120e-04 - 2.243668094960e-06j, -2.093659449530e-07 - 1.737186794311e-05j),
+]
+
+
+@pytest.mark.parametrize(("n", "radial", "tangential"), DAMPED)
+def test_damping_turns_the_waves(n, radial, tangential, wheels):
+    """The imaginary parts, of another sign if G had another one, to their own digits."""
+    mesh, u = under_rim_load(wheels, "20N", 4, 32, lambda a: 1e5 * np.cos(n * a), 30.0, damping=20.0)
+    u_r, u_phi = amplitudes(wheels, mesh, u, n)
+    assert abs(u_r - radial) < 1.3e-3 * abs(radial)
+    assert abs(u_phi - tangential) < 1.3e-3 * abs(radial)
+    assert u_r.imag == pytest.approx(radial.imag, rel=1e-2)
+    assert u_phi.real == pytest.approx(tangential.real, rel=1e-2)
+
+
+def contact(angle):
+    """A localised pressure at the lowest point."""
+    return 1e5 * np.exp(-((angle + np.pi / 2) ** 2) / (2 * 0.15**2))
+
+
+def at_angles(wheels, mesh, u, *angles):
+    _, phi, radial, tangential = wheels.polar(mesh, u)
+    found = []
+    for wanted in angles:
+        rim = mesh.nodes("outer")
+        node = rim[np.argmin(np.abs(phi[rim] - wanted))]
+        assert abs(phi[node] - wanted) < 1e-9
+        found.append((radial[node], tangential[node]))
+    return np.array(found)
+
+
+def test_contact_fixed_in_space(wheels):
+    places = -np.pi / 2, -np.pi / 4, -3 * np.pi / 4
+    mesh, u = under_rim_load(wheels, "20N", 6, 48, contact, 30.0)
+    below, right, left = at_angles(wheels, mesh, u, *places)
+    assert below[0] == pytest.approx(-2.120223003867e-04, rel=3e-3)
+    assert right[0] == pytest.approx(-1.651899357728e-06, rel=2e-2)
+    assert left[0] == pytest.approx(right[0], rel=1e-8)
+    assert abs(right[1]) == pytest.approx(4.974812019475e-05, rel=3e-3)
+    assert left[1] == pytest.approx(-right[1], rel=1e-8)
+    mesh, u = under_rim_load(wheels, "20N", 6, 48, contact, 30.0, damping=20.0)
+    _, right, left = at_angles(wheels, mesh, u, *places)
+    assert right[0] - left[0] == pytest.approx(-1.354089404349e-06 + 1.952175037520e-06, rel=1e-2)
+    assert right[0] == pytest.approx(-1.354089404349e-06, rel=3e-2)
+
+
+def test_the_report_names_the_way_of_solving(wheels):
+    model = wheels.disk("8N", 2, 16)
+    model.add(Rotation("z", rate=30.0, damping=20.0))
+    assert model.solve().report.reason == "the matrix of a motion with damping is not symmetric"
+    still = wheels.disk("8N", 2, 16)
+    still.add(kl.Gravity((0, -9.81, 0)))
+    still.add(Rotation("z"))
+    result = still.solve()
+    assert result.report.skipped == ["convective terms, as the rate is 0"]
+    plain = wheels.disk("8N", 2, 16)
+    plain.add(kl.Gravity((0, -9.81, 0)))
+    np.testing.assert_allclose(result.u, plain.solve().u, atol=1e-12 * np.abs(result.u).max())
+
+
+def test_hub_reactions(wheels):
+    """Forces of the hub balance those of the load but for what the curved motion of the mass asks for."""
+    model = wheels.disk("20N", 3, 24)
+    model.add(kl.NodalForces(rim_load(model.mesh, contact)))
+    model.add(Rotation("z", rate=30.0))
+    result = model.solve()
+    total = rim_load(model.mesh, contact).sum(axis=0)
+    np.testing.assert_allclose(result.reactions.sum(axis=0), -total, atol=1e-8 * np.abs(total).max())
