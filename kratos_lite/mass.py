@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,9 @@ from kratos_lite import fields
 from kratos_lite.assembly import Pattern
 from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.elements import KinematicLinear
 from kratos_lite.inertia import inertia_matrices
+from kratos_lite.quadrature import Rule
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.banded import add_scalar
 
@@ -31,12 +33,20 @@ class Mass:
     Attributes
     ----------
     lumped : whether the mass stands in the nodes.
+    rule_of : gives the rule of an element class; its own `mass_rule` if not given.
     pattern : the sparsity of matrices on the nodes.
     """
 
-    def __init__(self, points: Array, batches: Sequence[Batch], pattern: Pattern, lumped: bool) -> None:
+    def __init__(
+        self,
+        points: Array,
+        batches: Sequence[Batch],
+        pattern: Pattern,
+        lumped: bool,
+        rule_of: Callable[[type[KinematicLinear]], Rule] = lambda element: element.mass_rule,
+    ) -> None:
         self._points, self._batches = points, batches
-        self.lumped, self.pattern = lumped, pattern
+        self.lumped, self.pattern, self._rule_of = lumped, pattern, rule_of
 
     @cached_property
     def scalar(self) -> csr_array[Any, Any]:
@@ -45,9 +55,7 @@ class Mass:
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        made = inertia_matrices(
-            self._points, self._batches, self.pattern, "M", lambda element: element.mass_rule
-        )
+        made = inertia_matrices(self._points, self._batches, self.pattern, "M", self._rule_of)
         n = self.pattern.n_nodes
         return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
 

@@ -14,6 +14,7 @@ from kratos_lite import solvers
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.ends import dashpots
 from kratos_lite.ale.guards import warnings_of
+from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.blockmatrix import BlockMatrix
@@ -84,7 +85,11 @@ class EquationsOfMotion:
             progress=progress,
         )
         self._links = links
-        self.mass = Mass(self.system.points, self.system.batches, self.system.pattern, lumped)
+        placed = self.system.points, self.system.batches, self.system.pattern
+        if model.motion is None:
+            self.mass = Mass(*placed, lumped)
+        else:  # by the rule of G and H: then G u = M (L A X) holds for linear fields u = L X
+            self.mass = Mass(*placed, lumped, lambda element: exact_rule(element.shape))
         self.terms: MotionMatrices | None = None
         if model.motion is not None:
             self.terms = MotionMatrices(
