@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 NEAR_CRITICAL = 0.9
 """Share of the critical rate from which a warning is given."""
+UNEVEN = 1e-2
+"""Share of a harmonic of the mass about the axis that is too much."""
 LEAK = 1e-2
 """Share of the velocity that may pass through the boundary before a warning is given."""
 NOT_ROUND = 0.2
@@ -74,6 +76,29 @@ def leak(motion: Motion, model: Model) -> float:
         normal = max(normal, float(np.abs((c * n).sum(axis=-1)).max()))
         largest = max(largest, float(np.linalg.norm(c, axis=-1).max()))
     return normal / largest if largest else 0.0
+
+
+def check_density(terms: MotionMatrices) -> None:
+    """Raise ModelError if the mass of a rotating body is not spread evenly about its axis.
+
+    Its first three harmonics Σ m r² e^{i n φ} must vanish beside Σ m r².
+    """
+    motion = terms.motion
+    if not isinstance(motion, Rotation):
+        return
+    c = motion.field(terms.points)
+    first = c[int(np.argmax((c * c).sum(axis=1)))]
+    x = c @ first / np.linalg.norm(first)
+    y = c @ np.cross(motion.direction, first) / np.linalg.norm(first)
+    weights = np.abs(terms.mass.nodal) * (c * c).sum(axis=1)
+    angle = np.arctan2(y, x)
+    shares = [abs((weights * np.exp(1j * n * angle)).sum()) / weights.sum() for n in (1, 2, 3)]
+    if max(shares) > UNEVEN:
+        raise ModelError(
+            f"the mass of the body is not spread evenly about its axis (harmonic {int(np.argmax(shares)) + 1} "
+            f"is {max(shares):.1%}): a body that turns through a mesh at rest must be one of revolution in shape "
+            "and density"
+        )
 
 
 def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite import solvers
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.ends import dashpots
-from kratos_lite.ale.guards import warnings_of
+from kratos_lite.ale.guards import check_density, warnings_of
 from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
@@ -95,6 +95,7 @@ class EquationsOfMotion:
             self.terms = MotionMatrices(
                 model.motion, self.system.points, self.system.batches, self.system.pattern, self.mass
             )
+            check_density(self.terms)
             self.warnings += warnings_of(self.terms, model)
         self._kept: tuple[Any, Solve] | None = None
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None

@@ -116,3 +116,19 @@ def test_periodic_ends_need_opposite_nodes(wheels):
 def test_arguments(make, text):
     with pytest.raises(InputError, match=text):
         make()
+
+
+def test_density_must_be_axisymmetric():
+    mesh = kl.annulus(inner=0.3, outer=1.0, width=0.2, cells=(2, 12, 1), element="KinematicLinear3D8N")
+    light, heavy = (kl.Isotropic3D(E=210e6, nu=0.3, density=rho) for rho in (7000.0, 8000.0))
+    model = kl.Model(mesh, light)
+    model.fix("inner")
+    middles = np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
+    ring = np.hypot(middles[:, 0], middles[:, 1]) > 0.65
+    model.assign(heavy, np.flatnonzero(ring))
+    model.add(kl.ale.Rotation("z", rate=10.0))
+    model.solve()  # a heavy ring is one of revolution
+    model.assign(light)
+    model.assign(heavy, np.flatnonzero(middles[:, 0] > 0))
+    with pytest.raises(kl.ModelError, match="not spread evenly about its axis"):
+        model.solve()
