@@ -9,6 +9,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices
 from kratos_lite.assembly import Pattern
+from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.mass import Mass
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
@@ -59,10 +60,39 @@ def polar(mesh: kl.Mesh, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
     return r, np.arctan2(y, x), (x * u[:, 0] + y * u[:, 1]) / r, (x * u[:, 1] - y * u[:, 0]) / r
 
 
+def rim_load(mesh: kl.Mesh, pressure: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the nodal forces of a pressure(angle) on the rim that pushes inward."""
+    total = np.zeros_like(mesh.points)
+    rim = np.zeros(mesh.n_nodes, dtype=bool)
+    rim[mesh.nodes("outer")] = True
+    for block in mesh.boundary:
+        faces = block.nodes[rim[block.nodes].all(axis=1)]
+        if not len(faces):
+            continue
+        rule = face_rule(block.shape)
+        X = mesh.points[faces]
+        N = np.array([block.shape.N(xi) for xi in rule.points])
+        at = N @ X
+        area = area_vectors(block.shape, X, rule)
+        area = np.linalg.norm(area, axis=-1, keepdims=True)
+        inward = -at * (1.0, 1.0, 0.0) / np.hypot(at[..., 0], at[..., 1])[..., None]
+        p = pressure(np.arctan2(at[..., 1], at[..., 0]))[..., None]
+        np.add.at(
+            total, faces, np.swapaxes(np.broadcast_to(N, (len(faces), *N.shape)), 1, 2) @ (p * inward * area)
+        )
+    return total
+
+
 @pytest.fixture(scope="session")
 def wheels() -> SimpleNamespace:
     """Steel, its wave speeds, and the functions of this module."""
     C, rho = STEEL.C, STEEL.density
     speeds = {"c_p": np.sqrt(C[0, 0] / rho), "c_s": np.sqrt(C[3, 3] / rho)}
-    tools: dict[str, Callable] = {"disk": disk, "bar": bar, "matrices": matrices, "polar": polar}
-    return SimpleNamespace(steel=STEEL, **speeds, **tools)
+    tools: dict[str, Callable] = {
+        "disk": disk,
+        "bar": bar,
+        "matrices": matrices,
+        "polar": polar,
+        "rim_load": rim_load,
+    }
+    return SimpleNamespace(steel=STEEL, rim_load=rim_load, **speeds, **tools)

@@ -1,0 +1,268 @@
+"""Moving bodies in time: another frame of reference, energy, travelling waves."""
+
+import numpy as np
+import pytest
+from scipy.sparse import eye_array, kron
+from scipy.sparse.linalg import splu, spsolve
+
+import kratos_lite as kl
+from kratos_lite.ale import Rotation, Translation
+from kratos_lite.dynamics import EquationsOfMotion
+from kratos_lite.loads import Varying
+from kratos_lite.rotations import exp
+
+A = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+# ---- frame invariance --------------------------------------------------------------------------------
+
+
+def contact(wheels, mesh, turned=0.0):
+    """Return a pressure on the rim about the angle -pi/2 in space, on material that has turned clockwise."""
+
+    def pressure(angle):
+        away = (angle - turned + np.pi / 2 + np.pi) % (2 * np.pi) - np.pi
+        return 1e5 * np.exp(-(away**2) / (2 * 0.15**2))
+
+    return wheels.rim_load(mesh, pressure)
+
+
+def lagrangian(model, angle, rate, acceleration, load, h, steps):
+    """March the same body in axes that turn with it, M w'' + 2 rate M A w' + … by the trapezoidal rule.
+
+    Returns w (n, 3): the displacement in those axes of the material that starts at each node.
+    """
+    e = EquationsOfMotion(model)
+    free, K = e.system.reduced.free, e.K.scipy().tocsr()
+    M, scalar = kron(e.mass.scalar, eye_array(3)).tocsr(), e.mass.scalar
+    MA, MAA = kron(scalar, A).tocsr(), kron(scalar, A @ A).tocsr()
+    X = model.mesh.points
+    take = lambda matrix: matrix[free][:, free]  # noqa: E731
+
+    def terms(t):
+        C = 2 * rate(t) * MA
+        return take(C), take(K + acceleration(t) * MA + rate(t) ** 2 * MAA)
+
+    def force(t):
+        own = -(scalar @ (X @ (rate(t) ** 2 * A @ A + acceleration(t) * A).T))
+        return (load(angle(t), t) + own).ravel()[free]
+
+    Mf = take(M)
+    u = v = np.zeros(len(free))
+    a = spsolve(Mf.tocsc(), force(0.0))
+    kept = None
+    for k in range(1, steps + 1):
+        t = k * h
+        C, S = terms(t)
+        if kept is None or acceleration(t) or kept[0] != rate(t):
+            kept = rate(t), splu((Mf + h / 2 * C + h * h / 4 * S).tocsc())
+        guess_v, guess_u = v + h / 2 * a, u + h * v + h * h / 4 * a
+        a = kept[1].solve(force(t) - C @ guess_v - S @ guess_u)
+        u, v = guess_u + h * h / 4 * a, guess_v + h / 2 * a
+    out = np.zeros(e.size)
+    out[free] = u
+    return e.system.whole(out)
+
+
+CASES = {
+    "constant": (30.0, 0.0, np.pi / 60, {"8N": 1.7e-3, "20N": 6.6e-4}),
+    "spin-up": (0.0, 872.664626, 0.06, {"8N": 6e-4, "20N": 3.7e-6}),
+}
+
+
+@pytest.mark.parametrize("element", ["8N", "20N"])
+@pytest.mark.parametrize("case", CASES)
+def test_the_same_in_axes_that_turn_with_the_material(case, element, wheels):
+    """u(T, X) in space is R w(T, R^T X) of the material: M, G, H, acceleration and loads with all signs."""
+    start, spin, T, tolerance = CASES[case]
+    steps, cells = 200, {"8N": (4, 32), "20N": (4, 32)}[element]
+
+    def rate(t):
+        return start + spin * t
+
+    def ramp(t):
+        return np.sin(np.pi * min(t, 0.02) / 0.04) ** 2
+
+    model = wheels.disk(element, *cells)
+    plain = wheels.disk(element, *cells)
+    w = lagrangian(
+        plain,
+        lambda t: start * t + spin * t * t / 2,
+        rate,
+        lambda t: spin,
+        lambda turned, t: ramp(t) * contact(wheels, plain.mesh, turned),
+        T / steps,
+        steps,
+    )
+    model.add(Varying(kl.NodalForces(contact(wheels, model.mesh)), ramp))
+    model.add(Rotation("z", rate=rate, acceleration=spin))
+    *_, moment = model.transient().march(T / steps, steps, every=steps)
+    turn = start * T + spin * T * T / 2
+    R = exp(np.array([0.0, 0.0, -turn]))
+    X = model.mesh.points
+    distance = np.abs((X @ R)[:, None] - X[None]).max(axis=2)
+    assert distance.min(axis=1).max() < 1e-6  # a whole number of cells, so that nodes come to nodes
+    seen = w[distance.argmin(axis=1)] @ R.T
+    assert np.abs(moment.u - seen).max() < tolerance[element] * np.abs(seen).max()
+    if (case, element) == ("spin-up", "20N"):
+        lowest = moment.u[np.argmin(X[:, 1])]
+        np.testing.assert_allclose(lowest[:2], (5.606998e-02, -1.164555e-02), rtol=2e-6)
+
+
+def test_a_further_rigid_turn(wheels):
+    """u = (R(a) - 1) X is linear, so M u'' + 2 rate G u' + (-rate² H + …) u + loads is M R(angle + a)'' X."""
+    model = wheels.disk("8N", 2, 16, hub="free")
+    rate, spin, a, da, dda = 3.0, 7.0, 0.4, -2.0, 5.0
+    X, M = model.mesh.points, wheels.matrices(Rotation("z"), model)
+    m, S = M.M, M.G
+
+    def turn(angle):
+        return exp(np.array([0.0, 0.0, -angle]))
+
+    R, first, second = turn(a), A @ turn(a), A @ A @ turn(a)
+    u, v, acc = X @ (R - np.eye(3)).T, da * X @ first.T, X @ (dda * first + da * da * second).T
+    left = m @ acc + 2 * rate * S @ v + (spin * S - rate**2 * M.H) @ u
+    left -= rate**2 * M.terms.centrifugal + spin * M.terms.euler
+    expected = m @ (X @ ((spin + dda) * first + (rate + da) ** 2 * second).T)
+    r = np.hypot(X[:, 0], X[:, 1])
+    inner = (r > 0.3 + 1e-9) & (r < 1.0 - 1e-9)  # H is by parts, with a flux through a polygonal rim
+    assert inner.any()
+    assert np.abs((left - expected)[inner]).max() < 1e-12 * np.abs(expected).max()
+
+
+# ---- energy --------------------------------------------------------------------------------------------
+
+
+def graded(wheels, **options):
+    """Return a turning wheel whose mesh is no mirror image of itself, and velocities of all waves."""
+    model = wheels.disk("8N", 2, 32)
+    points = model.mesh.points
+    r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    angle = angle + 0.4 * np.sin(angle) + 0.25 * np.sin(2 * angle + 0.7)
+    points[:, :2] = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
+    model.add(Rotation("z", rate=80.0, **options))
+    e = EquationsOfMotion(model)
+    model.add(kl.NodalForces(-e.system.whole(e.inertia_load(0.0))))
+    v = np.random.default_rng(1).standard_normal(points.shape)
+    return model, v
+
+
+def test_energy_is_constant_on_a_graded_mesh(wheels):
+    model, v = graded(wheels)
+    march = model.transient(velocity=v)
+    start = march.energy()
+    energies = [march.energy() for _ in march.march(2e-4, 20_000, every=1000)]
+    assert np.abs(np.array(energies) / start - 1).max() < 1e-12
+
+
+def test_energy_grows_without_the_skew_form(wheels):
+    model, v = graded(wheels, skew=False)
+    march = model.transient(velocity=v)
+    start = march.energy()
+    for _ in march.march(2e-4, 5000, every=5000):
+        assert march.energy() > 1.2 * start
+
+
+def test_free_rotor_grows_unless_stiffened(wheels):
+    """At 30 rad/s a small turn grows by e^{29.5 t}; the centrifugal stress bounds it."""
+    ends = {}
+    for stiffening in (False, True):
+        model = wheels.disk("8N", 2, 16, hub="free")
+        model.add(Rotation("z", rate=30.0, stiffening=stiffening))
+        e = EquationsOfMotion(model)
+        model.add(kl.NodalForces(-e.system.whole(e.inertia_load(0.0))))
+        start = 1e-6 * model.mesh.points @ A.T
+        march = model.transient(displacement=start)
+        ends[stiffening] = [np.abs(m.u).max() for m in march.march(1e-3, 600, every=100)]
+    growth = np.log(ends[False][-1] / ends[False][-2]) / 0.1
+    assert growth == pytest.approx(29.5, rel=0.03)
+    assert max(ends[True]) < 5e-6
+
+
+# ---- bars ------------------------------------------------------------------------------------------------
+
+BAR = [
+    (0.0, 1.962120581421e-03),
+    (0.3, 2.078308400527e-03),
+    (0.6, 2.551003671427e-03),
+    (0.9, 4.818012528552e-03),
+    (0.99, 1.485145714961e-02),
+]
+
+
+@pytest.mark.parametrize(("share", "figure"), BAR)
+def test_moving_load_on_a_founded_bar(share, figure, wheels):
+    """The discrete closed form of 80 hex8 to 1e-11, for a stiffness kv / ρ · M of the foundation."""
+    L, n, kv = 20.0, 40, 2e6
+    v, c = share * wheels.c_p, wheels.c_p
+    model = wheels.bar("8N", 2 * n, L)
+    model.add(Translation("x", rate=v, ends="fixed"))
+    load = 1e5 / 4 * (np.abs(model.mesh.points[:, :1]) < 1e-9) * (1.0, 0, 0)
+    e = EquationsOfMotion(model)
+    free = e.system.reduced.free
+    K = (e.matrix(0.0, kv / wheels.steel.density, 0.0, 1.0)).scipy().tocsr()[free][:, free]
+    u = spsolve(K.tocsc(), load.ravel()[free])
+    D, h = wheels.steel.C[0, 0] * (1 - v * v / c / c), L / n
+    alpha, beta = D / h - kv * h / 6, D / h + kv * h / 3
+    q = np.arccosh(beta / alpha)
+    exact = 1e5 / (2 * (beta - alpha * np.cosh(q)) + 2 * alpha * np.sinh(q) / np.tanh(q * n))
+    assert u.max() == pytest.approx(exact, rel=2e-11)
+    assert u.max() == pytest.approx(figure, rel=1e-11)
+
+
+def pulse(x):
+    return 1e-3 * np.exp(-(x**2) / (2 * 0.8**2))
+
+
+WAVES = [
+    ("8N", 100, 400, 0.0, (1.5e-2, 2.9e-2, 8.5e-4)),
+    ("27N", 100, 800, 0.0, (3.3e-3, 4.6e-4, 1.0e-5)),
+    ("27N", 100, 800, 400.0, (2.5e-3, 4.9e-4, 7.0e-6)),
+]
+
+
+@pytest.mark.parametrize(("element", "n", "steps", "spin", "tolerances"), WAVES)
+def test_pulse_through_absorbing_ends(element, n, steps, spin, tolerances, wheels):
+    """D'Alembert's two pulses in a window of constant or growing speed; then nothing stays."""
+    c, start = wheels.c_p, (0.2 if spin else 0.4) * wheels.c_p
+    model = wheels.bar(element, n)
+    x = model.mesh.points[:, 0]
+    rate = (lambda t: start + spin * t) if spin else start
+    model.add(Translation("x", rate=rate, acceleration=spin, ends="absorbing"))
+    u, v = np.zeros_like(model.mesh.points), np.zeros_like(model.mesh.points)
+    u[:, 0], v[:, 0] = pulse(x), -start * x / 0.64 * pulse(x)
+    march = model.transient(displacement=u, velocity=v)
+    wanted = iter(tolerances)
+    for moment in march.march(0.16 / steps, steps, every=steps // 4):
+        z = start * moment.time + spin * moment.time**2 / 2
+        exact = (pulse(x + z - c * moment.time) + pulse(x + z + c * moment.time)) / 2
+        if round(moment.time, 6) != 0.12:
+            assert np.abs(moment.u[:, 0] - exact).max() < next(wanted) * 1e-3
+
+
+def test_pulse_in_a_natural_window_comes_back(wheels):
+    model = wheels.bar("8N", 60)
+    x = model.mesh.points[:, 0]
+    model.add(Translation("x", rate=0.4 * wheels.c_p, ends="natural"))
+    u, v = np.zeros_like(model.mesh.points), np.zeros_like(model.mesh.points)
+    u[:, 0], v[:, 0] = pulse(x), -0.4 * wheels.c_p * x / 0.64 * pulse(x)
+    *_, last = model.transient(displacement=u, velocity=v).march(0.16 / 240, 240, every=240)
+    assert np.abs(last.u[:, 0]).max() > 2e-4
+
+
+def test_nothing_is_made_again_when_the_rate_changes(wheels, monkeypatch):
+    """Another rate at each step: matrices G and H are assembled once."""
+    from kratos_lite.ale import matrices
+
+    made = []
+    assemble = matrices.assemble_scalar
+    monkeypatch.setattr(matrices, "assemble_scalar", lambda *a: made.append(1) or assemble(*a))
+    model = wheels.disk("8N", 2, 12)
+    model.add(Rotation("z", rate=lambda t: 10 + 5 * t, acceleration=5.0))
+    list(model.transient().march(1e-3, 10))
+    assert len(made) == 2
+    made.clear()
+    still = wheels.disk("8N", 2, 12)
+    still.add(Rotation("z"))
+    list(still.transient().march(1e-3, 10))
+    assert not made
