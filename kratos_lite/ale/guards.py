@@ -95,9 +95,9 @@ def check_density(terms: MotionMatrices) -> None:
     shares = [abs((weights * np.exp(1j * n * angle)).sum()) / weights.sum() for n in (1, 2, 3)]
     if max(shares) > UNEVEN:
         raise ModelError(
-            f"the mass of the body is not spread evenly about its axis (harmonic {int(np.argmax(shares)) + 1} "
-            f"is {max(shares):.1%}): a body that turns through a mesh at rest must be one of revolution in shape "
-            "and density"
+            "the mass of the body is not spread evenly about its axis (harmonic "
+            f"{int(np.argmax(shares)) + 1} is {max(shares):.1%}): a body that turns through a mesh at rest "
+            "must be one of revolution in shape and density"
         )
 
 

@@ -95,4 +95,4 @@ def wheels() -> SimpleNamespace:
         "polar": polar,
         "rim_load": rim_load,
     }
-    return SimpleNamespace(steel=STEEL, rim_load=rim_load, **speeds, **tools)
+    return SimpleNamespace(steel=STEEL, **speeds, **tools)

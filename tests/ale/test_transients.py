@@ -160,7 +160,7 @@ def test_energy_grows_without_the_skew_form(wheels):
     march = model.transient(velocity=v)
     start = march.energy()
     for _ in march.march(2e-4, 5000, every=5000):
-        assert march.energy() > 1.2 * start
+        assert march.energy() > 1.01 * start
 
 
 def test_free_rotor_grows_unless_stiffened(wheels):
@@ -255,12 +255,12 @@ def test_nothing_is_made_again_when_the_rate_changes(wheels, monkeypatch):
     from kratos_lite.ale import matrices
 
     made = []
-    assemble = matrices.assemble_scalar
-    monkeypatch.setattr(matrices, "assemble_scalar", lambda *a: made.append(1) or assemble(*a))
+    assemble = matrices.inertia_matrices
+    monkeypatch.setattr(matrices, "inertia_matrices", lambda *a: made.append(a[3]) or assemble(*a))
     model = wheels.disk("8N", 2, 12)
     model.add(Rotation("z", rate=lambda t: 10 + 5 * t, acceleration=5.0))
     list(model.transient().march(1e-3, 10))
-    assert len(made) == 2
+    assert sorted("".join(made)) == ["G", "H"]
     made.clear()
     still = wheels.disk("8N", 2, 12)
     still.add(Rotation("z"))
