@@ -88,11 +88,5 @@ def wheels() -> SimpleNamespace:
     """Steel, its wave speeds, and the functions of this module."""
     C, rho = STEEL.C, STEEL.density
     speeds = {"c_p": np.sqrt(C[0, 0] / rho), "c_s": np.sqrt(C[3, 3] / rho)}
-    tools: dict[str, Callable] = {
-        "disk": disk,
-        "bar": bar,
-        "matrices": matrices,
-        "polar": polar,
-        "rim_load": rim_load,
-    }
-    return SimpleNamespace(steel=STEEL, **speeds, **tools)
+    tools: dict[str, Callable] = {"disk": disk, "bar": bar, "matrices": matrices, "polar": polar}
+    return SimpleNamespace(steel=STEEL, rim_load=rim_load, **speeds, **tools)
