@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.movement import at, at_start, beyond_newmark
 from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
 from kratos_lite.errors import InputError, ModelError, SolveError
@@ -118,8 +119,8 @@ class Transient:
             raise ModelError("central differences do not take constraints; use newmark()")
         self.time, self.step = 0.0, 0
         self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
-        self.u = self._allowed(self.u, self.equations.prescribed(0.0))
-        self.v = self._allowed(self.v, self._speed(0.0))
+        start, speed, _ = at_start(self.equations)
+        self.u, self.v = self._allowed(self.u, start), self._allowed(self.v, speed)
         self.a = self._initial_acceleration()
 
     @property
@@ -144,17 +145,11 @@ class Transient:
             raise InputError(f"the initial {what} needs shape ({n}, 3); got {given.shape}")
         return self.equations.system.local(given).copy()
 
-    def _speed(self, time: float, h: float = 1e-6) -> Array:
-        """Return the velocity of what is prescribed, by differences where it changes."""
-        if not self.equations.model.movements:
-            return np.zeros(self.equations.size)
-        return (self.equations.prescribed(time + h) - self.equations.prescribed(time)) / h
-
     def _initial_acceleration(self) -> Array:
-        """Return M^-1 (f - C v - K u) where nothing is prescribed."""
+        """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
         e = self.equations
         force = e.load(0.0) - e.times_damping(self.v, 0.0) - e.times_stiffness(self.u, 0.0)
-        return e.solver(0.0, 1.0, 0.0, 0.0)(force, np.zeros(e.size))
+        return e.solver(0.0, 1.0, 0.0, 0.0)(force, at_start(e)[2])
 
     # ---- marching --------------------------------------------------------------------------------
 
@@ -224,6 +219,10 @@ class Transient:
         end, f = self.time + h, 1 - s.alpha_f
         a_old = self.v / (s.beta * h) + (1 / (2 * s.beta) - 1) * self.a  # minus a⁺ for Δu = 0
         v_new = (1 - s.gamma / s.beta) * self.v + h * (1 - s.gamma / (2 * s.beta)) * self.a
+        start, more_a = self.time, np.zeros_like(self.a)
+        if e.model.movements:
+            more_v, more_a = beyond_newmark(e, s, start, h)
+            v_new, a_old = v_new + more_v, a_old - more_a
         middle = self.time + f * h
         force = e.load(middle)
         force = force - e.times_stiffness(self.u, end)
@@ -231,8 +230,7 @@ class Transient:
         if s.alpha_m or s.alpha_f or (s.beta, s.gamma) != (0.25, 0.5):
             force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * self.a)
         else:  # M a is known from the balance at the start; so no rounding is handed on from step to step
-            start = self.time
-            force += e.times_mass(self.v) * (4 / h) + e.load(start)
+            force += e.times_mass(4 / h * self.v - more_a) + e.load(start)
             force -= e.times_stiffness(self.u, start) + e.times_damping(self.v, start)
         solve = e.solver(end, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
         change = np.where(self._held, e.prescribed(end) - self.u, 0.0)
@@ -254,13 +252,13 @@ class Transient:
         e, held = self.equations, self._held
         half = self.v + h / 2 * self.a
         u = self.u + h * half
-        start = self.u
-        u[held] = e.prescribed(self.time + h)[held]
+        given = at(e, self.time + h, h)
+        u[held] = given[0][held]
         force = e.load(self.time + h) - e.times_damping(half, self.time) - e.times_stiffness(u, self.time)
         a = e.mass.solve(force)
-        a[held] = 0.0
+        a[held] = given[2][held]
         self.v = half + h / 2 * a
-        self.v[held] = (u[held] - start[held]) / h
+        self.v[held] = given[1][held]
         self.u, self.a = u, a
 
     def _check_stable(self, h: float) -> None:

@@ -1,0 +1,47 @@
+"""Movement: displacement, velocity and acceleration of what is prescribed, over the steps of a march.
+
+Newmark's formulas would take velocity and acceleration of a support from its displacements and ring for ever
+with what they get wrong in one step.  Differences over steps do not, have order 2, and keep the whole impulse
+of a table's kinks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.schemes import Implicit
+
+Array = NDArray[np.float64]
+Course = tuple[Array, Array, Array]
+"""Displacement, velocity and acceleration (3a,)."""
+
+
+def at_start(e: EquationsOfMotion) -> Course:
+    """Return the course at the time 0, by one-sided differences of order 2."""
+    g, zero = e.prescribed(0.0), np.zeros(e.size)
+    if not e.model.movements:
+        return g, zero, zero
+    h, k = 1e-6, 1e-5
+    velocity = (-3 * g + 4 * e.prescribed(h) - e.prescribed(2 * h)) / (2 * h)
+    later = [e.prescribed(i * k) for i in (1, 2, 3)]
+    return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / k**2
+
+
+def at(e: EquationsOfMotion, time: float, h: float) -> Course:
+    """Return the course at a time, by central differences over steps h."""
+    if time < h / 2:
+        return at_start(e)
+    before, now, after = (e.prescribed(time + k * h) for k in (-1, 0, 1))
+    return now, (after - before) / (2 * h), (after - 2 * now + before) / h**2
+
+
+def beyond_newmark(e: EquationsOfMotion, s: Implicit, time: float, h: float) -> tuple[Array, Array]:
+    """Return what velocity and acceleration at the end of a step have beyond Newmark's formulas, (3a,)."""
+    (g, v, a), (g_end, v_end, a_end) = at(e, time, h), at(e, time + h, h)
+    change = g_end - g
+    v_newmark = s.gamma / (s.beta * h) * change + (1 - s.gamma / s.beta) * v
+    v_newmark += h * (1 - s.gamma / (2 * s.beta)) * a
+    a_newmark = change / (s.beta * h * h) - v / (s.beta * h) - (1 / (2 * s.beta) - 1) * a
+    return v_end - v_newmark, a_end - a_newmark

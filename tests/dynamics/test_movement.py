@@ -1,0 +1,66 @@
+"""Supports that move: their reactions, kinks of their tables, and what is tied to them."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.dynamics import CentralDifference, generalised_alpha, hht, newmark
+from kratos_lite.series import TimeSeries
+
+E, RHO = 1e6, 1000.0
+SCHEMES = [newmark(), hht(-0.1), generalised_alpha(0.8), CentralDifference()]
+
+
+def everywhere(X: np.ndarray) -> np.ndarray:
+    return np.ones(len(X), dtype=bool)
+
+
+def carried(s) -> kl.Model:
+    """Return a cube whose nodes all move along z by s(t)."""
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    model.fix(everywhere, "xy")
+    model.fix(everywhere, "z", s)
+    return model
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: s.name)
+def test_reactions_are_those_of_the_acceleration(scheme):
+    """m s'' from the first step to the last: nothing rings, nothing grows."""
+    steady = carried(lambda t: 0.5 * 9.81 * t * t)
+    for moment in steady.transient(scheme=scheme).march(1e-3, 50):
+        assert moment.reactions[:, 2].sum() == pytest.approx(9.81 * RHO, rel=1e-5)
+        assert moment.v[:, 2] == pytest.approx(9.81 * moment.time)
+    swinging = carried(lambda t: 1e-2 * np.sin(30 * t))
+    for moment in swinging.transient(scheme=scheme).march(1e-3, 400):
+        exact = -9.0 * RHO * np.sin(30 * moment.time)
+        assert moment.reactions[:, 2].sum() == pytest.approx(exact, abs=1e-4 * 9.0 * RHO)
+
+
+def test_a_kink_gives_its_whole_impulse():
+    """A base that starts with V at T: u = V τ - 1.5 V / ω sin ωτ of one cell of consistent mass."""
+    T, V = 0.05, 0.1
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    model.fix(everywhere, "xy")
+    model.fix("z-", "z", TimeSeries([0.0, T, 10.0], [0.0, 0.0, V * (10.0 - T)]))
+    omega, errors = np.sqrt(3 * E / RHO), []
+    for h in (1e-3, 5e-4):
+        steps = round(0.3 / h)
+        *_, end = model.transient().march(h, steps, every=steps)
+        exact = V * 0.25 - 1.5 * V / omega * np.sin(omega * 0.25)
+        errors.append(np.abs(end.u[model.mesh.nodes("z+"), 2] - exact).max())
+    assert errors[1] < 1e-4 * V
+    assert errors[0] / errors[1] > 3
+
+
+def test_what_is_tied_to_a_support_moves_with_it():
+    """A top tied to its moving base is the same body carried as a whole."""
+    model = kl.Model(kl.box((1, 1, 1), (1, 1, 2)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    model.fix(everywhere, "xy")
+    model.fix("z-", "z", lambda t: 1e-2 * np.sin(30 * t))
+    base = int(model.mesh.nodes("z-")[0])
+    for node in np.flatnonzero(model.mesh.points[:, 2] > 0).tolist():
+        model.link((node, "z"), {(base, "z"): 1.0})
+    for moment in model.transient().march(1e-3, 200):
+        np.testing.assert_allclose(moment.u[:, 2], 1e-2 * np.sin(30 * moment.time), atol=1e-13)
+        np.testing.assert_allclose(moment.v[:, 2], 0.3 * np.cos(30 * moment.time), atol=1e-4)
+        np.testing.assert_allclose(moment.a[:, 2], -9.0 * np.sin(30 * moment.time), atol=2e-3)
