@@ -53,8 +53,18 @@ Factor: TypeAlias = "float | TimeSeries | Callable[[float], float]"
 
 def function_of(value: Factor, what: str) -> Callable[[float], float]:
     """Return a number, time series or function as a function of the time."""
-    if callable(value):
+    if isinstance(value, TimeSeries):
         return value
+    if callable(value):
+        given = value
+
+        def checked(time: float) -> float:
+            number = finite(given(time), f"{what} at t = {time:g} s")
+            if number.ndim:
+                raise InputError(f"{what} at t = {time:g} s must be one number; got shape {number.shape}")
+            return float(number)
+
+        return checked
     number = finite(value, what)
     if number.ndim:
         raise InputError(f"{what} must be a number, a TimeSeries or a function of the time; got {value!r}")

@@ -142,7 +142,7 @@ class StaticSystem:
 
     def _follow(self) -> None:
         """Take over what has changed in the model."""
-        if not _same(self._state, self.model.state()):
+        if not same_state(self._state, self.model.state()):
             self._prepare()
         elif not np.array_equal(self._values, self.model.supports.values):
             held = self._held
@@ -330,7 +330,7 @@ def _any_axis(mask: Mask) -> Mask:
     return mask[:, 0] | mask[:, 1] | mask[:, 2]
 
 
-def _same(state: list[Any], other: list[Any]) -> bool:
+def same_state(state: list[Any], other: list[Any]) -> bool:
     """Return whether two states of a model are equal."""
     return len(state) == len(other) and all(
         np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b

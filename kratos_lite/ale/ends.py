@@ -45,7 +45,14 @@ def dashpots(mesh: Mesh, motion: Translation, system: System) -> BlockMatrix:
     local[system.nodes] = np.arange(len(system.nodes))
     impedance = _impedances(mesh, motion, system)
     for nodes in end_nodes(mesh, motion):
-        for block in mesh.faces(nodes):
+        faces = mesh.faces(nodes)
+        if not faces:
+            raise ModelError(
+                "an end of the window has no face across the direction "
+                f"{motion.direction.tolist()}, so nothing can absorb waves there; cut the body across it, or "
+                "take ends='natural'"
+            )
+        for block in faces:
             assert block.shape is not None
             m = surface_mass(block.shape, mesh.points[block.nodes])
             blocks = m[..., None, None] * impedance[block.ids][:, None, None]

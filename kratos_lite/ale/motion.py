@@ -142,7 +142,8 @@ def _unit(direction: ArrayLike | str) -> Array:
             raise InputError(f"an axis is 'x', 'y', 'z' or a vector; got {direction!r}")
         return np.array(AXES[direction])
     v = finite(direction, "an axis")
-    length = float(np.linalg.norm(v))
-    if v.shape != (3,) or length == 0:
+    largest = float(np.abs(v).max(initial=0.0))
+    if v.shape != (3,) or largest == 0:
         raise InputError(f"an axis needs three components, not all 0; got {direction!r}")
-    return np.asarray(v / length)
+    v = v / largest
+    return np.asarray(v / np.linalg.norm(v))

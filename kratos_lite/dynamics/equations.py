@@ -22,6 +22,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Varying
 from kratos_lite.mass import Mass
 from kratos_lite.solvers.banded import add_scalar
+from kratos_lite.statics import initial_loads
 from kratos_lite.supports import reduction, resolve
 from kratos_lite.system import System
 
@@ -107,6 +108,9 @@ class EquationsOfMotion:
         """Constant nodal forces, and those that change with their factors."""
         mesh, batches = self.model.mesh, self.model.batches()
         constant, changing = np.zeros(self.size), []
+        initial = initial_loads(self.model, batches)
+        if initial is not None:
+            constant -= self.system.local(initial)
         for load in self.model.loads:
             if isinstance(load, Varying):
                 changing.append((self.system.local(load.load.forces(mesh, batches)), load.factor))

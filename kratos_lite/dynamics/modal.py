@@ -69,7 +69,9 @@ def critical_rate(model: Model, count: int = 1) -> Array:
 
     They are those of the mesh; `critical_rate_estimate` is the limit of ever finer ones.
     """
-    e = EquationsOfMotion(model)
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+        raise InputError(f"count must be a whole number ≥ 1; got {count!r}")
+    e = EquationsOfMotion(model, free=False)
     if e.terms is None:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
     from kratos_lite.blockmatrix import BlockMatrix

@@ -73,6 +73,7 @@ def solve_steady(
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
         kernels=described(),
     )
-    result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report)
+    u0 = model.initial_displacement
+    result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result)
     return result

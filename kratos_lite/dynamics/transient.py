@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.finite_strain import highest_frequency
 from kratos_lite.io.output import write_whole
 from kratos_lite.solvers.blas import one_thread
+from kratos_lite.statics import same_state
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -64,6 +65,11 @@ class Moment:
         except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
             raise InputError(f"{path}: not a moment that Moment.save wrote ({error})") from None
         return cls(float(time), int(step), u, v, a, np.zeros_like(u))
+
+
+def model_state(model: Model) -> list[Any]:
+    """Return what must stay as it is while a transient of a model marches."""
+    return [*model.state(), tuple(map(id, model.loads)), id(model.motion), len(model.movements)]
 
 
 class Transient:
@@ -117,6 +123,7 @@ class Transient:
             raise ModelError("central differences do not take a motion of the material; use newmark()")
         if explicit and model.supports.links:
             raise ModelError("central differences do not take constraints; use newmark()")
+        self._state = model_state(model)
         self.time, self.step = 0.0, 0
         self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
         start, speed, _ = at_start(self.equations)
@@ -183,6 +190,8 @@ class Transient:
         for name, count in (("steps", steps), ("every", every)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+        if not same_state(self._state, model_state(self.equations.model)):
+            raise ModelError("the model has changed since this transient was made; make a new one and put()")
         advance = self._explicit if isinstance(self.scheme, CentralDifference) else self._implicit
         if isinstance(self.scheme, CentralDifference):
             self._check_stable(float(h))
@@ -284,8 +293,13 @@ class Transient:
     def put(self, moment: Moment) -> None:
         """Go on from a moment, such as `Moment.load` gives."""
         n = self.equations.system.n_nodes
-        if moment.u.shape != (n, 3):
-            raise InputError(f"this moment is of {len(moment.u)} nodes; the model has {n}")
+        if not isinstance(moment, Moment):
+            raise InputError(f"a Moment is needed, such as Moment.load gives; got {type(moment).__name__}")
+        for name in ("u", "v", "a"):
+            if np.shape(getattr(moment, name)) != (n, 3):
+                raise InputError(
+                    f"{name} of this moment has shape {np.shape(getattr(moment, name))}, not ({n}, 3)"
+                )
         local = self.equations.system.local
         self.u, self.v, self.a = (local(x).copy() for x in (moment.u, moment.v, moment.a))
         self.time, self.step = moment.time, moment.step
