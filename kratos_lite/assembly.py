@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 
 from kratos_lite.batches import Batch
 from kratos_lite.blockmatrix import BlockMatrix
-from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import lame_constants, tabulate
-from kratos_lite.materials import LinearMaterial
 from kratos_lite.native import kernels
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    pass
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -32,8 +30,6 @@ SCATTER_BYTES = 64_000_000
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the share that is done, 0 … 1."""
 CONSTANT_JACOBIANS = "all Jacobians but the first of elements where they are constant"
-Kernel = Callable[[KinematicLinear, LinearMaterial], Array]
-"""Gives matrices (m, k, k) of elements and their material."""
 
 
 class Pattern:
@@ -185,40 +181,6 @@ def _add_computed(
             constant |= standard and elements.constant_jacobian
         pattern.add(data, group, window, blocks)
         yield len(blocks), constant
-
-
-def assemble_scalar(points: Array, batches: Sequence[Batch], pattern: Pattern, kernel: Kernel) -> csr_array:
-    """Return the sum of element matrices with one number for each pair of nodes, (n, n).
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    batches : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the batches.
-    kernel : function of elements, X (m, k, 3), and their material that gives (m, k, k), symmetric or not.
-
-    Returns
-    -------
-    scipy.sparse.csr_array on the rows of the pattern.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box((1, 1, 1), cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
-    >>> batches = model.batches()
-    >>> pattern = Pattern(model.mesh.n_nodes, [batch.nodes for batch in batches])
-    >>> volume = assemble_scalar(model.mesh.points, batches, pattern, lambda e, material: e.scalar_mass())
-    >>> round(float(volume.sum()), 12)
-    1.0
-    """
-    from scipy.sparse import csr_array
-
-    data = np.zeros(len(pattern.indices))
-    for group, batch in enumerate(batches):
-        for chunk in batch.chunks():
-            pattern.add(data, group, chunk, kernel(batch.at(points, chunk), batch.material))
-    n = pattern.n_nodes
-    return csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
 
 
 def assemble_dense(points: Array, batches: Sequence[Batch]) -> Array:

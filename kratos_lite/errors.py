@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 MAX_PROBLEMS = 20
 """Problems shown in one message; the rest are counted."""
@@ -62,6 +63,14 @@ class Problems:
             place = [self.source] if self.source else []
             place += [str(part) for part in (line, column) if part is not None]
             self.messages.append(f"{':'.join(place)}: {message}" if place else message)
+
+    def of(self, action: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what an action returns; if it raises one of our errors, note it and return None."""
+        try:
+            return action(*arguments)
+        except KratosLiteError as error:
+            self.add(str(error))
+            return None
 
     def __bool__(self) -> bool:
         return self.count > 0

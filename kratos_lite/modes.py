@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.arguments import whole_number
 from kratos_lite.errors import InputError
 from kratos_lite.solvers import direct
 
@@ -47,7 +48,7 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
     [2.0, 3.0]
     """
     n = K.shape[0]
-    if not 1 <= count <= n:
+    if whole_number(count, "count") > n:
         raise InputError(f"this body has 1 … {n} modes; got {count}")
     if n <= DENSE_MODES or count > n // 4:
         from scipy.linalg import eigh

@@ -81,7 +81,8 @@ class Report:
             (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
             (
                 "critical rate",
-                f"of waves about {m['critical_rate_of_waves']:.4g} {unit}, margin {m['margin']:.1%}",
+                (f"{m['critical_rate']:.4g} {unit}, " if m["critical_rate"] else "")
+                + f"of waves about {m['critical_rate_of_waves']:.4g} {unit}, margin {m['margin']:.1%}",
             ),
             ("force of supports", f"{force} N"),
         ]

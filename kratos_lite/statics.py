@@ -211,7 +211,7 @@ class StaticSystem:
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
-            reactions = self._constrained(reactions)
+            reactions = model.supports.carried(reactions)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, noise * count)
@@ -261,15 +261,6 @@ class StaticSystem:
         if not moving.all():
             u[self._used & ~moving[self.part]] = 0.0
         return u
-
-    def _constrained(self, residual: Array) -> Array:
-        """Return the residual (n, 3) where supports or constraints act, and 0 elsewhere."""
-        supports = self.model.supports
-        tied = [dof for link in supports.links for dof in (link.slave, *link.masters)]
-        at = np.concatenate([np.flatnonzero(supports.fixed), np.array(tied, dtype=np.int64)])
-        reactions = np.zeros_like(residual)
-        reactions.flat[at] = residual.flat[at]
-        return reactions
 
     def _skipped(self, moving: Mask) -> list[str]:
         """Say what this solution did without."""

@@ -41,13 +41,15 @@ def axis_numbers(axes: str) -> list[int]:
 class Link:
     """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant.
 
-    Degrees of freedom count 3·node + axis.
+    Degrees of freedom count 3·node + axis.  A `mutual` one joins two that are alike, u[slave] = u[master]:
+    where supports hold the slave, the master follows.
     """
 
     slave: int
     masters: tuple[int, ...]
     weights: tuple[float, ...]
     constant: float = 0.0
+    mutual: bool = False
 
 
 Links: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
@@ -96,6 +98,12 @@ class Supports:
     def link(self, links: Iterable[Link]) -> None:
         """Add multi-point constraints."""
         self.links += links
+
+    def carried(self, residual: Array) -> Array:
+        """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""
+        acts = self.fixed.copy()
+        acts.flat[[dof for link in self.links for dof in (link.slave, *link.masters)]] = True
+        return np.where(acts, residual, 0.0)
 
     def rows_of_constraints(self) -> tuple[Ints, Ints, Array]:
         """Return all constraints but their values as sparse rows: (row, dof, weight)."""
@@ -186,7 +194,10 @@ def resolve(supports: Supports, used: NDArray[np.bool_]) -> Links:
     Raises ModelError for constraints that contradict, or that use nodes which no element uses.
     """
     by_slave: dict[int, Link] = {}
-    for link in supports.links:
+    for given in supports.links:
+        link = _mutual(given, supports) if given.mutual else given
+        if link is None:
+            continue
         if link.slave in by_slave:
             raise ModelError(f"{supports.name(link.slave)} is the slave of two constraints")
         if supports.fixed.flat[link.slave]:
@@ -199,6 +210,22 @@ def resolve(supports: Supports, used: NDArray[np.bool_]) -> Links:
     if lost:
         raise ModelError(f"a constraint uses {supports.name(lost[0])}, which belongs to no element")
     return done
+
+
+def _mutual(link: Link, supports: Supports) -> Link | None:
+    """Return u[slave] = u[master] with the one that supports hold as master; None if they hold both alike."""
+    slave, (master,) = link.slave, link.masters
+    if not supports.fixed.flat[slave]:
+        return link
+    if not supports.fixed.flat[master]:
+        return Link(master, (slave,), (1.0,))
+    one, other = supports.values.flat[slave], supports.values.flat[master]
+    if one != other:
+        raise ModelError(
+            f"{supports.name(slave)} and {supports.name(master)} are joined, but prescribed as "
+            f"{one:g} m and {other:g} m"
+        )
+    return None
 
 
 def _resolve_one(

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from kratos_lite.cli import main
+
 collect_ignore = ["interop/kratos_driver.py"]
 """Scripts that tests run in other processes."""
 
@@ -15,3 +17,34 @@ def shared() -> Path:
     if not (folder / "cases").is_dir():
         pytest.skip("the folder of real input files is not there")
     return folder
+
+
+class Outcome:
+    """Exit code, standard output and standard error of a command; its lines by their labels."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+        self.rows = {line[:22].strip(): line[22:] for line in out.splitlines()}
+
+    def refuses(self, *fragments):
+        """Show that the command ends with one error that says all fragments, and nothing else."""
+        assert (self.code, self.out) == (2, "")
+        assert self.err.startswith("error: ")
+        assert "Traceback" not in self.err
+        for fragment in fragments:
+            assert fragment in self.err
+        return True
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command in this process: ``run("solve", path, …)``."""
+
+    def call(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as end:
+            code = end.code
+        return Outcome(code, *capsys.readouterr())
+
+    return call

@@ -11,7 +11,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite import assembly
-from kratos_lite.assembly import Pattern, assemble_dense, assemble_scalar, assemble_stiffness
+from kratos_lite.assembly import Pattern, assemble_dense, assemble_stiffness
 from kratos_lite.batches import Batch
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.native import kernels
@@ -259,34 +259,3 @@ def test_a_pattern_of_another_mesh_is_refused():
     other.connectivity = [np.ascontiguousarray(batch.nodes)]
     with pytest.raises(ValueError, match="misses nodes that share an element"):
         assemble_stiffness(points, [batch], other)
-
-
-# ---- scalar matrices -------------------------------------------------------------------------
-
-
-def dense_scalar(points, batches, kernel):
-    total = np.zeros((len(points), len(points)))
-    for batch in batches:
-        for nodes, matrix in zip(batch.nodes, kernel(batch.at(points), batch.material), strict=True):
-            total[np.ix_(nodes, nodes)] += matrix
-    return total
-
-
-def transport(element, material):
-    """Return ∫ N_a dN_b/dX dV, which is not symmetric."""
-    dV, D = element._gauss
-    N = element.N(element.rule.points)
-    return np.einsum("mg,ga,mgb->mab", dV, N, D[..., 0, :])
-
-
-@pytest.mark.parametrize(
-    "kernel", [lambda e, material: e.scalar_mass(material.density), transport], ids=["mass", "transport"]
-)
-@pytest.mark.parametrize("name", ["KinematicLinear3D4N", "KinematicLinear3D8N", "KinematicLinear3D20N"])
-def test_scalar_matrices(path, name, kernel):
-    points, batches = scene(name, distortion=0.02)
-    want = dense_scalar(points, batches, kernel)
-    pattern = pattern_of(points, batches)
-    got = assemble_scalar(points, batches, pattern, kernel)
-    np.testing.assert_array_equal(got.indices, pattern.indices)
-    np.testing.assert_allclose(got.toarray(), want, rtol=0, atol=1e-14 * np.abs(want).max())

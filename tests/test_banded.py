@@ -5,9 +5,10 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite import finite_strain
-from kratos_lite.assembly import Pattern, assemble_scalar, assemble_stiffness
+from kratos_lite.assembly import Pattern, assemble_stiffness
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.errors import SolveError
+from kratos_lite.mass import Mass
 from kratos_lite.solvers import banded
 from kratos_lite.solvers.banded import Factoriser, add_scalar
 
@@ -36,7 +37,7 @@ def system(label, symmetric=True, shuffled=False):
     q, dq = 1e-3 * rng.standard_normal((2, *points.shape))
     A = finite_strain.stiffness(points, batches, pattern, q, None if symmetric else dq)
     A.data *= 1e-4
-    mass = assemble_scalar(points, batches, pattern, lambda e, m: e.scalar_mass(7800.0))
+    mass = Mass(points, batches, pattern, lumped=False).scalar
     add_scalar(A, mass.data)
     return pattern, A
 
@@ -138,7 +139,7 @@ def test_scalar_matrices_are_added_to_the_diagonals_of_blocks():
     mesh = kl.box((1.0, 2.0, 1.0), (2, 1, 1))
     batches = kl.Model(mesh, MATERIAL).batches()
     pattern = Pattern(mesh.n_nodes, [batch.nodes for batch in batches])
-    mass = assemble_scalar(mesh.points, batches, pattern, lambda e, m: e.scalar_mass(7800.0))
+    mass = Mass(mesh.points, batches, pattern, lumped=False).scalar
     A = assemble_stiffness(mesh.points, batches, pattern)
     K = A.scipy().toarray()
     add_scalar(A, mass.data)

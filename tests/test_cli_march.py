@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.cli import main
 
 SCENE = {
     "mesh": {"box": {"size": [0.4, 0.6, 1.0], "cells": [1, 2, 2]}},
@@ -22,36 +21,6 @@ SCENE = {
     "loads": [{"type": "gravity", "acceleration": [0, 0, -9.81]}],
     "time": {"step": 0.005, "steps": 20, "every": 5},
 }
-
-
-class Outcome:
-    """Exit code, standard output and standard error of a command."""
-
-    def __init__(self, code, out, err):
-        self.code, self.out, self.err = code, out, err
-        self.rows = {line[:22].strip(): line[22:] for line in out.splitlines()}
-
-    def refuses(self, *fragments):
-        assert (self.code, self.out) == (2, "")
-        assert self.err.startswith("error: ")
-        assert "Traceback" not in self.err
-        for fragment in fragments:
-            assert fragment in self.err
-        return True
-
-
-@pytest.fixture
-def run(capsys):
-    """Run a command in this process: ``run("march", path, …)``."""
-
-    def call(*words):
-        try:
-            code = main([str(word) for word in words])
-        except SystemExit as end:
-            code = end.code
-        return Outcome(code, *capsys.readouterr())
-
-    return call
 
 
 @pytest.fixture

@@ -48,9 +48,9 @@ WORDS = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--pre
 
 
 def test_a_rotation_in_words_in_a_run_file_and_in_python_are_the_same(folder):
-    motion = {"rate": 8.0, "acceleration": 3.0, "centre": [0, 0, 0.5], "stiffening": True}
+    motion = {"rate": 6.0, "acceleration": 3.0, "centre": [0, 0, 0.5], "stiffening": True}
     expected = wheel(axis="z", **motion).solve().u
-    turned = ("--rotation", "z:8:3", "--centre", "0,0,0.5", "--stiffening")
+    turned = ("--rotation", "z:6:3", "--centre", "0,0,0.5", "--stiffening")
     assert run("wheel.mdpa", *WORDS, *turned, "--json", "words.json") == 0
     path = write(
         folder,
@@ -65,7 +65,7 @@ def test_a_rotation_in_words_in_a_run_file_and_in_python_are_the_same(folder):
         result = json.loads((folder / name).read_text())
         found = np.array(list(result["displacement"].values()))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-        assert result["motion"]["rate"] == 8.0
+        assert result["motion"]["rate"] == 6.0
         assert result["motion"]["acceleration"] == 3.0
         assert 0 < result["motion"]["margin"] < 1
 
@@ -75,7 +75,8 @@ def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, c
     assert run("wheel.mdpa", *words, "--rotation", "0,0,-1:-8") == 0
     out = capsys.readouterr().out
     assert re.search(r"^rotation +-8 rad/s \(0, 0, -1\)$", out, re.M)
-    assert re.search(r"^critical rate +of waves about 18\.\d+ rad/s, margin 5\d\.\d%$", out, re.M)
+    critical = r"^critical rate +6\.\d+ rad/s, of waves about 18\.\d+ rad/s, margin -2\d\.\d%$"
+    assert re.search(critical, out, re.M)
     assert re.search(r"^force of supports +\(.*\) N$", out, re.M)
     assert re.search(r"^moment of supports +\(.*\) N m$", out, re.M)
 

@@ -43,10 +43,9 @@ def attach(motion: Motion, model: Model) -> None:
             slaves, masters = periodic_pairs(model.mesh, motion)
             model.supports.link(
                 [
-                    Link(3 * int(a) + axis, (3 * int(b) + axis,), (1.0,), 0.0)
+                    Link(3 * int(a) + axis, (3 * int(b) + axis,), (1.0,), mutual=True)
                     for a, b in zip(slaves, masters, strict=True)
                     for axis in range(3)
-                    if not model.supports.fixed[a, axis]
                 ]
             )
         elif motion.ends == "fixed":
@@ -135,19 +134,36 @@ def critical_rate_estimate(terms: MotionMatrices) -> float:
     return wave_speeds(terms)[2] / fastest
 
 
+def near_waves(terms: MotionMatrices, time: float) -> list[str]:
+    """Return a warning if the material is nearly as fast as its slowest waves at a time."""
+    limit, rate = critical_rate_estimate(terms), abs(terms.motion.rate(time))
+    unit = unit_of(terms.motion)
+    return _near(rate, limit, unit, f"about {limit:.4g} {unit} (material as fast as its slowest waves)")
+
+
+def near_critical(motion: Motion, below: float, above: float) -> list[str]:
+    """Return a warning if the rate at the time 0 lies above a critical one of the mesh, or near the next."""
+    limit, unit = below or above, unit_of(motion)
+    return _near(abs(motion.rate(0.0)), limit, unit, f"{limit:.4g} {unit} on this mesh")
+
+
+def _near(rate: float, limit: float, unit: str, what: str) -> list[str]:
+    if rate < NEAR_CRITICAL * limit:
+        return []
+    where = "above" if rate >= limit else "near"
+    return [f"the rate {rate:g} {unit} is {where} the critical one, {what}: solutions are not stable there"]
+
+
+def unit_of(motion: Motion) -> str:
+    """Return the unit of the rate of a motion."""
+    return "m/s" if isinstance(motion, Translation) else "rad/s"
+
+
 def warnings_of(terms: MotionMatrices | None, model: Model) -> list[str]:
     """Return what is doubtful about a motion, with figures."""
     if terms is None:
         return []
-    motion, said = terms.motion, []
-    rate, limit = abs(motion.rate(0.0)), critical_rate_estimate(terms)
-    unit = "m/s" if isinstance(motion, Translation) else "rad/s"
-    if rate >= NEAR_CRITICAL * limit:
-        where = "above" if rate >= limit else "near"
-        said.append(
-            f"the rate {rate:g} {unit} is {where} the critical one, about {limit:.4g} {unit} (material as "
-            "fast as its slowest waves): solutions are not stable there"
-        )
+    motion, said = terms.motion, near_waves(terms, 0.0)
     if isinstance(motion, Rotation):
         share = leak(motion, model)
         if share > LEAK:

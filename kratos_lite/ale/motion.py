@@ -18,7 +18,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
+from kratos_lite.arguments import finite, flag, number
 from kratos_lite.errors import InputError
 from kratos_lite.rotations import hat
 from kratos_lite.series import Factor, function_of
@@ -48,10 +48,9 @@ class Motion(ABC):
         self.rate = function_of(rate, "a rate")
         self.acceleration = function_of(acceleration, "an acceleration")
         self.steady = not (callable(rate) or callable(acceleration))
-        alpha = finite(damping, "a damping")
-        if alpha.ndim or alpha < 0:
+        self.damping = number(damping, "a damping")
+        if self.damping < 0:
             raise InputError(f"a damping must be one number in 1/s, ≥ 0; got {damping}")
-        self.damping = float(alpha)
 
     @abstractmethod
     def field(self, X: Array) -> Array:
@@ -95,7 +94,7 @@ class Rotation(Motion):
         self.centre = finite(centre, "the centre of a rotation")
         if self.centre.shape != (3,):
             raise InputError(f"the centre of a rotation must have shape (3,); got {self.centre.shape}")
-        self.skew, self.stiffening = bool(skew), bool(stiffening)
+        self.skew, self.stiffening = flag(skew, "skew"), flag(stiffening, "stiffening")
         self.A = -hat(self.direction)
 
     def field(self, X: Array) -> Array:

@@ -11,7 +11,7 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from kratos_lite.series import Factor
 
 Array = NDArray[np.float64]
-Gauge: TypeAlias = Callable[[Array], Array]
 
 _log = logging.getLogger("kratos_lite")
 BODIES: Registry[type[Body]] = Registry("kind of body")

@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.arguments import finite
+from kratos_lite.arguments import positive_step, whole_number
 from kratos_lite.assembly import Progress
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.closing import start
@@ -83,12 +83,9 @@ def march(
     >>> [round(float(state.q[11]), 9) for state in states]
     [-1.2, -4.95]
     """
-    h = _positive(dt)
-    for name, count in (("steps", steps), ("every", every)):
-        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-            raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+    h, count, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
     one = _alone(body) if isinstance(body, Body) else together(body)
-    return _states(one, h, int(steps), int(every), _divided(one, h, substeps), until, progress)
+    return _states(one, h, count, every, _divided(one, h, substeps), until, progress)
 
 
 def _states(
@@ -122,19 +119,9 @@ def _alone(body: Body) -> Body:
     return body
 
 
-def _positive(dt: float) -> float:
-    h = finite(dt, "a step")
-    if h.ndim or not h > 0:
-        raise InputError(f"a step must be one number of seconds > 0; got {dt}")
-    return float(h)
-
-
 def _divided(body: Body, h: float, substeps: int | str) -> int:
     """Return the number of parts of each step; InputError if an explicit one is too long."""
-    whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool) and substeps >= 1
-    if substeps != "auto" and not whole:
-        raise InputError(f"substeps must be a whole number ≥ 1, or 'auto'; got {substeps!r}")
-    parts = 1 if isinstance(substeps, str) else int(substeps)
+    parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if not isinstance(body, Deformable):
         return parts
     if body.scheme == "DEF_EXP":

@@ -21,6 +21,7 @@ from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.loads import Varying
 from kratos_lite.mass import Mass
+from kratos_lite.mobility import check_supports
 from kratos_lite.solvers.banded import add_scalar
 from kratos_lite.statics import initial_loads
 from kratos_lite.supports import reduction, resolve
@@ -312,6 +313,15 @@ class EquationsOfMotion:
         if self.terms is None:
             return 0.0, 0.0
         return self.terms.motion.rate(time), self.terms.motion.acceleration(time)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether supports hold all rigid motions."""
+        try:
+            check_supports(self.model.mesh, self.model.supports)
+        except ModelError:
+            return False
+        return True
 
     def is_symmetric(self, time: float, c: float) -> bool:
         """Return whether a matrix with the share c of damping is symmetric at a time."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.arguments import whole_number
 from kratos_lite.dynamics.equations import EquationsOfMotion
 from kratos_lite.errors import InputError
 from kratos_lite.modes import DENSE_MODES, modes
@@ -14,6 +15,9 @@ from kratos_lite.solvers import direct
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
+
+FEW = 40
+"""Up to this many unknowns there is nothing to iterate for."""
 
 Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,7 +36,7 @@ def complex_modes(model: Model, count: int) -> tuple[Complexes, Complexes]:
     e = EquationsOfMotion(model)
     M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     n = K.shape[0]
-    if not 1 <= count <= 2 * n:
+    if whole_number(count, "count") > 2 * n:
         raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
     if 2 * n <= DENSE_MODES or count > n // 4:
         inverse = np.linalg.inv(M.toarray())
@@ -69,22 +73,14 @@ def critical_rate(model: Model, count: int = 1) -> Array:
 
     They are those of the mesh; `critical_rate_estimate` is the limit of ever finer ones.
     """
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-        raise InputError(f"count must be a whole number ≥ 1; got {count!r}")
+    count = whole_number(count, "count")
     e = EquationsOfMotion(model, free=False)
     if e.terms is None:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
-    from kratos_lite.blockmatrix import BlockMatrix
-    from kratos_lite.solvers.banded import add_scalar
-
-    H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
-    add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
-    K, H = reduced(e, e.K), reduced(e, H)
+    K, H = _critical_pencil(e)
     n = K.shape[0]
     if n <= DENSE_MODES:
-        from scipy.linalg import eigh
-
-        largest = eigh(H.toarray(), K.toarray(), eigvals_only=True)[::-1][:count]
+        largest = _dense(K, H)[::-1][:count]
     else:
         from scipy.sparse.linalg import LinearOperator, eigsh
 
@@ -94,6 +90,57 @@ def critical_rate(model: Model, count: int = 1) -> Array:
         largest = eigsh(H, count, K, which="LA", Minv=inverse, v0=start, return_eigenvectors=False)[::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+
+
+def critical_rates_beside(
+    e: EquationsOfMotion, factors: direct.Factorisation | None = None
+) -> tuple[float, float]:
+    """Return the critical rates next below and next above the rate at the time 0, to some 1 %.
+
+    They are 0 and infinite where there is none.  `factors` are those of K - rate² H, if they are known: some
+    twenty solutions with them are enough.
+    """
+    square, (K, H) = e.rates(0.0)[0] ** 2, _critical_pencil(e)
+    if K.shape[0] <= FEW:
+        with np.errstate(divide="ignore"):
+            squares = 1 / _dense(K, H)
+    else:
+        factors = factors or direct.factorise((K - square * H).tocsr())
+        squares = _beside(K, H, square, factors)
+    below, above = squares[(squares > 0) & (squares <= square)], squares[squares > square]
+    return float(np.sqrt(below.max(initial=0.0))), float(np.sqrt(above.min(initial=np.inf)))
+
+
+def _beside(K: Any, H: Any, square: float, factors: direct.Factorisation) -> Array:
+    """Return eigenvalues of K φ = λ H φ on either side of a number, by Lanczos on (K - number H)^-1 K."""
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+    n = K.shape[0]
+    inverse = LinearOperator((n, n), matvec=factors.apply, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    way = {"mode": "buckling", "which": "BE", "OPinv": inverse, "v0": start, "return_eigenvectors": False}
+    try:
+        return np.asarray(eigsh(K, 2, H, sigma=square, tol=1e-2, ncv=FEW // 2, maxiter=3, **way))
+    except ArpackNoConvergence as error:
+        return np.asarray(error.eigenvalues)
+
+
+def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:
+    """Return K and H, less what stiffens, on the free degrees of freedom."""
+    from kratos_lite.blockmatrix import BlockMatrix
+    from kratos_lite.solvers.banded import add_scalar
+
+    assert e.terms is not None
+    H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
+    add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
+    return reduced(e, e.K), reduced(e, H)
+
+
+def _dense(K: Any, H: Any) -> Array:
+    """Return all 1 / λ of K φ = λ H φ, ascending."""
+    from scipy.linalg import eigh
+
+    return np.asarray(eigh(H.toarray(), K.toarray(), eigvals_only=True))
 
 
 def reduced(equations: EquationsOfMotion, A: Any) -> Any:

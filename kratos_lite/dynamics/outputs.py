@@ -124,20 +124,23 @@ def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) 
     return np.asarray(v + rate * along)
 
 
-def motion_summary(e: EquationsOfMotion, of: Reacting) -> dict[str, Any]:
-    """Return the figures of a steady motion for its report."""
+def motion_summary(e: EquationsOfMotion, of: Reacting, beside: tuple[float, float] | None) -> dict[str, Any]:
+    """Return the figures of a steady motion for its report; `beside` are the critical rates next to it."""
     assert e.terms is not None
-    rate, limit = e.rates(0.0)[0], critical_rate_estimate(e.terms)
+    rate, waves = e.rates(0.0)[0], critical_rate_estimate(e.terms)
+    critical = (beside[0] or beside[1]) if beside else None
     turns = isinstance(e.terms.motion, Rotation)
-    force, moment = reaction_resultant(e.model, of)
+    noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
+    force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))
     return {
         "kind": "rotation" if turns else "translation",
         "unit": "rad/s" if turns else "m/s",
         "direction": e.terms.motion.direction.tolist(),
         "rate": rate,
         "acceleration": e.rates(0.0)[1],
-        "critical_rate_of_waves": limit,
-        "margin": 1 - abs(rate) / limit,
+        "critical_rate": critical,
+        "critical_rate_of_waves": waves,
+        "margin": 1 - abs(rate) / (critical or waves),
         "support_force": force.tolist(),
         "support_moment": moment.tolist(),
     }

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kratos_lite.arguments import number
 from kratos_lite.errors import InputError
 
 
@@ -39,6 +40,7 @@ def newmark(beta: float = 0.25, gamma: float = 0.5) -> Implicit:
     >>> newmark().name
     'newmark(0.25, 0.5)'
     """
+    beta, gamma = number(beta, "Newmark's β"), number(gamma, "Newmark's γ")
     if not (gamma >= 0.5 and beta > 0 and 2 * beta >= gamma):
         raise InputError(
             f"Newmark's method is stable for γ ≥ 1/2 and β ≥ γ/2; got β = {beta}, γ = {gamma}: "
@@ -49,6 +51,7 @@ def newmark(beta: float = 0.25, gamma: float = 0.5) -> Implicit:
 
 def hht(alpha: float = -0.05) -> Implicit:
     """Return the method of Hilber, Hughes and Taylor, -1/3 ≤ α ≤ 0: order 2, high frequencies die out."""
+    alpha = number(alpha, "the α of HHT")
     if not -1 / 3 <= alpha <= 0:
         raise InputError(f"the α of HHT lies in -1/3 … 0; got {alpha}")
     return Implicit(f"hht({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, 0.0, -alpha)
@@ -56,6 +59,7 @@ def hht(alpha: float = -0.05) -> Implicit:
 
 def generalised_alpha(rho_inf: float = 0.8) -> Implicit:
     """Return the generalised-α method whose highest frequencies shrink by ρ∞ (0 … 1) a step: order 2."""
+    rho_inf = number(rho_inf, "the ρ∞ of the generalised-α method")
     if not 0 <= rho_inf <= 1:
         raise InputError(f"ρ∞ of the generalised-α method lies in 0 … 1; got {rho_inf}")
     m, f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import solvers
+from kratos_lite.ale.guards import near_critical
 from kratos_lite.assembly import Progress
 from kratos_lite.checks import equilibrium
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.dynamics.modal import critical_rates_beside
 from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
 from kratos_lite.native import described
@@ -48,14 +50,15 @@ def solve_steady(
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
-        left = e.system.whole(A @ u - forces).copy()
-        held = model.supports.fixed
-        tied = [dof for link in model.supports.links for dof in (link.slave, *link.masters)]
-        reactions = np.where(held, left, 0.0)
-        reactions.flat[tied] = left.flat[tied]
+        left = e.system.whole(A @ u - forces)
+        reactions = model.supports.carried(left)
         inner = e.system.whole(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
         balance = equilibrium(model.mesh.points, nodal - inner, reactions)
         judge(solution, u, balance)
+        beside = None
+        if e.terms is not None and e.rates(0.0)[0] and solution.method == "direct":
+            beside = critical_rates_beside(e, equations.factors if symmetric else None)
+            warnings += near_critical(e.terms.motion, *beside)
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=nodal.sum(axis=0),
@@ -75,5 +78,5 @@ def solve_steady(
     )
     u0 = model.initial_displacement
     result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report, u0)
-    report.motion = motion_summary(e, result)
+    report.motion = motion_summary(e, result, beside)
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
+from kratos_lite.ale.guards import near_critical, near_waves
+from kratos_lite.arguments import finite, flag, positive_step, whole_number
 from kratos_lite.assembly import Progress
-from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.dynamics.modal import critical_rates_beside
 from kratos_lite.dynamics.movement import at, at_start, beyond_newmark
 from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
@@ -26,6 +29,7 @@ from kratos_lite.statics import same_state
 if TYPE_CHECKING:
     from kratos_lite.model import Model
 
+_log = logging.getLogger("kratos_lite")
 Array = NDArray[np.float64]
 FIELDS = ("u", "v", "a", "time", "step")
 
@@ -38,7 +42,7 @@ class Moment:
     ----------
     time, step : s, and number of steps taken.
     u, v, a : displacement, velocity, acceleration (n, 3) in m, m/s, m/s².
-    reactions : (n, 3) N, forces of the supports on the body; 0 where nothing is fixed.
+    reactions : (n, 3) N, forces of supports and constraints on the body; 0 where nothing acts.
     """
 
     time: float
@@ -62,8 +66,8 @@ class Moment:
                 u, v, a, time, step = (file[name] for name in FIELDS)
         except FileNotFoundError:
             raise InputError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
-            raise InputError(f"{path}: not a moment that Moment.save wrote ({error})") from None
+        except (OSError, ValueError, KeyError, TypeError, EOFError):
+            raise InputError(f"{path}: not a moment that Moment.save wrote, or not all of it") from None
         return cls(float(time), int(step), u, v, a, np.zeros_like(u))
 
 
@@ -117,24 +121,24 @@ class Transient:
         explicit = isinstance(self.scheme, CentralDifference)
         self.progress = progress
         self.equations = EquationsOfMotion(
-            model, lumped=lumped or explicit, rayleigh=rayleigh, progress=progress
+            model, lumped=flag(lumped, "lumped") or explicit, rayleigh=rayleigh, progress=progress
         )
         if explicit and self.equations.terms is not None:
             raise ModelError("central differences do not take a motion of the material; use newmark()")
         if explicit and model.supports.links:
             raise ModelError("central differences do not take constraints; use newmark()")
+        e = self.equations
+        if e.terms is not None and e.rates(0.0)[0] and len(e.system.reduced.free) <= DIRECT_MAX and e.is_held:
+            e.warnings += near_critical(e.terms.motion, *critical_rates_beside(e))
         self._state = model_state(model)
+        self._near: list[str] = []
         self.time, self.step = 0.0, 0
         self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
-        start, speed, _ = at_start(self.equations)
+        self._held = np.ones(self.equations.size, dtype=bool)
+        self._held[self.equations.system.reduced.free] = False
+        start, speed, more = at_start(self.equations)
         self.u, self.v = self._allowed(self.u, start), self._allowed(self.v, speed)
-        self.a = self._initial_acceleration()
-
-    @property
-    def _held(self) -> NDArray[np.bool_]:
-        held = np.ones(self.equations.size, dtype=bool)
-        held[self.equations.system.reduced.free] = False
-        return held
+        self.a = self._initial_acceleration(more)
 
     def _allowed(self, x: Array, prescribed: Array) -> Array:
         """Return vectors (3a,) whose held components follow from supports and constraints."""
@@ -152,11 +156,11 @@ class Transient:
             raise InputError(f"the initial {what} needs shape ({n}, 3); got {given.shape}")
         return self.equations.system.local(given).copy()
 
-    def _initial_acceleration(self) -> Array:
+    def _initial_acceleration(self, prescribed: Array) -> Array:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
         e = self.equations
         force = e.load(0.0) - e.times_damping(self.v, 0.0) - e.times_stiffness(self.u, 0.0)
-        return e.solver(0.0, 1.0, 0.0, 0.0)(force, at_start(e)[2])
+        return e.solver(0.0, 1.0, 0.0, 0.0)(force, prescribed)
 
     # ---- marching --------------------------------------------------------------------------------
 
@@ -184,18 +188,13 @@ class Transient:
         SolveError
             The matrix of a step is singular, or the motion is no longer finite.
         """
-        h = finite(dt, "a step")
-        if h.ndim or not h > 0:
-            raise InputError(f"a step must be one number of seconds > 0; got {dt}")
-        for name, count in (("steps", steps), ("every", every)):
-            if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-                raise InputError(f"{name} must be a whole number ≥ 1; got {count!r}")
+        h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
         if not same_state(self._state, model_state(self.equations.model)):
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
         advance = self._explicit if isinstance(self.scheme, CentralDifference) else self._implicit
         if isinstance(self.scheme, CentralDifference):
-            self._check_stable(float(h))
-        return self._moments(advance, float(h), int(steps), int(every), until)
+            self._check_stable(h)
+        return self._moments(advance, h, steps, every, until)
 
     def _moments(
         self,
@@ -208,6 +207,7 @@ class Transient:
         for done in range(1, steps + 1):
             with one_thread():
                 advance(h)
+            self._watch_rate(self.time + h)
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
             if done % every and done < steps:
@@ -220,6 +220,16 @@ class Transient:
             yield moment
             if until and until(moment):
                 return
+
+    def _watch_rate(self, time: float) -> None:
+        """Note it when a rate that changes comes near the critical one, once."""
+        e = self.equations
+        if e.terms is None or e.terms.motion.steady or self._near:
+            return
+        self._near = near_waves(e.terms, time)
+        for text in self._near:
+            e.warnings.append(f"at t = {time:g} s {text}")
+            _log.warning("%s", e.warnings[-1])
 
     def _implicit(self, h: float) -> None:
         """Take a step of the generalised-α method, for the increment of the displacement."""
@@ -234,14 +244,14 @@ class Transient:
             v_new, a_old = v_new + more_v, a_old - more_a
         middle = self.time + f * h
         force = e.load(middle)
-        force = force - e.times_stiffness(self.u, end)
-        force -= e.times_damping(f * v_new + s.alpha_f * self.v, end)
+        force = force - e.times_stiffness(self.u, middle)
+        force -= e.times_damping(f * v_new + s.alpha_f * self.v, middle)
         if s.alpha_m or s.alpha_f or (s.beta, s.gamma) != (0.25, 0.5):
             force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * self.a)
         else:  # M a is known from the balance at the start; so no rounding is handed on from step to step
             force += e.times_mass(4 / h * self.v - more_a) + e.load(start)
             force -= e.times_stiffness(self.u, start) + e.times_damping(self.v, start)
-        solve = e.solver(end, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
+        solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
         change = np.where(self._held, e.prescribed(end) - self.u, 0.0)
         du = solve(force, self._prescribed_change(change, end))
         self.u = self.u + du
@@ -305,13 +315,11 @@ class Transient:
         self.time, self.step = moment.time, moment.step
 
     def reactions(self) -> Array:
-        """Return M a + C v + K u - f at fixed nodes, (n, 3) in N; 0 where nothing is fixed."""
+        """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
         e = self.equations
         left = e.times_mass(self.a) + e.times_damping(self.v, self.time)
         left += e.times_stiffness(self.u, self.time) - e.load(self.time)
-        out = e.system.whole(left).copy()
-        out[~e.model.supports.fixed] = 0.0
-        return out
+        return e.model.supports.carried(e.system.whole(left))
 
     def energy(self, moment: Moment | None = None) -> float:
         """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.

@@ -37,6 +37,7 @@ class Factorisation:
     ----------
     method : ``dense``, ``pardiso`` or ``superlu``.
     A : the matrix, for one step of iterative refinement.
+    apply : function of b that returns x without refinement.
 
     Examples
     --------
@@ -46,15 +47,15 @@ class Factorisation:
     """
 
     def __init__(self, method: str, A: Any, apply: Callable[[Array], Array]) -> None:
-        self.method, self.A, self._apply = method, A, apply
+        self.method, self.A, self.apply = method, A, apply
 
     def solve(self, b: Array) -> Array:
         """Return x (n,) of A x = b, refined once.
 
         Source: Higham, Accuracy and Stability of Numerical Algorithms (2002), chapter 12.
         """
-        x = self._apply(b)
-        return np.asarray(x + self._apply(b - self.A @ x))
+        x = self.apply(b)
+        return np.asarray(x + self.apply(b - self.A @ x))
 
 
 def factorise_dense(A: Array) -> Factorisation:

@@ -104,7 +104,7 @@ class Equations:
 
     def _solve(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
         if self.method == "dense":
-            q = self._factors.solve(b)
+            q = self.factors.solve(b)
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
@@ -117,7 +117,7 @@ class Equations:
                     f"{why}; {len(b)} unknowns are too many to factorise instead; look for thin elements or "
                     "ν near 0.5, use quadratic elements, or ask for solver='direct'"
                 )
-        q = self._factors.solve(b)
+        q = self.factors.solve(b)
         return Solution(q, "direct", why, 0, backward_error(self._sparse, q, b))
 
     @cached_property
@@ -137,7 +137,7 @@ class Equations:
         return A if len(free) == A.shape[0] else A[free][:, free]
 
     @cached_property
-    def _factors(self) -> direct.Factorisation:
+    def factors(self) -> direct.Factorisation:
         """The reduced matrix factorised."""
         return (
             direct.factorise_dense(self._full)

@@ -6,6 +6,8 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.ale.guards import leak, rayleigh_speed
+from kratos_lite.dynamics import EquationsOfMotion
+from kratos_lite.dynamics.modal import critical_rates_beside
 from kratos_lite.errors import InputError, ModelError
 
 
@@ -47,6 +49,48 @@ def test_rates_near_the_critical_one(wheels):
     assert "the rate 97 rad/s is above the critical one" in said[97.0]
     assert "above" in said[-97.0]
     assert rayleigh_speed(wheels.c_p, wheels.c_s) == pytest.approx(95.481345662, rel=1e-10)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [
+        (35.0, ""),
+        (41.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
+        (-43.7, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (64.0, "the rate 64 rad/s is above the critical one, 58.46 rad/s on this mesh"),
+    ],
+)
+def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, words, damping, wheels):
+    mesh = kl.annulus(0.3, 1.0, 0.25, (3, 32, 1), "KinematicLinear3D20N")
+    model = kl.Model(mesh, wheels.steel)
+    model.fix("inner")
+    model.add(Rotation("z", rate=rate, damping=damping))
+    result = model.solve()
+    for warnings in (result.report.warnings, model.transient().equations.warnings):
+        said = [text for text in warnings if "critical" in text]
+        assert (len(said) == 1 and said[0].startswith(words)) if words else not said
+    assert (result.report.motion["margin"] < 0) == ("above" in words)
+
+
+def test_critical_rates_beside_a_rate_are_those_of_the_mesh(wheels):
+    for cells, element in (((1, 12, 1), "20N"), ((2, 24, 1), "20N"), ((1, 12, 1), "8N")):
+        model = wheels.disk(element, *cells[:2])
+        all_rates = kl.critical_rate(wheels_with(model, 50.0), 12)
+        widest = int(np.diff(all_rates).argmax())
+        low, high = all_rates[widest : widest + 2]
+        between = (low + high) / 2
+        model.motion = None
+        beside = critical_rates_beside(EquationsOfMotion(wheels_with(model, between), free=False))
+        assert beside == pytest.approx((low, high), rel=1e-2)
+        model.motion = None
+        below_all = EquationsOfMotion(wheels_with(model, 0.5 * all_rates[0]), free=False)
+        assert critical_rates_beside(below_all) == (0.0, pytest.approx(all_rates[0], rel=1e-2))
+
+
+def wheels_with(model, rate):
+    model.add(Rotation("z", rate=rate))
+    return model
 
 
 def test_windows_near_their_critical_speed(wheels):
@@ -92,6 +136,34 @@ def test_one_motion_to_a_model(wheels):
         model.add(Rotation("z", rate=2.0))
 
 
+@pytest.mark.parametrize("end", ["x-", "x+"])
+def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels):
+    found = []
+    for before in (True, False):
+        model = wheels.bar("8N", 4)
+        if before:
+            model.fix(end, "x", 1e-3)
+        model.add(Translation("x", rate=1.0, ends="periodic"))
+        if not before:
+            model.fix(end, "x", 1e-3)
+        model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1e3, 0.0, 0.0)))
+        found.append(model.solve().u)
+        for side in ("x-", "x+"):
+            np.testing.assert_array_equal(found[-1][model.mesh.nodes(side), 0], 1e-3)
+    np.testing.assert_array_equal(*found)
+    pulled = 4e3 * 10 / (2 * wheels.steel.C[0, 0])
+    assert found[0][:, 0].max() == pytest.approx(1e-3 + pulled, rel=1e-5)
+
+
+def test_joined_ends_cannot_be_held_in_two_places(wheels):
+    model = wheels.bar("8N", 4)
+    model.add(Translation("x", rate=1.0, ends="periodic"))
+    model.fix("x-", "x", 0.0)
+    model.fix("x+", "x", 1e-3)
+    with pytest.raises(ModelError, match=r"are joined, but prescribed as 0\.001 m and 0 m"):
+        model.solve()
+
+
 def test_periodic_ends_need_opposite_nodes(wheels):
     model = wheels.bar("8N", 4)
     end = model.mesh.nodes("x+")
@@ -109,6 +181,9 @@ def test_periodic_ends_need_opposite_nodes(wheels):
         (lambda: Rotation("z", rate=np.nan), "rate"),
         (lambda: Rotation("z", rate=[1, 2]), "a rate must be a number"),
         (lambda: Rotation("z", centre=(1, 2)), r"centre of a rotation must have shape \(3,\)"),
+        (lambda: Rotation("z", stiffening="no"), "stiffening must be True or False; got 'no'"),
+        (lambda: Rotation("z", skew=1), "skew must be True or False; got 1"),
+        (lambda: Rotation("z", damping=(1, 2)), "a damping must be one number"),
         (lambda: Rotation("z", damping=-1.0), "a damping must be one number in 1/s, ≥ 0; got -1.0"),
         (lambda: Translation("x", ends="open"), "ends must be one of absorbing, periodic, fixed, natural"),
     ],

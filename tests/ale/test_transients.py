@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.sparse import eye_array, kron
 from scipy.sparse.linalg import splu, spsolve
 
@@ -12,6 +13,82 @@ from kratos_lite.loads import Varying
 from kratos_lite.rotations import exp
 
 A = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+# ---- a rate that changes -----------------------------------------------------------------------------
+
+ALPHA, SPAN = 20.0, 0.03
+
+
+def rate(t):
+    return 20 + 15 * np.sin(40 * t)
+
+
+def acceleration(t):
+    return 600 * np.cos(40 * t)
+
+
+def load(t):
+    return np.cos(70 * t)
+
+
+def shaken_wheel(wheels):
+    model = wheels.disk("8N", 1, 12)
+    model.add(Rotation("z", rate, acceleration, damping=ALPHA))
+    model.add(Varying(kl.Traction("z+", (1e3, 2e2, 0.0)), load))
+    return model
+
+
+@pytest.fixture(scope="module")
+def reference(wheels):
+    """Return u at the end, of M u'' + (α M + 2 s S) u' + (K - s² H + (s' + α s) S) u = f by Runge-Kutta."""
+    model = shaken_wheel(wheels)
+    e = EquationsOfMotion(model)
+    free, points = e.system.reduced.free, e.system.points
+    own = wheels.matrices(model.motion, model)
+    take = lambda full: np.kron(full, np.eye(3))[np.ix_(free, free)]  # noqa: E731
+    M, S, H = (take(full) for full in (own.M, own.S, own.H))
+    K, inverse = e.K.scipy().toarray()[np.ix_(free, free)], np.linalg.inv(M)
+    push = model.loads[0].load.forces(model.mesh, model.batches()).ravel()[free]
+
+    def slope(t, y):
+        u, v = y.reshape(2, -1)
+        s, spin = rate(t), acceleration(t)
+        carried = -(own.M @ points @ (s * s * A @ A + spin * A).T).ravel()[free]
+        force = load(t) * push + carried - ALPHA * (M @ v) - 2 * s * (S @ v)
+        return np.concatenate([v, inverse @ (force - K @ u + s * s * (H @ u) - (spin + ALPHA * s) * (S @ u))])
+
+    start = np.zeros(2 * len(free))
+    done = solve_ivp(slope, (0, SPAN), start, method="DOP853", rtol=1e-10, atol=1e-14)
+    return done.y[: len(free), -1]
+
+
+@pytest.mark.parametrize(
+    "scheme",
+    [kl.newmark(), kl.hht(-0.05), kl.hht(-0.3), kl.generalised_alpha(0.8), kl.generalised_alpha(0.3)],
+    ids=lambda scheme: scheme.name,
+)
+def test_order_two_while_the_rate_changes(scheme, wheels, reference):
+    transient = shaken_wheel(wheels).transient(scheme=scheme)
+    free, errors = transient.equations.system.reduced.free, []
+    for steps in (300, 600):
+        transient = shaken_wheel(wheels).transient(scheme=scheme)
+        list(transient.march(SPAN / steps, steps, every=steps))
+        errors.append(np.abs(transient.u[free] - reference).max() / np.abs(reference).max())
+    assert errors[1] < 1e-3
+    assert 1.95 < np.log2(errors[0] / errors[1]) < 2.05
+
+
+def test_a_rate_that_passes_the_critical_one_is_told_once(wheels, caplog):
+    model = wheels.disk("8N", 1, 12)
+    model.add(Rotation("z", lambda t: 2000 * t, 2000.0))
+    transient = model.transient()
+    list(transient.march(1e-3, 40))
+    assert not any("critical" in text for text in transient.equations.warnings)
+    list(transient.march(1e-3, 10))
+    (said,) = [text for text in transient.equations.warnings if "critical" in text]
+    assert said.startswith("at t = 0.043 s the rate 86 rad/s is near the critical one, about 95.48 rad/s")
+    assert [record.getMessage() for record in caplog.records] == [said]
 
 
 # ---- frame invariance --------------------------------------------------------------------------------

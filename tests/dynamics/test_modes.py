@@ -146,5 +146,9 @@ def test_what_is_refused():
         cube(1, "8N").modes(25)
     with pytest.raises(InputError, match="this model has 1 … 8 complex modes; got 9"):
         column(1).complex_modes(9)
+    for count in (0, 2.0, "all", True, None):
+        for find in (column(1).modes, column(1).complex_modes):
+            with pytest.raises(InputError, match="count must be a whole number ≥ 1; got"):
+                find(count)
     with pytest.raises(InputError, match="a critical rate belongs to a motion"):
         modal.critical_rate(column(1))

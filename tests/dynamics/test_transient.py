@@ -268,8 +268,12 @@ def test_constraints():
         np.testing.assert_allclose(b.u[mesh.nodes("z+"), 2], a.u[:, 2].max(), atol=1e-14)
 
 
-def test_reactions_balance_load_and_inertia():
+@pytest.mark.parametrize("tied", [False, True])
+def test_reactions_balance_load_and_inertia(tied):
     model = bar(4)
+    if tied:  # a point of the top follows one of the middle
+        middle, top = (model.mesh.nodes(lambda X, z=z: X[:, 2] == z)[0] for z in (LENGTH / 2, LENGTH))
+        model.link((top, "z"), {(middle, "z"): 1.0})
     model.add(kl.Gravity((0, 0, -9.81)))
     e = model.transient()
     for moment in e.march(1e-3, 20):
@@ -345,6 +349,7 @@ def test_no_density():
         ({"velocity": np.full((20, 3), np.nan)}, "initial velocity"),
         ({"rayleigh": (-1.0, 0.0)}, "Rayleigh damping is α ≥ 0"),
         ({"rayleigh": (1.0,)}, "Rayleigh damping is α ≥ 0"),
+        ({"lumped": "no"}, "lumped must be True or False; got 'no'"),
     ],
 )
 def test_wrong_options(options, text):
@@ -360,6 +365,8 @@ def test_wrong_options(options, text):
         ({"dt": 1e-3, "steps": 0}, "steps must be a whole number ≥ 1; got 0"),
         ({"dt": 1e-3, "steps": 2.5}, "steps must be a whole number"),
         ({"dt": 1e-3, "steps": 2, "every": 0}, "every must be a whole number"),
+        ({"dt": 1e-300, "steps": 2}, "a step of 1e-300 s is too short to compute with"),
+        ({"dt": "1 ms", "steps": 2}, "a step must be made of real numbers; got '1 ms'"),
     ],
 )
 def test_wrong_marches(options, text):
@@ -369,10 +376,20 @@ def test_wrong_marches(options, text):
 
 @pytest.mark.parametrize(
     "make",
-    [lambda: newmark(0.0, 0.5), lambda: newmark(0.2, 0.5), lambda: newmark(0.25, 0.4), lambda: hht(0.1)],
+    [
+        lambda: newmark(0.0, 0.5),
+        lambda: newmark(0.2, 0.5),
+        lambda: newmark(0.25, 0.4),
+        lambda: newmark("a"),
+        lambda: newmark(0.25, [0.5]),
+        lambda: hht(0.1),
+        lambda: hht(None),
+        lambda: hht(np.nan),
+        lambda: generalised_alpha("0.8"),
+    ],
 )
 def test_wrong_schemes(make):
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=r"Newmark|HHT|generalised-α"):
         make()
 
 

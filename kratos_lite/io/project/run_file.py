@@ -58,42 +58,28 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     return _read_own(settings, folder, allow_outside)
 
 
-class _Collector:
-    """Calls functions and collects the errors that they raise."""
-
-    def __init__(self) -> None:
-        self.problems = Problems()
-
-    def __call__(self, action: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return action(*arguments)
-        except KratosLiteError as error:
-            self.problems.add(str(error))
-            return None
-
-
 def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
-    collect = _Collector()
+    problems = Problems()
     for key in settings.unknown(KEYS):
-        collect.problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
-    solver, tolerance = collect(_solver, settings) or ("auto", 0.0)
-    output = collect(_outputs, settings, folder, outside)
-    path = collect(_model_path, settings, folder, outside)
-    sections = {key: collect(settings.section, key) for key in ("material", "fix", *LOADS)}
-    gravity = collect(settings.vector, "gravity") if "gravity" in settings else None
-    collect.problems.raise_if_any()
+        problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
+    solver, tolerance = problems.of(_solver, settings) or ("auto", 0.0)
+    output = problems.of(_outputs, settings, folder, outside)
+    path = problems.of(_model_path, settings, folder, outside)
+    sections = {key: problems.of(settings.section, key) for key in ("material", "fix", *LOADS)}
+    gravity = problems.of(settings.vector, "gravity") if "gravity" in settings else None
+    problems.raise_if_any()
     material = sections["material"]
     model = model_from(read_document(path), materials=not material.values or _is_by_part(material))
-    _assign(model, material, collect)
+    _assign(model, material, problems)
     for part in sections["fix"].values:
-        collect(_fix, model, sections["fix"], part)
+        problems.of(_fix, model, sections["fix"], part)
     for key, load in LOADS.items():
         for part in sections[key].values:
-            collect(_load, model, sections[key], part, load)
+            problems.of(_load, model, sections[key], part, load)
     if gravity is not None:
         _add_gravity(model, gravity)
-    collect(add_motion, model, settings)
-    collect.problems.raise_if_any()
+    problems.of(add_motion, model, settings)
+    problems.raise_if_any()
     return Scene(model, solver, tolerance, output)
 
 
@@ -147,14 +133,14 @@ def _is_by_part(material: Settings) -> bool:
     return any(isinstance(value, Object) for value in material.values.values())
 
 
-def _assign(model: Model, section: Settings, collect: _Collector) -> None:
+def _assign(model: Model, section: Settings, problems: Problems) -> None:
     if not _is_by_part(section):
-        material = collect(read_material, section) if section.values else None
+        material = problems.of(read_material, section) if section.values else None
         if material is not None:
             model.assign(material)
         return
     for part in section.values:
-        collect(_assign_part, model, section, part)
+        problems.of(_assign_part, model, section, part)
 
 
 def _assign_part(model: Model, section: Settings, part: str) -> None:

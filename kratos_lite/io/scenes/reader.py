@@ -12,7 +12,7 @@ import numpy as np
 from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody, State
 from kratos_lite.bodies.given import Material
 from kratos_lite.characteristics import Characteristics
-from kratos_lite.errors import InputError, KratosLiteError, Problems
+from kratos_lite.errors import InputError, Problems
 from kratos_lite.generate import annulus, box
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos import model_from
@@ -65,20 +65,6 @@ CHARACTERISTICS: dict[str, Read] = {
 }
 
 
-class _Collector:
-    """Calls functions and collects the errors that they raise."""
-
-    def __init__(self) -> None:
-        self.problems = Problems()
-
-    def __call__(self, action: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return action(*arguments)
-        except KratosLiteError as error:
-            self.problems.add(str(error))
-            return None
-
-
 def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
     """Return the scene of a JSON file; its files are named from its folder.
 
@@ -87,24 +73,24 @@ def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
     InputError
         With file, line, column and cure of every problem that is found.
     """
-    settings, collect = read_settings(path), _Collector()
+    settings, problems = read_settings(path), Problems()
     if "model" in settings or "solver_settings" in settings:
         raise InputError(f"{path}: this is a run file of a static model: kratos-lite solve {path}")
     for key in settings.unknown(KEYS):
-        collect.problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
+        problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
     files = [path]
-    time = collect(_time, settings)
-    output = collect(_outputs, settings, path.parent)
-    body = collect(_body_of, settings, path.parent, files, strict)
+    time = problems.of(_time, settings)
+    output = problems.of(_outputs, settings, path.parent)
+    body = problems.of(_body_of, settings, path.parent, files, strict)
     if body is None:
-        collect.problems.raise_if_any()
-    collect(_start, settings, body)
+        problems.raise_if_any()
+    problems.of(_start, settings, body)
     for key, add in (("loads", add_load), ("constraints", add_constraint)):
-        for section in collect(settings.sections, key) or []:
-            collect(add, body, section)
+        for section in problems.of(settings.sections, key) or []:
+            problems.of(add, body, section)
     if "restart" in settings:
-        collect(_restart, settings, path.parent, files, body)
-    collect.problems.raise_if_any()
+        problems.of(_restart, settings, path.parent, files, body)
+    problems.raise_if_any()
     line, column = settings.section("time").values.places["step"]
     return BodyScene(body, **time, output=output, files=files, place=f"{path}:{line}:{column}")
 
