@@ -46,7 +46,7 @@ class Mass:
         rule_of: Callable[[type[KinematicLinear]], Rule] = lambda element: element.mass_rule,
     ) -> None:
         self._points, self._batches = points, batches
-        self.lumped, self.pattern, self._rule_of = lumped, pattern, rule_of
+        self.lumped, self.pattern, self.rule_of = lumped, pattern, rule_of
 
     @cached_property
     def scalar(self) -> csr_array[Any, Any]:
@@ -55,7 +55,7 @@ class Mass:
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        made = inertia_matrices(self._points, self._batches, self.pattern, "M", self._rule_of)
+        made = inertia_matrices(self._points, self._batches, self.pattern, "M", self.rule_of)
         n = self.pattern.n_nodes
         return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
 

@@ -22,7 +22,7 @@ from kratos_lite.mesh import Mesh, Where, WhereElements
 from kratos_lite.quadrature import Rule
 from kratos_lite.result import Result
 from kratos_lite.statics import StaticSystem, solve_static
-from kratos_lite.supports import AXES, Link, Supports, axis_numbers, rigid_modes
+from kratos_lite.supports import AXES, Link, Supports, rigid_modes
 
 if TYPE_CHECKING:
     from kratos_lite.dynamics import Transient
@@ -60,7 +60,6 @@ class Model:
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self.motion: Motion | None = None
-        self.movements: list[tuple[NDArray[np.int64], int, Callable[[float], float]]] = []
         self.patterns = PatternCache()
         self.notes: list[str] = []
         self.initial_displacement: Array | None = None
@@ -121,9 +120,7 @@ class Model:
             what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
             raise ModelError(f"cannot fix {axes}: {what}")
         if callable(value):
-            start = float(finite(value(0.0), "a prescribed displacement"))
-            self.supports.fix(rows, axes, start, override)
-            self.movements += [(rows, axis, value) for axis in axis_numbers(axes)]
+            self.supports.move(rows, axes, value, override)
         else:
             self.supports.fix(rows, axes, value, override)
 

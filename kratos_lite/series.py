@@ -41,6 +41,19 @@ class TimeSeries:
         """Return the value at a time in s."""
         return float(np.interp(time, self.times, self.values))
 
+    def slope(self, time: float) -> float:
+        """Return the derivative at a time in s; at a kink the mean of both sides, at 0 the later one.
+
+        >>> ramp = TimeSeries([0.0, 2.0], [0.0, 10.0])
+        >>> ramp.slope(0.0), ramp.slope(1.0), ramp.slope(2.0), ramp.slope(3.0)
+        (5.0, 5.0, 2.5, 0.0)
+        """
+        slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
+        near = 1e-9 * float(np.abs(self.times).max())
+        after = slopes[np.searchsorted(self.times, time + near)]
+        before = slopes[np.searchsorted(self.times, time - near)] if time > near else after
+        return float(before + after) / 2
+
     def integral(self, start: float, end: float) -> float:
         """Return the integral from start to end, exactly."""
         inner = self.times[(self.times > start) & (self.times < end)]
@@ -69,6 +82,23 @@ def function_of(value: Factor, what: str) -> Callable[[float], float]:
     if number.ndim:
         raise InputError(f"{what} must be a number, a TimeSeries or a function of the time; got {value!r}")
     return lambda time: float(number)
+
+
+def slope_of(value: Factor, what: str) -> Callable[[float], float]:
+    """Return the derivative of a number, time series or function; of a function by differences."""
+    if isinstance(value, TimeSeries):
+        return value.slope
+    if not callable(value):
+        return lambda time: 0.0
+    f = function_of(value, what)
+
+    def slope(time: float) -> float:
+        h = 1e-6 * max(1.0, abs(time))
+        if time < h:
+            return (-3 * f(time) + 4 * f(time + h) - f(time + 2 * h)) / (2 * h)
+        return (f(time + h) - f(time - h)) / (2 * h)
+
+    return slope
 
 
 def integral_of(value: Factor, start: float, end: float) -> float:

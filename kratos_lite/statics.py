@@ -64,6 +64,15 @@ class LoadSet:
     phase: Phases
 
 
+def check_arguments(solver: str, tolerance: float, progress: Progress | None) -> None:
+    """Raise InputError for arguments of a solution that are none."""
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
+        raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
+    solvers.choose(solver, 0)
+
+
 class StaticSystem:
     """A model made ready to be solved for many load sets; made by `Model.system`.
 
@@ -83,11 +92,7 @@ class StaticSystem:
         tolerance: float = 1e-10,
         progress: Progress | None = None,
     ) -> None:
-        if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
-            raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-        if progress is not None and not callable(progress):
-            raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
-        solvers.choose(solver, 0)
+        check_arguments(solver, tolerance, progress)
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance, self.progress = model, solver, tolerance, progress

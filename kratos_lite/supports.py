@@ -6,8 +6,8 @@ T^T K T q = T^T (f - K c) keep symmetry and hold the constraints exactly (no pen
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
+from kratos_lite.series import function_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 AXES = "xyz"
+PRESCRIBED_TWICE = "by a function of the time and otherwise; fix it once, or with override=True"
 
 
 def axis_numbers(axes: str) -> list[int]:
@@ -52,6 +54,16 @@ class Link:
     mutual: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """Node rows whose displacement along an axis is a function of the time; `given` is that of the caller."""
+
+    rows: Ints
+    axis: int
+    course: Callable[[float], float]
+    given: object
+
+
 Links: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
 """Constraints that are resolved: for each slave the weights of free degrees of freedom, and a constant."""
 
@@ -64,6 +76,7 @@ class Supports:
         self.fixed: NDArray[np.bool_] = np.zeros(mesh.points.shape, dtype=bool)
         self.values: Array = np.zeros(mesh.points.shape)
         self.links: list[Link] = []
+        self.movements: list[Movement] = []
 
     def name(self, dof: int) -> str:
         """Return the readable name of a degree of freedom."""
@@ -92,8 +105,36 @@ class Supports:
             raise ModelError(
                 f"{self.name(dof)} is prescribed twice: {self.values.flat[dof]:g} m and {given[i, j]:g} m"
             )
+        self._stop(rows, numbers, None, override)
         self.fixed[at] = True
         self.values[at] = given
+
+    def move(self, rows: Ints, axes: str, course: Callable[[float], float], override: bool = False) -> None:
+        """Prescribe the displacement of nodes along axes as a function of the time; see `fix`."""
+        numbers, checked = axis_numbers(axes), function_of(course, "a prescribed displacement")
+        start = checked(0.0)
+        resting = self.fixed.copy()
+        for movement in self.movements:
+            resting[movement.rows, movement.axis] = False
+        i, j = np.nonzero(resting[np.ix_(rows, np.array(numbers))])
+        if len(i) and not override:
+            dof = 3 * int(rows[i[0]]) + numbers[j[0]]
+            raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
+        self._stop(rows, numbers, course, override)
+        for axis in numbers:
+            self.fixed[rows, axis], self.values[rows, axis] = True, start
+            self.movements.append(Movement(rows, axis, checked, course))
+
+    def _stop(self, rows: Ints, axes: list[int], given: object, override: bool) -> None:
+        """Take nodes out of the movements that they have along axes, all but those given alike."""
+        kept = []
+        for old in self.movements:
+            again = np.isin(old.rows, rows) & (old.axis in axes)
+            if again.any() and not override and old.given is not given:
+                dof = 3 * int(old.rows[again][0]) + old.axis
+                raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
+            kept.append(replace(old, rows=old.rows[~again]))
+        self.movements = [old for old in kept if len(old.rows)]
 
     def link(self, links: Iterable[Link]) -> None:
         """Add multi-point constraints."""
@@ -188,14 +229,14 @@ def _renumbered(dof: Any, local: Ints) -> Any:
     return 3 * local[dof // 3] + dof % 3
 
 
-def resolve(supports: Supports, used: NDArray[np.bool_]) -> Links:
-    """Express every slave by free degrees of freedom alone.
+def resolve(supports: Supports, used: NDArray[np.bool_], agree: bool = True) -> Links:
+    """Express every slave by free degrees of freedom alone; prescribed values must `agree` with them.
 
     Raises ModelError for constraints that contradict, or that use nodes which no element uses.
     """
     by_slave: dict[int, Link] = {}
     for given in supports.links:
-        link = _mutual(given, supports) if given.mutual else given
+        link = _mutual(given, supports, agree) if given.mutual else given
         if link is None:
             continue
         if link.slave in by_slave:
@@ -212,7 +253,7 @@ def resolve(supports: Supports, used: NDArray[np.bool_]) -> Links:
     return done
 
 
-def _mutual(link: Link, supports: Supports) -> Link | None:
+def _mutual(link: Link, supports: Supports, agree: bool) -> Link | None:
     """Return u[slave] = u[master] with the one that supports hold as master; None if they hold both alike."""
     slave, (master,) = link.slave, link.masters
     if not supports.fixed.flat[slave]:
@@ -220,7 +261,7 @@ def _mutual(link: Link, supports: Supports) -> Link | None:
     if not supports.fixed.flat[master]:
         return Link(master, (slave,), (1.0,))
     one, other = supports.values.flat[slave], supports.values.flat[master]
-    if one != other:
+    if agree and one != other:
         raise ModelError(
             f"{supports.name(slave)} and {supports.name(master)} are joined, but prescribed as "
             f"{one:g} m and {other:g} m"

@@ -29,6 +29,17 @@ def vector(stress: ArrayLike) -> Array:
     return t[..., rows, columns]
 
 
+def acoustic_tensor(C: Array, direction: Array) -> Array:
+    """Return Γ_ik = n_j C_ijkl n_l (3, 3) in Pa of a unit vector n: its eigenvalues are ρ c² of plane waves.
+
+    >>> acoustic_tensor(np.diag([4.0, 4, 4, 2, 2, 2]), np.array([1.0, 0, 0])).diagonal().tolist()
+    [4.0, 2.0, 2.0]
+    """
+    gradients = np.eye(3)[:, :, None] * np.asarray(direction)  # of unit displacements along x, y, z
+    strain = symmetric_gradient(gradients)
+    return np.asarray(strain @ C @ strain.T)
+
+
 def von_mises(stress: ArrayLike) -> Array:
     """Return the von Mises stress of (..., 6) in the unit of the stress.
 

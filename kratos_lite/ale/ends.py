@@ -11,7 +11,9 @@ from kratos_lite.ale.motion import Translation
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.elements.surface import surface_mass
 from kratos_lite.errors import ModelError
+from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
+from kratos_lite.voigt import acoustic_tensor
 
 if TYPE_CHECKING:
     from kratos_lite.system import System
@@ -33,7 +35,7 @@ def end_nodes(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
 
 
 def dashpots(mesh: Mesh, motion: Translation, system: System) -> BlockMatrix:
-    """Return the damping of absorbing ends: ρ c_p along the direction and ρ c_s across it, (3a, 3a) in N s/m.
+    """Return the damping of absorbing ends, (3a, 3a) in N s/m; see `impedance`.
 
     Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
     """
@@ -43,7 +45,9 @@ def dashpots(mesh: Mesh, motion: Translation, system: System) -> BlockMatrix:
     keys = rows * pattern.n_nodes + pattern.indices
     local = np.full(mesh.n_nodes, -1)
     local[system.nodes] = np.arange(len(system.nodes))
-    impedance = _impedances(mesh, motion, system)
+    of_element = np.zeros((mesh.n_elements, 3, 3))
+    for batch in system.batches:
+        of_element[batch.rows] = impedance(batch.material, motion.direction)
     for nodes in end_nodes(mesh, motion):
         faces = mesh.faces(nodes)
         if not faces:
@@ -55,22 +59,24 @@ def dashpots(mesh: Mesh, motion: Translation, system: System) -> BlockMatrix:
         for block in faces:
             assert block.shape is not None
             m = surface_mass(block.shape, mesh.points[block.nodes])
-            blocks = m[..., None, None] * impedance[block.ids][:, None, None]
+            blocks = m[..., None, None] * of_element[block.ids][:, None, None]
             cells = local[block.nodes]
             places = np.searchsorted(keys, cells[:, :, None] * pattern.n_nodes + cells[:, None, :])
             np.add.at(data, places, blocks)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
-def _impedances(mesh: Mesh, motion: Translation, system: System) -> Array:
-    """Return ρ c_p n n^T + ρ c_s (1 - n n^T) of the material of each element, (m, 3, 3)."""
-    along = np.outer(motion.direction, motion.direction)
-    out = np.zeros((mesh.n_elements, 3, 3))
-    for batch in system.batches:
-        C, rho = batch.material.C, batch.material.density
-        p, s = np.sqrt(rho * C[0, 0]), np.sqrt(rho * C[3, 3])
-        out[batch.rows] = p * along + s * (np.eye(3) - along)
-    return out
+def impedance(material: LinearMaterial, direction: Array) -> Array:
+    """Return √(ρ Γ) (3, 3) in N s/m³ with the acoustic tensor Γ of plane waves along a unit direction.
+
+    Of an isotropic material it is ρ c_p along the direction and ρ c_s across it.
+
+    >>> from kratos_lite.materials import Isotropic3D
+    >>> impedance(Isotropic3D(E=4.0, nu=0.0, density=1.0), np.array([1.0, 0, 0])).round(9).diagonal().tolist()
+    [2.0, 1.414213562, 1.414213562]
+    """
+    squares, ways = np.linalg.eigh(acoustic_tensor(material.C, direction))
+    return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)
 
 
 def periodic_pairs(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:

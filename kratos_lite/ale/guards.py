@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from kratos_lite.ale.ends import end_nodes, periodic_pairs
 from kratos_lite.ale.matrices import MotionMatrices
 from kratos_lite.ale.motion import Motion, Rotation, Translation
+from kratos_lite.ale.symmetry import leak
 from kratos_lite.elements.kinematic_linear import lame_constants
-from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.errors import ModelError
 from kratos_lite.supports import Link
+from kratos_lite.voigt import acoustic_tensor
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -22,12 +23,10 @@ Array = NDArray[np.float64]
 
 NEAR_CRITICAL = 0.9
 """Share of the critical rate from which a warning is given."""
-UNEVEN = 1e-2
-"""Share of a harmonic of the mass about the axis that is too much."""
 LEAK = 1e-2
 """Share of the velocity that may pass through the boundary before a warning is given."""
-NOT_ROUND = 0.2
-"""Share from which a body is not one of revolution at all."""
+FAR_OFF = 0.2
+"""Share from which a body is not one of revolution, or not straight, at all."""
 
 
 def attach(motion: Motion, model: Model) -> None:
@@ -39,74 +38,46 @@ def attach(motion: Motion, model: Model) -> None:
         The body is not one of revolution about the axis, or the ends cannot be joined.
     """
     if isinstance(motion, Translation):
-        if motion.ends == "periodic":
-            slaves, masters = periodic_pairs(model.mesh, motion)
-            model.supports.link(
-                [
-                    Link(3 * int(a) + axis, (3 * int(b) + axis,), (1.0,), mutual=True)
-                    for a, b in zip(slaves, masters, strict=True)
-                    for axis in range(3)
-                ]
-            )
-        elif motion.ends == "fixed":
-            for nodes in end_nodes(model.mesh, motion):
-                model.supports.fix(nodes, "xyz", 0.0, False)
-        return
-    share = leak(motion, model)
-    if share > NOT_ROUND:
+        _join(motion, model)
+    share = leak(motion, model.mesh)
+    if share > FAR_OFF:
+        what = "one of revolution about" if isinstance(motion, Rotation) else "straight along"
+        cure = "give the axis of the body and a point of it, centre=…"
+        if isinstance(motion, Translation):
+            cure = "give the direction of the body, and cut its ends across it"
         raise ModelError(
-            f"the body is not one of revolution about the axis {motion.direction.tolist()}: {share:.0%} of "
-            "the velocity passes through its boundary; give the axis of the body and a point of it, centre=…"
+            f"the body is not {what} the axis {motion.direction.tolist()}: {share:.0%} of the velocity "
+            f"passes through its boundary; {cure}"
         )
 
 
-def leak(motion: Motion, model: Model) -> float:
-    """Return the largest share of the velocity of the material that passes through the boundary."""
-    normal, largest = 0.0, 0.0
-    for block in model.mesh.boundary:
-        if block.shape is None or not len(block):
-            continue
-        rule = face_rule(block.shape)
-        X = model.mesh.points[block.nodes]
-        n = area_vectors(block.shape, X, rule)
-        n = n / np.linalg.norm(n, axis=-1, keepdims=True)
-        N = np.array([block.shape.N(xi) for xi in rule.points])
-        c = motion.field(N @ X)
-        normal = max(normal, float(np.abs((c * n).sum(axis=-1)).max()))
-        largest = max(largest, float(np.linalg.norm(c, axis=-1).max()))
-    return normal / largest if largest else 0.0
-
-
-def check_density(terms: MotionMatrices) -> None:
-    """Raise ModelError if the mass of a rotating body is not spread evenly about its axis.
-
-    Its first three harmonics Σ m r² e^{i n φ} must vanish beside Σ m r².
-    """
-    motion = terms.motion
-    if not isinstance(motion, Rotation):
-        return
-    c = motion.field(terms.points)
-    first = c[int(np.argmax((c * c).sum(axis=1)))]
-    x = c @ first / np.linalg.norm(first)
-    y = c @ np.cross(motion.direction, first) / np.linalg.norm(first)
-    weights = np.abs(terms.mass.nodal) * (c * c).sum(axis=1)
-    angle = np.arctan2(y, x)
-    shares = [abs((weights * np.exp(1j * n * angle)).sum()) / weights.sum() for n in (1, 2, 3)]
-    if max(shares) > UNEVEN:
-        raise ModelError(
-            "the mass of the body is not spread evenly about its axis (harmonic "
-            f"{int(np.argmax(shares)) + 1} is {max(shares):.1%}): a body that turns through a mesh at rest "
-            "must be one of revolution in shape and density"
+def _join(motion: Translation, model: Model) -> None:
+    """Give a model the constraints of the ends of its window."""
+    if motion.ends == "periodic":
+        slaves, masters = periodic_pairs(model.mesh, motion)
+        model.supports.link(
+            [
+                Link(3 * int(a) + axis, (3 * int(b) + axis,), (1.0,), mutual=True)
+                for a, b in zip(slaves, masters, strict=True)
+                for axis in range(3)
+            ]
         )
+    elif motion.ends == "fixed":
+        for nodes in end_nodes(model.mesh, motion):
+            model.supports.fix(nodes, "xyz", 0.0, False)
 
 
 def wave_speeds(terms: MotionMatrices) -> tuple[float, float, float]:
-    """Return the lowest speeds c_p, c_s and c_R (Rayleigh) of the materials in m/s."""
+    """Return the lowest speeds c_p, c_s and c_R (Rayleigh) of the materials in m/s.
+
+    They are those along a window, and otherwise the lowest along x, y and z.
+    """
     p, s = np.inf, np.inf
     for batch in terms.batches:
-        C, rho = batch.material.C, batch.material.density
-        p = min(p, float(np.sqrt(C[0, 0] / rho)))
-        s = min(s, float(np.sqrt(C[3, 3] / rho)))
+        along = [terms.motion.direction] if isinstance(terms.motion, Translation) else np.eye(3)
+        squares = np.array([np.linalg.eigvalsh(acoustic_tensor(batch.material.C, n)) for n in along])
+        speeds = np.sqrt(squares / batch.material.density)
+        p, s = min(p, float(speeds[:, 2].min())), min(s, float(speeds[:, 0].min()))
     return p, s, rayleigh_speed(p, s)
 
 
@@ -164,13 +135,13 @@ def warnings_of(terms: MotionMatrices | None, model: Model) -> list[str]:
     if terms is None:
         return []
     motion, said = terms.motion, near_waves(terms, 0.0)
+    share = leak(motion, model.mesh)
+    if share > LEAK:
+        where = "through the polygonal rim; take more cells around the axis, or quadratic ones"
+        if isinstance(motion, Translation):
+            where = "through the sides of the window; its sections must be alike"
+        said.append(f"{share:.1%} of the velocity passes {where}")
     if isinstance(motion, Rotation):
-        share = leak(motion, model)
-        if share > LEAK:
-            said.append(
-                f"{share:.1%} of the velocity passes through the polygonal rim; take more cells around the "
-                "axis, or quadratic ones"
-            )
         if any(lame_constants(batch.material.C) is None for batch in terms.batches):
             said.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
         if not motion.stiffening and not _rotation_held(motion, model):

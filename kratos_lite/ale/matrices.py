@@ -35,7 +35,8 @@ def exact_rule(shape: type[Shape]) -> Rule:
 class MotionMatrices:
     """What a motion adds to the equations of elements, for the rates 1; each is made when it is asked for.
 
-    All are data (nnz,) on one pattern.
+    All are data (nnz,) on one pattern.  Loads come from `mass`, which is consistent also where that of the
+    equations is lumped.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite, flag, number
 from kratos_lite.errors import InputError
 from kratos_lite.rotations import hat
-from kratos_lite.series import Factor, function_of
+from kratos_lite.series import Factor, function_of, slope_of
 
 Array = NDArray[np.float64]
 
@@ -38,15 +38,19 @@ class Motion(ABC):
     direction : (3,) unit vector, the axis of a rotation or the way of a window.
     rate, acceleration : functions of the time in s.
     steady : whether they never change.
+    is_accelerated : whether the acceleration was given, and not taken from the rate.
     damping : α in 1/s, mass-proportional damping relative to the rigid motion.
     """
 
     def __init__(
-        self, direction: ArrayLike | str, rate: Factor, acceleration: Factor, damping: float
+        self, direction: ArrayLike | str, rate: Factor, acceleration: Factor | None, damping: float
     ) -> None:
         self.direction = _unit(direction)
         self.rate = function_of(rate, "a rate")
-        self.acceleration = function_of(acceleration, "an acceleration")
+        self.acceleration = (
+            slope_of(rate, "a rate") if acceleration is None else function_of(acceleration, "an acceleration")
+        )
+        self.is_accelerated = acceleration is not None
         self.steady = not (callable(rate) or callable(acceleration))
         self.damping = number(damping, "a damping")
         if self.damping < 0:
@@ -67,7 +71,7 @@ class Rotation(Motion):
     ----------
     axis : ``"x"``, ``"y"``, ``"z"`` or (3,).
     rate : rad/s; number, `TimeSeries` or function of the time.
-    acceleration : rad/s², likewise.
+    acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.
     centre : (3,) m, a point of the axis.
     skew : take the skew part of G, which keeps the energy on every mesh.
     stiffening : add the stiffness that the centrifugal stress gives; a rotor that may turn freely needs it.
@@ -83,7 +87,7 @@ class Rotation(Motion):
         self,
         axis: ArrayLike | str = "z",
         rate: Factor = 0.0,
-        acceleration: Factor = 0.0,
+        acceleration: Factor | None = None,
         *,
         centre: ArrayLike = (0.0, 0.0, 0.0),
         skew: bool = True,
@@ -109,7 +113,7 @@ class Translation(Motion):
     ----------
     direction : ``"x"``, ``"y"``, ``"z"`` or (3,): the way of the window for a positive rate.
     rate : m/s; number, `TimeSeries` or function of the time.
-    acceleration : m/s², likewise.
+    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.
     ends : what the two faces across the direction do: ``absorbing`` lets waves out (Lysmer's dashpots),
         ``periodic`` joins them, ``fixed`` holds them, ``natural`` leaves them to what the model says.
     damping : α in 1/s.
@@ -119,7 +123,7 @@ class Translation(Motion):
         self,
         direction: ArrayLike | str = "x",
         rate: Factor = 0.0,
-        acceleration: Factor = 0.0,
+        acceleration: Factor | None = None,
         *,
         ends: str = "absorbing",
         damping: float = 0.0,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.output import read_arrays, write_arrays
 
 Array = NDArray[np.float64]
 FIELDS = ("kind", "q", "u", "time", "step", "external_work")
@@ -69,20 +68,15 @@ class State:
 
     def save(self, path: str | Path) -> None:
         """Write the state to an .npz file, as a whole or not at all."""
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, **{name: np.asarray(getattr(self, name)) for name in FIELDS})
-        write_whole(path, buffer.getvalue())
+        write_arrays(path, {name: np.asarray(getattr(self, name)) for name in FIELDS})
 
     @classmethod
     def load(cls, path: str | Path) -> State:
         """Read a state; InputError if the file is none."""
+        values = read_arrays(path, FIELDS, "a state that State.save wrote")
         try:
-            with np.load(path, allow_pickle=False) as file:
-                values = {name: file[name] for name in FIELDS}
             kind, step, time = str(values["kind"]), int(values["step"]), float(values["time"])
-        except FileNotFoundError:
-            raise InputError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, TypeError, EOFError):
+        except (ValueError, TypeError):
             raise InputError(f"{path}: not a state that State.save wrote") from None
         return cls(kind, values["q"], values["u"], time, step, values["external_work"])
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from kratos_lite import solvers
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.ends import dashpots
-from kratos_lite.ale.guards import check_density, warnings_of
+from kratos_lite.ale.guards import warnings_of
 from kratos_lite.ale.matrices import exact_rule
+from kratos_lite.ale.symmetry import check_materials
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.blockmatrix import BlockMatrix
@@ -47,6 +48,7 @@ class EquationsOfMotion:
     lumped : whether the mass stands in the nodes.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
     free : whether supports may leave rigid motions free.
+    steady : take a rate that changes as one that stays, unless the motion is given an acceleration.
 
     Attributes
     ----------
@@ -65,9 +67,10 @@ class EquationsOfMotion:
         lumped: bool = False,
         rayleigh: tuple[float, float] = (0.0, 0.0),
         free: bool = True,
+        steady: bool = False,
         progress: Progress | None = None,
     ) -> None:
-        self.model, self.progress = model, progress
+        self.model, self.progress, self._steady = model, progress, steady
         self.rayleigh = _checked_rayleigh(rayleigh)
         batches, part, self.warnings = model.checked(free=free)
         for batch in batches:
@@ -88,16 +91,13 @@ class EquationsOfMotion:
         )
         self._links = links
         placed = self.system.points, self.system.batches, self.system.pattern
-        if model.motion is None:
-            self.mass = Mass(*placed, lumped)
-        else:  # by the rule of G and H: then G u = M (L A X) holds for linear fields u = L X
-            self.mass = Mass(*placed, lumped, lambda element: exact_rule(element.shape))
+        self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
-        if model.motion is not None:
-            self.terms = MotionMatrices(
-                model.motion, self.system.points, self.system.batches, self.system.pattern, self.mass
-            )
-            check_density(self.terms)
+        if model.motion is not None:  # by the rule of G and H: then G u = M (L A X) holds for u = L X
+            exact = Mass(*placed, False, lambda element: exact_rule(element.shape))
+            self.mass = Mass(*placed, True, exact.rule_of) if lumped else exact
+            self.terms = MotionMatrices(model.motion, *placed, exact)
+            check_materials(self.terms)
             self.warnings += warnings_of(self.terms, model)
         self._kept: tuple[Any, Solve] | None = None
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
@@ -136,7 +136,7 @@ class EquationsOfMotion:
         """Return the centrifugal and Euler load (3a,) of the motion at a time."""
         if self.terms is None:
             return np.zeros(self.size)
-        rate, acceleration = self.terms.motion.rate(time), self.terms.motion.acceleration(time)
+        rate, acceleration = self.rates(time)
         total = np.zeros_like(self.system.points)
         if rate:
             total += rate**2 * self.terms.centrifugal
@@ -146,17 +146,35 @@ class EquationsOfMotion:
 
     def prescribed(self, time: float) -> Array:
         """Return the displacements (3a,) at a time where the free ones are 0."""
-        supports = self.model.supports
-        if not self.model.movements:
+        if not self.model.supports.movements:
             return self.system.reduced.c
+        resting, shares = self._moved
+        return resting + sum(value(time) * share for value, share in shares)
+
+    @cached_property
+    def _moved(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
+        """What is prescribed while all that moves is at 0, and the share (3a,) of each that moves, at 1."""
+        supports = self.model.supports
         kept = supports.values.copy()
         try:
-            for rows, axis, value in self.model.movements:
-                supports.values[rows, axis] = value(time)
-            links = resolve(supports, self._used) if supports.links else {}
-            return reduction(supports, self.system.nodes, links).c
+            for one in supports.movements:
+                supports.values[one.rows, one.axis] = 0.0
+            resting, shares = self._held_at(), []
+            for one in supports.movements:
+                supports.values[one.rows, one.axis] = 1.0
+                shares.append((one.course, self._held_at() - resting))
+                supports.values[one.rows, one.axis] = 0.0
+            return resting, shares
         finally:
             supports.values[...] = kept
+
+    def _held_at(self) -> Array:
+        """Return the displacements (3a,) that values of the supports prescribe, 0 where they are free."""
+        supports = self.model.supports
+        links = resolve(supports, self._used, agree=False) if supports.links else {}
+        found = reduction(supports, self.system.nodes, links)
+        found.c[found.free] = 0.0
+        return found.c
 
     @cached_property
     def _used(self) -> NDArray[np.bool_]:
@@ -177,17 +195,16 @@ class EquationsOfMotion:
         if self.terms is None:
             return None
         motion, terms = self.terms.motion, self.terms
-        rate, acceleration = motion.rate(time), motion.acceleration(time)
+        rate, acceleration = self.rates(time)
         out: Array | None = None
         if rate:
             out = -(rate**2) * terms.H
             if self.stiffened:
                 out = out + rate**2 * self.stiffening
-            if motion.damping:
-                out = out + motion.damping * rate * self._convective
-        if acceleration:
-            spin = acceleration * (terms.G if isinstance(motion, Translation) else self._convective)
-            out = spin if out is None else out + spin
+        carried = acceleration + motion.damping * rate
+        if carried:
+            flow = carried * (terms.G if isinstance(motion, Translation) else self._convective)
+            out = flow if out is None else out + flow
         return out
 
     def damping_terms(self, time: float) -> Array | None:
@@ -201,7 +218,7 @@ class EquationsOfMotion:
 
     @property
     def _convective(self) -> Array:
-        """G, or its skew part where that is asked for: a window always takes it, beside its dashpots."""
+        """G, or its skew part where that is asked for: a window takes it for 2 s G u', with its dashpots."""
         assert self.terms is not None
         motion = self.terms.motion
         return self.terms.G if isinstance(motion, Rotation) and not motion.skew else self.terms.S
@@ -312,7 +329,9 @@ class EquationsOfMotion:
         """Return rate and acceleration of the motion at a time."""
         if self.terms is None:
             return 0.0, 0.0
-        return self.terms.motion.rate(time), self.terms.motion.acceleration(time)
+        motion = self.terms.motion
+        stays = self._steady and not motion.is_accelerated
+        return motion.rate(time), 0.0 if stays else motion.acceleration(time)
 
     @property
     def is_held(self) -> bool:

@@ -33,7 +33,7 @@ def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array
 
 def complex_modes(model: Model, count: int) -> tuple[Complexes, Complexes]:
     """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
-    e = EquationsOfMotion(model)
+    e = EquationsOfMotion(model, steady=True)
     M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     n = K.shape[0]
     if whole_number(count, "count") > 2 * n:
@@ -79,7 +79,9 @@ def critical_rate(model: Model, count: int = 1) -> Array:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
     K, H = _critical_pencil(e)
     n = K.shape[0]
-    if n <= DENSE_MODES:
+    if count > n:
+        raise InputError(f"this model has 1 … {n} critical rates; got {count}")
+    if n <= DENSE_MODES or count > n // 4:
         largest = _dense(K, H)[::-1][:count]
     else:
         from scipy.sparse.linalg import LinearOperator, eigsh

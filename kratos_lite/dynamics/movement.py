@@ -18,28 +18,26 @@ Course = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration (3a,)."""
 
 
-def at_start(e: EquationsOfMotion) -> Course:
-    """Return the course at the time 0, by one-sided differences of order 2."""
+def at_start(e: EquationsOfMotion, h: float = np.inf) -> Course:
+    """Return the course at the time 0, by one-sided differences of order 2 over steps no longer than h."""
     g, zero = e.prescribed(0.0), np.zeros(e.size)
-    if not e.model.movements:
+    if not e.model.supports.movements:
         return g, zero, zero
-    h, k = 1e-6, 1e-5
-    velocity = (-3 * g + 4 * e.prescribed(h) - e.prescribed(2 * h)) / (2 * h)
-    later = [e.prescribed(i * k) for i in (1, 2, 3)]
-    return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / k**2
+    short, long = min(h, 1e-6), min(h, 1e-5)
+    velocity = (-3 * g + 4 * e.prescribed(short) - e.prescribed(2 * short)) / (2 * short)
+    later = [e.prescribed(i * long) for i in (1, 2, 3)]
+    return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / long**2
 
 
-def at(e: EquationsOfMotion, time: float, h: float) -> Course:
-    """Return the course at a time, by central differences over steps h."""
-    if time < h / 2:
-        return at_start(e)
+def at_end(e: EquationsOfMotion, time: float, h: float) -> Course:
+    """Return the course at the end of a step, time ≥ h, by central differences over steps h."""
     before, now, after = (e.prescribed(time + k * h) for k in (-1, 0, 1))
     return now, (after - before) / (2 * h), (after - 2 * now + before) / h**2
 
 
-def beyond_newmark(e: EquationsOfMotion, s: Implicit, time: float, h: float) -> tuple[Array, Array]:
+def beyond_newmark(s: Implicit, h: float, start: Course, end: Course) -> tuple[Array, Array]:
     """Return what velocity and acceleration at the end of a step have beyond Newmark's formulas, (3a,)."""
-    (g, v, a), (g_end, v_end, a_end) = at(e, time, h), at(e, time + h, h)
+    (g, v, a), (g_end, v_end, a_end) = start, end
     change = g_end - g
     v_newmark = s.gamma / (s.beta * h) * change + (1 - s.gamma / s.beta) * v
     v_newmark += h * (1 - s.gamma / (2 * s.beta)) * a

@@ -63,6 +63,8 @@ def reaction_resultant(
     >>> print(f"{force[2]:.6f} N, {moment[1]:.6f} N m")
     -2.000000 N, 2.000000 N m
     """
+    if not hasattr(of, "reactions"):
+        raise InputError(f"a Result or a Moment is needed; got {type(of).__name__}")
     if of.reactions.shape != model.mesh.points.shape:
         raise InputError(f"reactions of {len(of.reactions)} nodes; the model has {model.mesh.n_nodes}")
     rows = np.arange(model.mesh.n_nodes) if where is None else model.mesh.nodes(where)

@@ -17,7 +17,7 @@ from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
 from kratos_lite.native import described
 from kratos_lite.result import Report, Result, peak_memory
-from kratos_lite.statics import Phases, judge
+from kratos_lite.statics import Phases, check_arguments, judge
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -29,9 +29,10 @@ def solve_steady(
     model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
 ) -> Result:
     """Solve (K - rate² H + …) u = f of a model with a motion, at the time 0; see `Model.solve`."""
+    check_arguments(solver, tolerance, progress)
     phase = Phases()
     with phase("check"):
-        e = EquationsOfMotion(model, free=False, progress=progress)
+        e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
         warnings = list(e.warnings)
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)

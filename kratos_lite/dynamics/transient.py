@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,16 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.guards import near_critical, near_waves
-from kratos_lite.arguments import finite, flag, positive_step, whole_number
+from kratos_lite.arguments import finite, flag, number, positive_step, whole_number
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates_beside
-from kratos_lite.dynamics.movement import at, at_start, beyond_newmark
+from kratos_lite.dynamics.movement import at_end, at_start, beyond_newmark
 from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.finite_strain import highest_frequency
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.output import read_arrays, write_arrays
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.statics import same_state
 
@@ -31,6 +30,10 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("kratos_lite")
 Array = NDArray[np.float64]
+OFF_SUPPORT = 1e-6
+"""Share of the largest displacement by which a moment may miss its supports."""
+OFF_BALANCE = 1e-4
+"""Share of the largest force by which the accelerations of a moment may miss the balance."""
 FIELDS = ("u", "v", "a", "time", "step")
 
 
@@ -54,26 +57,26 @@ class Moment:
 
     def save(self, path: str | Path) -> None:
         """Write what a march needs to go on to an .npz file, as a whole or not at all."""
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, **{name: np.asarray(getattr(self, name)) for name in FIELDS})
-        write_whole(path, buffer.getvalue())
+        write_arrays(path, {name: np.asarray(getattr(self, name)) for name in FIELDS})
 
     @classmethod
     def load(cls, path: str | Path) -> Moment:
         """Read a moment; InputError if the file holds none."""
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                u, v, a, time, step = (file[name] for name in FIELDS)
-        except FileNotFoundError:
-            raise InputError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, TypeError, EOFError):
-            raise InputError(f"{path}: not a moment that Moment.save wrote, or not all of it") from None
-        return cls(float(time), int(step), u, v, a, np.zeros_like(u))
+        u, v, a, time, step = read_arrays(path, FIELDS, "a moment that Moment.save wrote").values()
+        if time.shape or step.shape:
+            raise InputError(f"{path}: a series of moments, not one that Moment.save wrote")
+        return cls(time.item(), step.item(), u, v, a, np.zeros(u.shape))
 
 
 def model_state(model: Model) -> list[Any]:
     """Return what must stay as it is while a transient of a model marches."""
-    return [*model.state(), tuple(map(id, model.loads)), id(model.motion), len(model.movements)]
+    supports = model.supports
+    values = supports.values[supports.fixed].copy()
+    return [*model.state(), values, tuple(map(id, model.loads)), id(model.motion), tuple(supports.movements)]
+
+
+def _is_trapezoidal(scheme: Implicit | CentralDifference) -> bool:
+    return isinstance(scheme, Implicit) and replace(scheme, name="") == Implicit("", 0.25, 0.5)
 
 
 class Transient:
@@ -83,7 +86,8 @@ class Transient:
     ----------
     model : elements with density, supports, loads, and its motion if it has one.
     scheme : `newmark()`, `hht()`, `generalised_alpha()` or `CentralDifference()`.
-    displacement, velocity : (n, 3) at the time 0; at rest if not given.
+    displacement, velocity : (n, 3) at the time 0; at rest if not given, and as the supports say where they
+        hold.
     lumped : whether the mass stands in the nodes; central differences always lump it.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
 
@@ -115,6 +119,8 @@ class Transient:
         rayleigh: tuple[float, float] = (0.0, 0.0),
         progress: Progress | None = None,
     ) -> None:
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
         self.scheme = newmark() if scheme is None else scheme
         if not isinstance(self.scheme, (Implicit, CentralDifference)):
             raise InputError(f"a scheme such as newmark() or CentralDifference() is needed; got {scheme!r}")
@@ -133,12 +139,17 @@ class Transient:
         self._state = model_state(model)
         self._near: list[str] = []
         self.time, self.step = 0.0, 0
-        self.u, self.v = self._given(displacement, "displacement"), self._given(velocity, "velocity")
+        self.u = self._given(displacement, "the initial displacement")
+        self.v = self._given(velocity, "the initial velocity")
         self._held = np.ones(self.equations.size, dtype=bool)
         self._held[self.equations.system.reduced.free] = False
-        start, speed, more = at_start(self.equations)
-        self.u, self.v = self._allowed(self.u, start), self._allowed(self.v, speed)
-        self.a = self._initial_acceleration(more)
+        self._untouched = True
+        self._start(*at_start(self.equations))
+
+    def _start(self, u: Array, v: Array, a: Array) -> None:
+        """Take over what is prescribed at the start, and find the first acceleration."""
+        self.u, self.v = self._allowed(self.u, u), self._allowed(self.v, v)
+        self.a = self._balanced(a)
 
     def _allowed(self, x: Array, prescribed: Array) -> Array:
         """Return vectors (3a,) whose held components follow from supports and constraints."""
@@ -147,20 +158,26 @@ class Transient:
             return np.asarray(reduced.T @ x[reduced.free] + prescribed)
         return np.where(self._held, prescribed, x)
 
+    def _prescribed_part(self, x: Array) -> Array:
+        """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
+        reduced = self.equations.system.reduced
+        return np.where(self._held, x, 0.0) if reduced.T is None else x - reduced.T @ x[reduced.free]
+
     def _given(self, values: ArrayLike | None, what: str) -> Array:
-        n = self.equations.system.n_nodes
-        if values is None:
-            return np.zeros(self.equations.size)
-        given = finite(values, f"the initial {what}")
+        return np.zeros(self.equations.size) if values is None else self._nodal(values, what)
+
+    def _nodal(self, values: ArrayLike, what: str) -> Array:
+        """Return nodal vectors (n, 3) as (3a,)."""
+        given, n = finite(values, what), self.equations.system.n_nodes
         if given.shape != (n, 3):
-            raise InputError(f"the initial {what} needs shape ({n}, 3); got {given.shape}")
+            raise InputError(f"{what} needs shape ({n}, 3); got {given.shape}")
         return self.equations.system.local(given).copy()
 
-    def _initial_acceleration(self, prescribed: Array) -> Array:
+    def _balanced(self, prescribed: Array) -> Array:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
-        e = self.equations
-        force = e.load(0.0) - e.times_damping(self.v, 0.0) - e.times_stiffness(self.u, 0.0)
-        return e.solver(0.0, 1.0, 0.0, 0.0)(force, prescribed)
+        e, time = self.equations, self.time
+        force = e.load(time) - e.times_damping(self.v, time) - e.times_stiffness(self.u, time)
+        return e.solver(time, 1.0, 0.0, 0.0)(force, prescribed)
 
     # ---- marching --------------------------------------------------------------------------------
 
@@ -188,12 +205,17 @@ class Transient:
         SolveError
             The matrix of a step is singular, or the motion is no longer finite.
         """
+        if until is not None and not callable(until):
+            raise InputError(f"until must be a function of a moment; got {until!r}")
         h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
         if not same_state(self._state, model_state(self.equations.model)):
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
         advance = self._explicit if isinstance(self.scheme, CentralDifference) else self._implicit
         if isinstance(self.scheme, CentralDifference):
             self._check_stable(h)
+        if self._untouched and self.equations.model.supports.movements:
+            self._start(*at_start(self.equations, h))
+        self._untouched = False
         return self._moments(advance, h, steps, every, until)
 
     def _moments(
@@ -239,14 +261,17 @@ class Transient:
         a_old = self.v / (s.beta * h) + (1 / (2 * s.beta) - 1) * self.a  # minus a⁺ for Δu = 0
         v_new = (1 - s.gamma / s.beta) * self.v + h * (1 - s.gamma / (2 * s.beta)) * self.a
         start, more_a = self.time, np.zeros_like(self.a)
-        if e.model.movements:
-            more_v, more_a = beyond_newmark(e, s, start, h)
+        if e.model.supports.movements:
+            part = self._prescribed_part
+            more_v, more_a = beyond_newmark(
+                s, h, (part(self.u), part(self.v), part(self.a)), at_end(e, end, h)
+            )
             v_new, a_old = v_new + more_v, a_old - more_a
         middle = self.time + f * h
         force = e.load(middle)
         force = force - e.times_stiffness(self.u, middle)
         force -= e.times_damping(f * v_new + s.alpha_f * self.v, middle)
-        if s.alpha_m or s.alpha_f or (s.beta, s.gamma) != (0.25, 0.5):
+        if not _is_trapezoidal(s):
             force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * self.a)
         else:  # M a is known from the balance at the start; so no rounding is handed on from step to step
             force += e.times_mass(4 / h * self.v - more_a) + e.load(start)
@@ -271,7 +296,7 @@ class Transient:
         e, held = self.equations, self._held
         half = self.v + h / 2 * self.a
         u = self.u + h * half
-        given = at(e, self.time + h, h)
+        given = at_end(e, self.time + h, h)
         u[held] = given[0][held]
         force = e.load(self.time + h) - e.times_damping(half, self.time) - e.times_stiffness(u, self.time)
         a = e.mass.solve(force)
@@ -301,18 +326,40 @@ class Transient:
         return Moment(self.time, self.step, u, v, a, self.reactions())
 
     def put(self, moment: Moment) -> None:
-        """Go on from a moment, such as `Moment.load` gives."""
-        n = self.equations.system.n_nodes
+        """Go on from a moment, such as `Moment.load` gives, of this model or of one that was held otherwise.
+
+        Raises
+        ------
+        InputError
+            It is no moment, has another size, or does not lie where the supports hold the model at its time.
+        """
         if not isinstance(moment, Moment):
             raise InputError(f"a Moment is needed, such as Moment.load gives; got {type(moment).__name__}")
-        for name in ("u", "v", "a"):
-            if np.shape(getattr(moment, name)) != (n, 3):
-                raise InputError(
-                    f"{name} of this moment has shape {np.shape(getattr(moment, name))}, not ({n}, 3)"
-                )
-        local = self.equations.system.local
-        self.u, self.v, self.a = (local(x).copy() for x in (moment.u, moment.v, moment.a))
-        self.time, self.step = moment.time, moment.step
+        u, v, a = (self._nodal(getattr(moment, name), f"{name} of a moment") for name in "uva")
+        time, step = number(moment.time, "the time of a moment"), moment.step
+        if time < 0 or isinstance(step, bool) or not isinstance(step, (int, np.integer)) or step < 0:
+            raise InputError(f"a moment has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
+        off = np.abs(self._prescribed_part(u) - self.equations.prescribed(time)).reshape(-1, 3)
+        node, axis = np.unravel_index(int(off.argmax()), off.shape)
+        if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
+            name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
+            raise InputError(
+                f"this moment does not fit the supports: at t = {time:g} s {name} is off by "
+                f"{off[node, axis]:g} m from where it is held"
+            )
+        self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
+        self._untouched = not step
+        if _is_trapezoidal(self.scheme) and self._imbalance() > OFF_BALANCE:
+            self.a = self._balanced(self._prescribed_part(a))
+
+    def _imbalance(self) -> float:
+        """Return the largest free component of M a + C v + K u - f as a share of the largest of its terms."""
+        e, time = self.equations, self.time
+        terms = [e.times_mass(self.a), e.times_damping(self.v, time), e.times_stiffness(self.u, time)]
+        terms.append(-e.load(time))
+        largest = max(float(np.abs(term).max(initial=0.0)) for term in terms)
+        left = np.abs(e.system.reduced.reduce(np.sum(terms, axis=0))).max(initial=0.0)
+        return float(left) / largest if largest else 0.0
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.output import write_arrays, write_whole
 from kratos_lite.io.vtu import check_mode, write_pvd, write_vtu
 
 if TYPE_CHECKING:
@@ -103,9 +102,7 @@ class Arrays(Writer):
     def write(self) -> None:
         """Write the arrays."""
         arrays = {name: np.array([getattr(state, name) for state in self.states]) for name in self.names}
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, **self.extra(), **arrays)
-        write_whole(self.path, buffer.getvalue())
+        write_arrays(self.path, {**self.extra(), **arrays})
 
 
 class MomentFrames(Frames):

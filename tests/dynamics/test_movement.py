@@ -52,6 +52,80 @@ def test_a_kink_gives_its_whole_impulse():
     assert errors[0] / errors[1] > 3
 
 
+@pytest.mark.parametrize("scheme", SCHEMES[:3], ids=lambda s: s.name)
+@pytest.mark.parametrize("steps", [(2e-3, 1e-3), (1e-3, 1e-4), (1e-5, 1e-3)])
+def test_another_step_does_not_make_reactions_ring(scheme, steps):
+    transient = carried(lambda t: 1e-2 * np.sin(30 * t)).transient(scheme=scheme)
+    for h in steps:
+        for moment in transient.march(h, 100):
+            exact = -9.0 * RHO * np.sin(30 * moment.time)
+            assert moment.reactions[:, 2].sum() == pytest.approx(exact, abs=4e-4 * 9.0 * RHO)
+
+
+@pytest.mark.parametrize("hertz", [1e3, 1e5, 1e6])
+def test_supports_may_move_fast(hertz):
+    """A cell on a base that starts with V: u of one free cell against its closed form."""
+    model, way = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO)), 1e-9
+    model.fix(everywhere, "xy")
+    model.fix("z-", "z", lambda t: way * np.sin(2 * np.pi * hertz * t))
+    h, turn, omega2 = 1 / (200 * hertz), 2 * np.pi * hertz, 3 * E / RHO
+    *_, end = model.transient().march(h, 190, every=190)
+    # u'' + ω² u = ω² g - g'' / 2, of the consistent mass, from rest
+    ratio = (omega2 + turn**2 / 2) / (omega2 - turn**2)
+    omega, t = np.sqrt(omega2), end.time
+    exact = way * ratio * (np.sin(turn * t) - turn / omega * np.sin(omega * t))
+    top = end.u[model.mesh.nodes("z+"), 2]
+    assert top == pytest.approx(exact, abs=1e-3 * way)
+
+
+def test_supports_that_come_to_be_equal():
+    """Nothing jumps when the two ends of a bar are, for once, displaced alike."""
+    ends = []
+    for apart in (0.0, 1e-9):
+        model = kl.Model(kl.box((1, 1, 4), (1, 1, 4)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+        model.fix(everywhere, "xy")
+        model.fix("z-", "z", TimeSeries([0.0, 0.2, 1.0], [0.0, 1e-3, 1e-3]))
+        model.fix("z+", "z", TimeSeries([0.0, 0.2, 1.0], [0.0, 1e-3 + apart, 1e-3 + apart]))
+        ends.append(np.array([moment.u[:, 2] for moment in model.transient().march(2e-3, 200)]))
+    assert np.abs(ends[0] - ends[1]).max() < 2e-9
+
+
+def test_a_support_moves_by_one_function():
+    def way(t):
+        return 1e-3 * np.sin(30 * t)
+
+    twice = "prescribed twice: by a function of the time and otherwise"
+    for second in (0.0, lambda t: 0.0, 1e-3):
+        model = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+        model.fix("z-", "xyz", way)
+        with pytest.raises(kl.ModelError, match="prescribed twice"):
+            model.fix("x-", "z", second)
+        model.fix("x-", "xyz", way)  # the same function, on a common edge
+        model.fix("z-", "z", 0.0, override=True)
+        *_, end = model.transient().march(1e-3, 20, every=20)
+        bottom, side = model.mesh.nodes("z-"), model.mesh.nodes("x-")
+        assert not end.u[bottom, 2].any()
+        np.testing.assert_allclose(end.u[bottom, 0], way(end.time), rtol=1e-12)
+        np.testing.assert_allclose(end.u[np.setdiff1d(side, bottom), 2], way(end.time), rtol=1e-12)
+    held = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    held.fix("z-", "xyz")
+    with pytest.raises(kl.ModelError, match=twice):
+        held.fix("z-", "x", way)
+    held.fix("z-", "x", way, override=True)
+
+
+@pytest.mark.parametrize(
+    "value", [lambda t: None, lambda t: "far", lambda t: [0.0, 1.0], lambda t: 1j, np.log]
+)
+def test_nonsense_of_a_moving_support_is_told(value):
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    with (
+        np.errstate(divide="ignore"),
+        pytest.raises(kl.InputError, match="a prescribed displacement at t = 0 s"),
+    ):
+        model.fix("z-", "z", value)
+
+
 def test_what_is_tied_to_a_support_moves_with_it():
     """A top tied to its moving base is the same body carried as a whole."""
     model = kl.Model(kl.box((1, 1, 1), (1, 1, 2)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))

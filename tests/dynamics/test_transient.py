@@ -417,5 +417,5 @@ def test_files_that_are_no_moments(tmp_path):
     with pytest.raises(InputError, match=r"not a moment that Moment\.save wrote"):
         Moment.load(tmp_path / "text.npz")
     other = bar(2).transient().moment()
-    with pytest.raises(InputError, match="u of this moment has shape"):
+    with pytest.raises(InputError, match="u of a moment needs shape"):
         bar(4).transient().put(other)

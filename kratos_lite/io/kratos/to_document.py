@@ -33,7 +33,7 @@ def document_from(model: Model) -> Document:
         "a prestress": model.prestress is not None,
         "an initial displacement": model.initial_displacement is not None,
         "a motion of the material": model.motion is not None,
-        "a support that moves in time": bool(model.movements),
+        "a support that moves in time": bool(model.supports.movements),
         "a load that changes in time": any(isinstance(load, Varying) for load in model.loads),
     }
     for what, given in unwritten.items():

@@ -18,12 +18,13 @@ KEYS = {
 }
 
 
-def add_motion(model: Model, settings: Settings) -> None:
+def add_motion(model: Model, settings: Settings, time: float | None = None) -> None:
     """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
 
     It is ``{"rotation": {"axis", "rate", "acceleration", "centre", "skew", "stiffening", "damping"}}`` or
     ``{"translation": {"direction", "rate", "acceleration", "ends", "damping"}}`` with the arguments of
-    `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.
+    `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.  Given a
+    `time` in s, they stay what they are then.
 
     Raises
     ------
@@ -39,7 +40,12 @@ def add_motion(model: Model, settings: Settings) -> None:
     (kind,) = section.values
     inner = section.section(kind)
     try:
-        model.add(read_motion(inner, kind))
+        motion = read_motion(inner, kind)
+        if time is not None:
+            rate = motion.rate(time)
+            acceleration = motion.acceleration(time) if motion.is_accelerated else 0.0
+            motion.rate, motion.acceleration = (lambda _: rate), (lambda _: acceleration)
+        model.add(motion)
     except InputError:
         raise
     except KratosLiteError as error:

@@ -59,7 +59,7 @@ def read_kratos_project(
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
     notes = _check_solver(solver) + _check_root(settings)
-    notes.append(f"{len(times) - 1} time step(s): supports and loads are those at t = {times[-1]:g} s")
+    notes.append(f"{len(times) - 1} time step(s): supports, loads, motion are those at t = {times[-1]:g} s")
     document = _read_mesh(solver, folder, allow_outside, notes)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     case = Case(document.mesh, root, folder, times, moved, allow_outside)
@@ -72,7 +72,7 @@ def read_kratos_project(
     )
     for number, material in (materials or {}).items():
         model.assign(material, number)
-    add_motion(model, settings)
+    add_motion(model, settings, times[-1])
     model.notes += notes
     return model, checks
 
