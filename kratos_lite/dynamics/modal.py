@@ -71,12 +71,17 @@ def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Comple
 def critical_rate(model: Model, count: int = 1) -> Array:
     """Return the lowest rates (count,) at which K - rate² H is singular, in rad/s or m/s.
 
-    They are those of the mesh; `critical_rate_estimate` is the limit of ever finer ones.
+    They are those of the mesh, and fall with ever finer ones.
     """
     count = whole_number(count, "count")
     e = EquationsOfMotion(model, free=False)
     if e.terms is None:
         raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
+    return critical_rates(e, count)
+
+
+def critical_rates(e: EquationsOfMotion, count: int) -> Array:
+    """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
     K, H = _critical_pencil(e)
     n = K.shape[0]
     if count > n:
@@ -95,14 +100,14 @@ def critical_rate(model: Model, count: int = 1) -> Array:
 
 
 def critical_rates_beside(
-    e: EquationsOfMotion, factors: direct.Factorisation | None = None
+    e: EquationsOfMotion, rate: float, factors: direct.Factorisation | None = None
 ) -> tuple[float, float]:
-    """Return the critical rates next below and next above the rate at the time 0, to some 1 %.
+    """Return the critical rates of the mesh next below and next above a rate > 0, to some 1 %.
 
     They are 0 and infinite where there is none.  `factors` are those of K - rate² H, if they are known: some
     twenty solutions with them are enough.
     """
-    square, (K, H) = e.rates(0.0)[0] ** 2, _critical_pencil(e)
+    square, (K, H) = rate**2, _critical_pencil(e)
     if K.shape[0] <= FEW:
         with np.errstate(divide="ignore"):
             squares = 1 / _dense(K, H)

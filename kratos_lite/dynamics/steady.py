@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import solvers
-from kratos_lite.ale.guards import near_critical
+from kratos_lite.ale.guards import critical_rate_estimate, near_critical
 from kratos_lite.assembly import Progress
 from kratos_lite.checks import equilibrium
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
@@ -57,9 +57,12 @@ def solve_steady(
         balance = equilibrium(model.mesh.points, nodal - inner, reactions)
         judge(solution, u, balance)
         beside = None
-        if e.terms is not None and e.rates(0.0)[0] and solution.method == "direct":
-            beside = critical_rates_beside(e, equations.factors if symmetric else None)
-            warnings += near_critical(e.terms.motion, *beside)
+        rate, terms = e.rates(0.0)[0], e.terms
+        if terms is not None and rate:
+            if solution.method == "direct":
+                beside = critical_rates_beside(e, rate, equations.factors if symmetric else None)
+            limit = (beside[0] or beside[1]) if beside else critical_rate_estimate(terms)
+            warnings += near_critical(terms.motion, 0.0, limit, beside is not None)
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=nodal.sum(axis=0),

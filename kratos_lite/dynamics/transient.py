@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.ale.guards import near_critical, near_waves
+from kratos_lite.ale.guards import critical_rate_estimate, near_critical
 from kratos_lite.arguments import finite, flag, number, positive_step, whole_number
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
-from kratos_lite.dynamics.modal import critical_rates_beside
+from kratos_lite.dynamics.modal import critical_rates
 from kratos_lite.dynamics.movement import at_end, at_start, beyond_newmark
 from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
@@ -133,11 +133,9 @@ class Transient:
             raise ModelError("central differences do not take a motion of the material; use newmark()")
         if explicit and model.supports.links:
             raise ModelError("central differences do not take constraints; use newmark()")
-        e = self.equations
-        if e.terms is not None and e.rates(0.0)[0] and len(e.system.reduced.free) <= DIRECT_MAX and e.is_held:
-            e.warnings += near_critical(e.terms.motion, *critical_rates_beside(e))
         self._state = model_state(model)
-        self._near: list[str] = []
+        self._limit, self._of_mesh = self._critical_rate()
+        self._watch_rate(0.0)
         self.time, self.step = 0.0, 0
         self.u = self._given(displacement, "the initial displacement")
         self.v = self._given(velocity, "the initial velocity")
@@ -243,15 +241,25 @@ class Transient:
             if until and until(moment):
                 return
 
-    def _watch_rate(self, time: float) -> None:
-        """Note it when a rate that changes comes near the critical one, once."""
+    def _critical_rate(self) -> tuple[float, bool]:
+        """Return the lowest critical rate, and whether it is that of the mesh; infinite without a motion."""
         e = self.equations
-        if e.terms is None or e.terms.motion.steady or self._near:
+        if e.terms is None or (e.terms.motion.steady and not e.rates(0.0)[0]):
+            return np.inf, False
+        if len(e.system.reduced.free) <= DIRECT_MAX and e.is_held:
+            return float(critical_rates(e, 1)[0]), True
+        return critical_rate_estimate(e.terms), False
+
+    def _watch_rate(self, time: float) -> None:
+        """Warn once, when the rate comes near the critical one."""
+        e = self.equations
+        if self._limit == np.inf or e.terms is None:
             return
-        self._near = near_waves(e.terms, time)
-        for text in self._near:
-            e.warnings.append(f"at t = {time:g} s {text}")
-            _log.warning("%s", e.warnings[-1])
+        for text in near_critical(e.terms.motion, time, self._limit, self._of_mesh):
+            self._limit = np.inf
+            e.warnings.append(f"at t = {time:g} s {text}" if time else text)
+            if time:
+                _log.warning("%s", e.warnings[-1])
 
     def _implicit(self, h: float) -> None:
         """Take a step of the generalised-α method, for the increment of the displacement."""
