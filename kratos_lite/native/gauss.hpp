@@ -23,13 +23,13 @@ struct Gauss {
     const double* C;          // (6, 6)
     const double* prestress;  // (m, 6) or null
     const double* to_nodes;   // (k, g) extrapolation
-    double* space;            // of `lanes()` vectors
+    double* space;            // of `vectors()` vectors
     double* out;              // result of the kernel, a row for each element from `origin`
     double* second;           // second result, rows of all elements, or null
     int64_t origin, first, last;
 
     // Vectors of working space: coordinates, displacements, prestress, stresses, nodal values.
-    int64_t lanes() const { return 12 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
+    int64_t vectors() const { return 12 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
 };
 
 // Rows (k, 3) of a nodal field in lanes; spare lanes repeat the last element.

@@ -28,12 +28,8 @@ struct Inertia : Gauss {
     bool flows() const { return G || H; }
 };
 
-// V elements from `first` on, and the places of their node pairs.
-struct InertiaTask {
+struct InertiaTask : Group {  // with inertia_size() numbers of work
     const Inertia& w;
-    int64_t first;
-    double* work;          // inertia_size() numbers
-    const int32_t* place;  // (V, k, k)
 };
 
 // Numbers that one task needs: coordinates, velocities, volumes, c·grad N, and weighted rows of a tile.

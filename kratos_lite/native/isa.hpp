@@ -10,8 +10,10 @@
 // The width follows the instruction set: eight doubles at once would spill on AVX2.
 
 #pragma once
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <vector>
 
 #define KL_INLINE inline __attribute__((always_inline))
 
@@ -47,6 +49,9 @@ inline const char* isa_name() {
     return isa() == Isa::avx512 ? "AVX-512" : isa() == Isa::avx2 ? "AVX2" : "baseline";
 }
 
+// Doubles in one vector.
+inline int lanes() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 2; }
+
 // GCC's vector extension: element-wise + - * / on V numbers.
 template <class T, int V>
 struct vec_of {
@@ -54,6 +59,18 @@ struct vec_of {
 };
 template <class T, int V>
 using vec = typename vec_of<T, V>::type;
+
+// Room for some numbers, from an address that suits vectors.
+class Space {
+public:
+    explicit Space(int64_t size) : numbers(size + 8) {}
+    double* data() {
+        return reinterpret_cast<double*>((reinterpret_cast<uintptr_t>(numbers.data()) + 63) / 64 * 64);
+    }
+
+private:
+    std::vector<double> numbers;
+};
 
 #if defined(__x86_64__)
 #define KL_DISPATCH(name, body, T, ...)                                                            \

@@ -197,14 +197,9 @@ KL_DISPATCH(totals_some, totals_body, double, const Displaced&)
 
 // ---- stiffness -------------------------------------------------------------------------------------
 
-// V elements from `first` on, and the places of their node pairs.
-struct TangentTask {
+struct TangentTask : Group {  // with tangent_size() numbers of work
     const Displaced& w;
-    int64_t first;
     double* data;
-    double* work;          // tangent_size() numbers
-    const int32_t* place;  // (V, k, k)
-    int64_t ahead;         // from there to the places of the next group
 };
 
 // Numbers that one task needs: what it gathers, the gradients and motions, and Z of one node.

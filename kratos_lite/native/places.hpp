@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "isa.hpp"
 #include "pattern.hpp"
 #include "threads.hpp"
 
@@ -120,5 +121,39 @@ private:
     int64_t share;
     std::vector<int32_t> first, column, next, touched, place;
 };
+
+constexpr int64_t BLOCK_PAIRS = 4096;  // node pairs whose places are looked up together
+
+// V elements from `first` on, and the places of their node pairs.
+struct Group {
+    int64_t first;
+    const int32_t* place;  // (V, k, k), -1 where nothing is to be added
+    int64_t ahead;         // from there to the places of the next group
+    double* work;
+};
+
+// f(group) for all elements, V at a time, by all threads; each has `work` numbers of room.
+template <class F>
+void for_groups(const Connectivity& mesh, const Graph& graph, int V, int64_t work, const F& f) {
+    if (!mesh.count) return;
+    const Shares shares(graph.rows, mesh, V, wanted_threads());
+    const int64_t pairs = static_cast<int64_t>(V) * mesh.k * mesh.k;  // of a group
+    const int64_t block = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
+    parallel(static_cast<int64_t>(shares.size()), [&](int64_t share) {
+        Places places(graph, mesh, shares, share, block * V);
+        Space space(work);
+        std::vector<int64_t> elements(block * V);
+        const auto& groups = shares.groups(share);
+        const int64_t total = static_cast<int64_t>(groups.size());
+        for (int64_t from = 0; from < total; from += block) {
+            const int64_t count = std::min(block, total - from);
+            for (int64_t i = 0; i < count * V; ++i)
+                elements[i] = static_cast<int64_t>(groups[from + i / V]) * V + i % V;
+            const int32_t* place = places.find(elements.data(), count * V);
+            for (int64_t i = 0; i < count; ++i, place += pairs)
+                f(Group{elements[i * V], place, i + 1 < count ? pairs : 0, space.data()});
+        }
+    });
+}
 
 }  // namespace kl

@@ -20,11 +20,6 @@ kl::Connectivity connectivity(const Array<int32_t>& nodes) {
     return {nodes.data(), nodes.shape(0), static_cast<int>(nodes.shape(1))};
 }
 
-void check(const kl::Connectivity& mesh, int64_t rows) {
-    for (int64_t i = 0; i < mesh.count * mesh.k; ++i)
-        require(static_cast<uint32_t>(mesh.nodes[i]) < rows, "nodes must be rows of the matrix");
-}
-
 py::tuple pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& arrays) {
     std::vector<kl::Connectivity> groups;
     for (const auto& nodes : arrays) groups.push_back(connectivity(nodes));
@@ -69,7 +64,7 @@ kl::Moduli moduli(const Array<double>& C) {
         m.mu = C.data()[1];
         return m;
     }
-    require(C.ndim() == 2 && C.shape(0) == 6 && C.shape(1) == 6, "C must be (6, 6), or lambda and mu");
+    require(kl::has_shape(C, 6, 6), "C must be (6, 6), or lambda and mu");
     const int voigt[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
@@ -88,12 +83,12 @@ int64_t add_stiffness(Array<double> points, Array<int32_t> nodes, Array<double> 
     require(points.ndim() == 2 && points.shape(1) == 3 && points.shape(0) == rows, "points must be (n, 3)");
     require(mesh.k == t.k, "nodes and dN must have the same number of nodes");
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
+    require(kl::are_rows(nodes, rows), "nodes must be rows of the matrix");
     const kl::Graph graph{rows, indptr.data(), indices.data()};
     const double* from = points.data();
     double* to = data.mutable_data();
     py::gil_scoped_release release;
-    check(mesh, rows);
-    return mesh.count ? kl::add_stiffness(t, m, mesh, from, graph, to) : 0;
+    return kl::add_stiffness(t, m, mesh, from, graph, to);
 }
 
 void add_matrices(Array<int32_t> nodes, Array<double> matrices, Array<int32_t> indptr, Array<int32_t> indices,
@@ -104,10 +99,10 @@ void add_matrices(Array<int32_t> nodes, Array<double> matrices, Array<int32_t> i
     require(data.size() == each * indices.size(), "data must be (nnz, 3, 3) or (nnz,)");
     require(matrices.size() == each * mesh.count * mesh.k * mesh.k,
             "matrices must be (m, k, k, 3, 3) or (m, k, k)");
+    require(kl::are_rows(nodes, graph.rows), "nodes must be rows of the matrix");
     const double* from = matrices.data();
     double* to = data.mutable_data();
     py::gil_scoped_release release;
-    check(mesh, graph.rows);
     each == 9 ? kl::add_matrices<3>(mesh, from, graph, to) : kl::add_matrices<1>(mesh, from, graph, to);
 }
 

@@ -38,17 +38,13 @@ struct Tables {
     }
 };
 
-struct Task {
+struct Task : Group {  // with work_size() numbers of work
     const Tables& tables;
     const Moduli& moduli;
     const Connectivity& mesh;
     const double* points;
     double* data;
-    double* work;             // room for work_size() numbers
-    const int64_t* elements;  // of this group
-    const int32_t* place;     // (V, k, k) of this group
-    int64_t ahead;            // from there to the places of the next group
-    bool affine;              // out: whether J was constant
+    bool affine;  // out: whether J was constant
 };
 
 // Numbers that one task needs: coordinates, J, weights, D and one weighted row of D, V of each.
@@ -146,7 +142,7 @@ KL_INLINE void add_pair(const Task& t, int k, int a, int b, const vec<double, V>
 template <int V>
 KL_INLINE void gather(const Task& t, int k, vec<double, V>* X) {
     for (int l = 0; l < V; ++l) {
-        const int64_t e = t.elements[l] < t.mesh.count ? t.elements[l] : t.mesh.count - 1;
+        const int64_t e = std::min(t.first + l, t.mesh.count - 1);
         for (int a = 0; a < k; ++a)
             for (int i = 0; i < 3; ++i)
                 X[3 * a + i][l] = t.points[3 * static_cast<int64_t>(t.mesh.nodes[e * k + a]) + i];
@@ -271,37 +267,15 @@ KL_INLINE void any_group(Task& t) {
 }
 KL_DISPATCH(add_group, any_group, double, Task&)
 
-inline int lanes() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 2; }
-
-constexpr int64_t BLOCK_PAIRS = 4096;  // node pairs whose places are looked up together
-
 // Add the stiffness of all elements to data (nnz, 3, 3); return how many groups had constant J.
 inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const Connectivity& mesh,
                              const double* points, const Graph& graph, double* data) {
-    const int V = lanes();
-    const Shares shares(graph.rows, mesh, V, wanted_threads());
-    const int64_t pairs = static_cast<int64_t>(V) * mesh.k * mesh.k;  // of a group
-    const int64_t block = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
     std::atomic<int64_t> affine{0};
-    parallel(static_cast<int64_t>(shares.size()), [&](int64_t share) {
-        Places places(graph, mesh, shares, share, block * V);
-        std::vector<double> work(work_size(tables, V) + 8);
-        auto* aligned = reinterpret_cast<double*>((reinterpret_cast<uintptr_t>(work.data()) + 63) / 64 * 64);
-        std::vector<int64_t> elements(block * V);
-        const auto& groups = shares.groups(share);
-        const int64_t total = static_cast<int64_t>(groups.size());
-        for (int64_t from = 0; from < total; from += block) {
-            const int64_t count = std::min(block, total - from);
-            for (int64_t i = 0; i < count * V; ++i)
-                elements[i] = static_cast<int64_t>(groups[from + i / V]) * V + i % V;
-            const int32_t* place = places.find(elements.data(), count * V);
-            for (int64_t i = 0; i < count; ++i) {
-                Task task{tables, moduli, mesh, points, data, aligned, &elements[i * V], place + i * pairs,
-                          i + 1 < count ? pairs : 0, false};
-                add_group(task);
-                affine += task.affine;
-            }
-        }
+    const int V = lanes();
+    for_groups(mesh, graph, V, work_size(tables, V), [&](const Group& group) {
+        Task task{group, tables, moduli, mesh, points, data, false};
+        add_group(task);
+        affine += task.affine;
     });
     return affine;
 }
@@ -309,18 +283,14 @@ inline int64_t add_stiffness(const Tables& tables, const Moduli& moduli, const C
 // Add given element matrices, R x R blocks (count, k, k, R, R), to data (nnz, R, R).
 template <int R>
 void add_matrices(const Connectivity& mesh, const double* blocks, const Graph& graph, double* data) {
-    const Shares one(graph.rows, mesh, 1, 1);
     const int64_t pairs = static_cast<int64_t>(mesh.k) * mesh.k;
-    const int64_t most = std::max<int64_t>(8, BLOCK_PAIRS / pairs);
-    Places places(graph, mesh, one, 0, most);
-    std::vector<int64_t> elements(most);
-    for (int64_t from = 0; from < mesh.count; from += most) {
-        const int64_t count = std::min(most, mesh.count - from);
-        for (int64_t e = 0; e < count; ++e) elements[e] = from + e;
-        const int32_t* place = places.find(elements.data(), count);
-        for (int64_t p = 0; p < count * pairs; ++p, blocks += R * R)
-            for (int i = 0; i < R * R; ++i) data[R * R * static_cast<int64_t>(place[p]) + i] += blocks[i];
-    }
+    for_groups(mesh, graph, 1, 0, [&](const Group& element) {
+        const double* block = blocks + R * R * pairs * element.first;
+        for (int64_t p = 0; p < pairs; ++p, block += R * R) {
+            const int64_t place = element.place[p];
+            for (int i = 0; place >= 0 && i < R * R; ++i) data[R * R * place + i] += block[i];
+        }
+    });
 }
 
 }  // namespace kl
