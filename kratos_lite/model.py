@@ -327,8 +327,7 @@ class Model:
     def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
         """Return natural frequencies (count,) in rad/s, ascending, and shapes (count, n, 3).
 
-        Supports hold what they hold, at zero.  With a motion of the material these are not the frequencies of
-        waves; see `complex_modes`.
+        Supports hold what they hold, at zero.  A motion of the material is left out: see `complex_modes`.
         """
         from kratos_lite.dynamics.modal import natural_modes
 

@@ -236,8 +236,9 @@ class Result:
         if report.force_error is not None:
             balance = f"forces {report.force_error:.1e}, moments {report.moment_error:.1e}"
             rows.append(("equilibrium", balance))
+        if report.seconds:
+            rows.append(("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())))
         rows += [
-            ("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())),
             ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
             ("kernels", report.kernels),
         ]

@@ -47,6 +47,9 @@ def test_frames_table_and_arrays_hold_each_moment(tmp_path):
         names = {"DISPLACEMENT": "u", "VELOCITY": "v", "ACCELERATION": "a", "REACTION": "reactions"}
         for kratos, ours in names.items():
             np.testing.assert_array_equal(frame.point_data[kratos], getattr(moment, ours))
+        result = transient.result(moment)
+        np.testing.assert_array_equal(frame.point_data["VON_MISES_STRESS"], result.von_mises("node"))
+        np.testing.assert_array_equal(frame.cell_data["CAUCHY_STRESS_VECTOR"][0], result.stress("element"))
     arrays = np.load(tmp_path / "swing.npz")
     assert sorted(arrays) == ["a", "reactions", "step", "time", "u", "v"]
     np.testing.assert_array_equal(arrays["v"], [moment.v for moment in moments])
@@ -67,6 +70,22 @@ def test_the_energy_of_an_earlier_moment_is_that_of_then():
     list(transient.march(dt=0.01, steps=3))
     assert transient.energy(then) == start
     assert transient.energy() > 10 * abs(start)
+
+
+def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
+    """A bar that has come to rest has the stress of statics; a moment has summary and files of results."""
+    model = shaken_bar()
+    transient = model.transient(rayleigh=(2 * model.modes(1)[0][0], 0.0))
+    *_, late = transient.march(dt=0.02, steps=600, every=600)
+    static, result = model.solve(), transient.result(late)
+    np.testing.assert_allclose(result.stress("node"), static.stress("node"), rtol=0, atol=1e-5 * 8e4)
+    np.testing.assert_allclose(result.report.total_load, static.report.total_load, atol=1e-9)
+    assert result.report.backward_error < 1e-9
+    rows = dict(result.table())
+    assert rows["solver"] == "newmark(0.25, 0.5): step 600, t = 12 s"
+    assert {"total reaction", "largest von Mises"} <= rows.keys()
+    result.save(tmp_path / "late.vtu")
+    result.save(tmp_path / "late.json")
 
 
 def test_a_moment_is_drawn_deformed(tmp_path):

@@ -9,6 +9,8 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.cli import main
 from kratos_lite.io.project import read_project
+from kratos_lite.io.project.ale import add_motion
+from kratos_lite.io.project.settings import read_settings
 
 RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
 
@@ -48,16 +50,16 @@ WORDS = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--pre
 
 
 def test_a_rotation_in_words_in_a_run_file_and_in_python_are_the_same(folder):
-    motion = {"rate": 6.0, "acceleration": 3.0, "centre": [0, 0, 0.5], "stiffening": True}
+    motion = {"rate": 6.0, "damping": 2.0, "acceleration": 3.0, "centre": [0, 0, 0.5], "stiffening": True}
     expected = wheel(axis="z", **motion).solve().u
-    turned = ("--rotation", "z:6:3", "--centre", "0,0,0.5", "--stiffening")
+    turned = ("--rotation", "z:6:3", "--center", "0,0,0.5", "--stiffening", "--damping", "2")
     assert run("wheel.mdpa", *WORDS, *turned, "--json", "words.json") == 0
     path = write(
         folder,
         model="wheel.mdpa",
         fix={"inner": "xyz"},
         pressure={"outer": 1e3},
-        ale={"rotation": {"axis": "z", "damping": 0.0, "skew": True, **motion}},
+        ale={"rotation": {"axis": "z", "skew": True, **motion}},
         json="file.json",
     )
     assert run(str(path), "-q") == 0
@@ -158,6 +160,9 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
         (("--stiffening", "--translation", "x:1"), "--stiffening belongs to --rotation"),
         (("--ends", "fixed"), "--ends belongs to --translation"),
         (("--rotation", "x:1"), "not one of revolution about the axis"),
+        (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
+        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number in 1/s, ≥ 0; got -2.0"),
+        (("--damping", "2"), "--damping belongs to --rotation or --translation"),
         (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
     ],
 )
@@ -199,6 +204,20 @@ def test_a_rate_may_be_a_table(folder):
     assert not motion.steady
 
 
+def test_a_rate_table_is_taken_at_the_time_of_the_solution(folder):
+    """Kratos run files are solved at their end; a rate that is still changing then is taken as it is."""
+    table = {"times": [0.0, 1.0], "values": [0.0, 8.0]}
+    settings = {"ale": {"rotation": {"axis": "z", "rate": table}}}
+    path = folder / "frozen.json"
+    path.write_text(json.dumps(settings))
+    motions = []
+    for time in (None, 1.0, 0.5):
+        model = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)), kl.Isotropic3D(**RUBBER))
+        add_motion(model, read_settings(path), time)
+        motions.append((model.motion.rate(0.0), model.motion.acceleration(0.0)))
+    assert motions == [(0.0, 8.0), (8.0, 0.0), (4.0, 0.0)]
+
+
 def test_modes_are_those_of_python(folder, capsys):
     held = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--modes", "4")
     assert run("wheel.mdpa", *held) == 0
@@ -213,7 +232,8 @@ def test_modes_are_those_of_python(folder, capsys):
     assert run("wheel.mdpa", *held, "--rotation", "z:5") == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     model.add(kl.ale.Rotation("z", rate=5.0))
-    values, _ = model.complex_modes(4)
+    values = np.array([value for value in model.complex_modes(8)[0] if value.imag > 0])
+    assert len(values) == 4 == len(rows) - 1
     found = np.array([[float(word) for word in row[1:]] for row in rows[1:]])
     assert rows[0][-2:] == ["growth", "1/s"]
     np.testing.assert_allclose(np.sort(found[:, 1]), np.sort(values.imag), rtol=1e-6)

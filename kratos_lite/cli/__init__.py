@@ -155,7 +155,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
     ale.add_argument(
         "--rotation", metavar="AXIS:RATE[:ACCELERATION]", help="about x, y, z or X,Y,Z, in rad/s and rad/s²"
     )
-    ale.add_argument("--centre", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
+    ale.add_argument("--centre", "--center", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
     ale.add_argument(
         "--stiffening", action="store_true", help="add the stiffness that the centrifugal stress gives"
     )
@@ -167,6 +167,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         choices=("absorbing", "periodic", "fixed", "natural"),
         help="what the cut faces of the window do (absorbing)",
     )
+    ale.add_argument("--damping", metavar="ALPHA", help="by mass, relative to the motion, in 1/s (0)")
 
 
 def _add_march(commands: object) -> None:
@@ -266,7 +267,7 @@ def _discard_output() -> None:
 
 def _join_negative(arguments: Sequence[str]) -> list[str]:
     """Join ``--gravity -9.81,0,0`` and the like to one word, which argparse would take for another option."""
-    numeric = ("--gravity", "--centre", "--rotation", "--translation")
+    numeric = ("--gravity", "--centre", "--center", "--rotation", "--translation")
     joined: list[str] = []
     for word in arguments:
         if joined and joined[-1] in numeric and word[:1] == "-":

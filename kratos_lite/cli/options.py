@@ -97,22 +97,31 @@ def _where(model: Model, part: str | None) -> str | int | None:
     raise InputError(f"--material: unknown law or part {part!r}; laws are {laws}, parts are {parts}.{hint}")
 
 
-def motion(options: Namespace) -> Motion | None:
+def motion(model: Model, options: Namespace) -> Motion | None:
     """Return the motion of the material that the options give, or None."""
     from kratos_lite.ale import Rotation, Translation
 
     turns, passes = options.rotation, options.translation
+    if (turns or passes) and model.motion is not None:
+        raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
     if turns and passes:
         raise InputError("--rotation and --translation: a model has one motion; give one of them")
     for option, owner in (("centre", "rotation"), ("stiffening", "rotation"), ("ends", "translation")):
         if getattr(options, option) and not getattr(options, owner):
             raise InputError(f"--{option} belongs to --{owner}; give that too")
-    if turns:
+    text, option = turns or passes, "--rotation" if turns else "--translation"
+    if not text:
+        if options.damping:
+            raise InputError("--damping belongs to --rotation or --translation; give one of them too")
+        return None
+    rates, given = _rates(text, option), {"damping": number(options.damping or "0", "--damping")}
+    try:
+        if passes:
+            return Translation(*rates, ends=options.ends or "absorbing", **given)
         centre = vector(options.centre, "--centre") if options.centre else (0.0, 0.0, 0.0)
-        return Rotation(*_rates(turns, "--rotation"), centre=centre, stiffening=options.stiffening)
-    if passes:
-        return Translation(*_rates(passes, "--translation"), ends=options.ends or "absorbing")
-    return None
+        return Rotation(*rates, centre=centre, stiffening=options.stiffening, **given)
+    except InputError as error:
+        raise InputError(f"{option} {text}: {error}") from None
 
 
 def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
@@ -152,5 +161,5 @@ def apply(model: Model, options: Namespace) -> None:
     for text in options.point_load:
         part, rest = split_part(text, "--point-load", "PART:X,Y,Z")
         model.add(PointLoad(part, vector(rest, "--point-load")))
-    if (given_motion := motion(options)) is not None:
+    if (given_motion := motion(model, options)) is not None:
         model.add(given_motion)

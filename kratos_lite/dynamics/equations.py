@@ -124,6 +124,13 @@ class EquationsOfMotion:
         """Number of degrees of freedom, the prescribed ones among them."""
         return 3 * len(self.system.nodes)
 
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which degrees of freedom (3a,) supports or constraints hold."""
+        held = np.ones(self.size, dtype=bool)
+        held[self.system.reduced.free] = False
+        return held
+
     def load(self, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those of the motion among them."""
         constant, changing = self._loads

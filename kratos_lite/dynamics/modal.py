@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.arguments import whole_number
 from kratos_lite.dynamics.equations import EquationsOfMotion
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.modes import DENSE_MODES, modes
 from kratos_lite.solvers import direct
 
@@ -53,7 +53,7 @@ def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Comple
 
     With x = (u, λ u) the inverse takes (p, q) to (-K^-1 (C p + M q), p).
     """
-    from scipy.sparse.linalg import LinearOperator, eigs
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
     n = K.shape[0]
     factors = direct.factorise(K, symmetric=False)
@@ -64,7 +64,15 @@ def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Comple
 
     operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(2 * n)
-    values, vectors = eigs(operator, min(count + 2, 2 * n - 2), which="LM", v0=start)
+    # Eigenvalues come in pairs, often nearly repeated: room for more of them, no tolerance below rounding.
+    wanted = min(count + 2, 2 * n - 2)
+    try:
+        values, vectors = eigs(operator, wanted, which="LM", v0=start, ncv=3 * wanted + 20, tol=1e-11)
+    except ArpackNoConvergence as error:
+        raise SolveError(
+            f"only {len(error.eigenvalues)} of {wanted} complex modes are found; ask for fewer, or for more "
+            "to have repeated ones in full"
+        ) from None
     return 1 / values, vectors
 
 

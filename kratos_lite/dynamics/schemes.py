@@ -44,7 +44,7 @@ def newmark(beta: float = 0.25, gamma: float = 0.5) -> Implicit:
     if not (gamma >= 0.5 and beta > 0 and 2 * beta >= gamma):
         raise InputError(
             f"Newmark's method is stable for γ ≥ 1/2 and β ≥ γ/2; got β = {beta}, γ = {gamma}: "
-            "take central_difference for an explicit scheme"
+            "take CentralDifference() for an explicit scheme"
         )
     return Implicit(f"newmark({beta:g}, {gamma:g})", beta, gamma)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +14,15 @@ from kratos_lite.arguments import finite, flag, number, positive_step, whole_num
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates
-from kratos_lite.dynamics.movement import at_end, at_start, beyond_newmark
+from kratos_lite.dynamics.moment import Moment
+from kratos_lite.dynamics.movement import Course, at_start, prescribed_part, with_prescribed
 from kratos_lite.dynamics.outputs import velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
+from kratos_lite.dynamics.steps import explicit_step, implicit_step, is_trapezoidal
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.finite_strain import highest_frequency
-from kratos_lite.io.output import read_arrays, write_arrays
+from kratos_lite.native import described
+from kratos_lite.result import Report, Result, peak_memory
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.statics import same_state
 
@@ -30,42 +31,12 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("kratos_lite")
 Array = NDArray[np.float64]
+ABSURD = 1e9
+"""Displacements by the size of the model beyond which a motion has lost its stability."""
 OFF_SUPPORT = 1e-6
 """Share of the largest displacement by which a moment may miss its supports."""
 OFF_BALANCE = 1e-4
 """Share of the largest force by which the accelerations of a moment may miss the balance."""
-FIELDS = ("u", "v", "a", "time", "step")
-
-
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """A model at one time.
-
-    Attributes
-    ----------
-    time, step : s, and number of steps taken.
-    u, v, a : displacement, velocity, acceleration (n, 3) in m, m/s, m/s².
-    reactions : (n, 3) N, forces of supports and constraints on the body; 0 where nothing acts.
-    """
-
-    time: float
-    step: int
-    u: Array
-    v: Array
-    a: Array
-    reactions: Array
-
-    def save(self, path: str | Path) -> None:
-        """Write what a march needs to go on to an .npz file, as a whole or not at all."""
-        write_arrays(path, {name: np.asarray(getattr(self, name)) for name in FIELDS})
-
-    @classmethod
-    def load(cls, path: str | Path) -> Moment:
-        """Read a moment; InputError if the file holds none."""
-        u, v, a, time, step = read_arrays(path, FIELDS, "a moment that Moment.save wrote").values()
-        if time.shape or step.shape:
-            raise InputError(f"{path}: a series of moments, not one that Moment.save wrote")
-        return cls(time.item(), step.item(), u, v, a, np.zeros(u.shape))
 
 
 def model_state(model: Model) -> list[Any]:
@@ -73,10 +44,6 @@ def model_state(model: Model) -> list[Any]:
     supports = model.supports
     values = supports.values[supports.fixed].copy()
     return [*model.state(), values, tuple(map(id, model.loads)), id(model.motion), tuple(supports.movements)]
-
-
-def _is_trapezoidal(scheme: Implicit | CentralDifference) -> bool:
-    return isinstance(scheme, Implicit) and replace(scheme, name="") == Implicit("", 0.25, 0.5)
 
 
 class Transient:
@@ -137,32 +104,30 @@ class Transient:
         self._limit, self._of_mesh = self._critical_rate()
         self._watch_rate(0.0)
         self.time, self.step = 0.0, 0
-        self.u = self._given(displacement, "the initial displacement")
-        self.v = self._given(velocity, "the initial velocity")
-        self._held = np.ones(self.equations.size, dtype=bool)
-        self._held[self.equations.system.reduced.free] = False
+        rest = np.zeros((self.equations.system.n_nodes, 3))
+        self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
+        self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
         self._untouched = True
-        self._start(*at_start(self.equations))
+        course = at_start(self.equations)
+        if displacement is not None:
+            self._check_supports(self.u, course[0], "the initial displacement")
+        self._start(*course)
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
         """Take over what is prescribed at the start, and find the first acceleration."""
-        self.u, self.v = self._allowed(self.u, u), self._allowed(self.v, v)
+        e = self.equations
+        self.u, self.v = with_prescribed(e, self.u, u), with_prescribed(e, self.v, v)
         self.a = self._balanced(a)
 
-    def _allowed(self, x: Array, prescribed: Array) -> Array:
-        """Return vectors (3a,) whose held components follow from supports and constraints."""
-        reduced = self.equations.system.reduced
-        if reduced.T is not None:
-            return np.asarray(reduced.T @ x[reduced.free] + prescribed)
-        return np.where(self._held, prescribed, x)
-
-    def _prescribed_part(self, x: Array) -> Array:
-        """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
-        reduced = self.equations.system.reduced
-        return np.where(self._held, x, 0.0) if reduced.T is None else x - reduced.T @ x[reduced.free]
-
-    def _given(self, values: ArrayLike | None, what: str) -> Array:
-        return np.zeros(self.equations.size) if values is None else self._nodal(values, what)
+    def _check_supports(self, u: Array, prescribed: Array, what: str) -> None:
+        """Raise InputError if displacements (3a,) are not where the supports hold the model."""
+        off = np.abs(prescribed_part(self.equations, u) - prescribed).reshape(-1, 3)
+        node, axis = np.unravel_index(int(off.argmax()), off.shape)
+        if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
+            name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
+            raise InputError(
+                f"{what} does not fit the supports: {name} is {off[node, axis]:g} m off from where it is held"
+            )
 
     def _nodal(self, values: ArrayLike, what: str) -> Array:
         """Return nodal vectors (n, 3) as (3a,)."""
@@ -208,38 +173,46 @@ class Transient:
         h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
         if not same_state(self._state, model_state(self.equations.model)):
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
-        advance = self._explicit if isinstance(self.scheme, CentralDifference) else self._implicit
         if isinstance(self.scheme, CentralDifference):
             self._check_stable(h)
         if self._untouched and self.equations.model.supports.movements:
             self._start(*at_start(self.equations, h))
         self._untouched = False
-        return self._moments(advance, h, steps, every, until)
+        return self._moments(h, steps, every, until)
 
     def _moments(
         self,
-        advance: Callable[[float], None],
         h: float,
         steps: int,
         every: int,
         until: Callable[[Moment], bool] | None,
     ) -> Iterator[Moment]:
+        beyond = ABSURD * float(np.ptp(self.equations.system.points, axis=0).max())
         for done in range(1, steps + 1):
-            with one_thread():
-                advance(h)
+            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+                self.u, self.v, self.a = self._step((self.u, self.v, self.a), h)
             self._watch_rate(self.time + h)
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
             if done % every and done < steps:
                 continue
-            if not np.isfinite(self.u).all():
-                raise SolveError(f"the motion is no longer finite at t = {self.time:g} s: it is not stable")
+            if not np.abs(self.u).max(initial=0.0) < beyond:  # nor is what is not a number
+                raise SolveError(
+                    f"the motion grows without bound: at t = {self.time:g} s it is beyond {ABSURD:g} times "
+                    "the size of the model; are the step and the rate stable, and all units SI?"
+                )
             if self.progress:
                 self.progress("march", done / steps)
             moment = self.moment()
             yield moment
             if until and until(moment):
                 return
+
+    def _step(self, now: Course, h: float) -> Course:
+        """Return displacement, velocity and acceleration a step later."""
+        if isinstance(self.scheme, CentralDifference):
+            return explicit_step(self.equations, now, self.time, h)
+        return implicit_step(self.equations, self.scheme, now, self.time, h)
 
     def _critical_rate(self) -> tuple[float, bool]:
         """Return the lowest critical rate, and whether it is that of the mesh; infinite without a motion."""
@@ -260,58 +233,6 @@ class Transient:
             e.warnings.append(f"at t = {time:g} s {text}" if time else text)
             if time:
                 _log.warning("%s", e.warnings[-1])
-
-    def _implicit(self, h: float) -> None:
-        """Take a step of the generalised-α method, for the increment of the displacement."""
-        s, e = self.scheme, self.equations
-        assert isinstance(s, Implicit)
-        end, f = self.time + h, 1 - s.alpha_f
-        a_old = self.v / (s.beta * h) + (1 / (2 * s.beta) - 1) * self.a  # minus a⁺ for Δu = 0
-        v_new = (1 - s.gamma / s.beta) * self.v + h * (1 - s.gamma / (2 * s.beta)) * self.a
-        start, more_a = self.time, np.zeros_like(self.a)
-        if e.model.supports.movements:
-            part = self._prescribed_part
-            more_v, more_a = beyond_newmark(
-                s, h, (part(self.u), part(self.v), part(self.a)), at_end(e, end, h)
-            )
-            v_new, a_old = v_new + more_v, a_old - more_a
-        middle = self.time + f * h
-        force = e.load(middle)
-        force = force - e.times_stiffness(self.u, middle)
-        force -= e.times_damping(f * v_new + s.alpha_f * self.v, middle)
-        if not _is_trapezoidal(s):
-            force += e.times_mass((1 - s.alpha_m) * a_old - s.alpha_m * self.a)
-        else:  # M a is known from the balance at the start; so no rounding is handed on from step to step
-            force += e.times_mass(4 / h * self.v - more_a) + e.load(start)
-            force -= e.times_stiffness(self.u, start) + e.times_damping(self.v, start)
-        solve = e.solver(middle, (1 - s.alpha_m) / (s.beta * h * h), f * s.gamma / (s.beta * h), f)
-        change = np.where(self._held, e.prescribed(end) - self.u, 0.0)
-        du = solve(force, self._prescribed_change(change, end))
-        self.u = self.u + du
-        self.a = du / (s.beta * h * h) - a_old
-        self.v = s.gamma / (s.beta * h) * du + v_new
-
-    def _prescribed_change(self, change: Array, end: float) -> Array:
-        """Return the change of what is prescribed; with constraints, of all that follows from it."""
-        reduced = self.equations.system.reduced
-        if reduced.T is None:
-            return change
-        c = self.equations.prescribed(end)
-        return np.asarray(c - (self.u - reduced.T @ self.u[reduced.free]))
-
-    def _explicit(self, h: float) -> None:
-        """Take a step of central differences; damping sees the velocity half a step before the end."""
-        e, held = self.equations, self._held
-        half = self.v + h / 2 * self.a
-        u = self.u + h * half
-        given = at_end(e, self.time + h, h)
-        u[held] = given[0][held]
-        force = e.load(self.time + h) - e.times_damping(half, self.time) - e.times_stiffness(u, self.time)
-        a = e.mass.solve(force)
-        a[held] = given[2][held]
-        self.v = half + h / 2 * a
-        self.v[held] = given[1][held]
-        self.u, self.a = u, a
 
     def _check_stable(self, h: float) -> None:
         e = self.equations
@@ -347,27 +268,47 @@ class Transient:
         time, step = number(moment.time, "the time of a moment"), moment.step
         if time < 0 or isinstance(step, bool) or not isinstance(step, (int, np.integer)) or step < 0:
             raise InputError(f"a moment has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
-        off = np.abs(self._prescribed_part(u) - self.equations.prescribed(time)).reshape(-1, 3)
-        node, axis = np.unravel_index(int(off.argmax()), off.shape)
-        if off[node, axis] > OFF_SUPPORT * np.abs(u).max(initial=0.0):
-            name = self.equations.model.supports.name(3 * int(self.equations.system.nodes[node]) + int(axis))
-            raise InputError(
-                f"this moment does not fit the supports: at t = {time:g} s {name} is off by "
-                f"{off[node, axis]:g} m from where it is held"
-            )
+        self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the moment")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
         self._untouched = not step
-        if _is_trapezoidal(self.scheme) and self._imbalance() > OFF_BALANCE:
-            self.a = self._balanced(self._prescribed_part(a))
+        if is_trapezoidal(self.scheme) and self._imbalance(u, v, a, time) > OFF_BALANCE:
+            self.a = self._balanced(prescribed_part(self.equations, a))
 
-    def _imbalance(self) -> float:
+    def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> float:
         """Return the largest free component of M a + C v + K u - f as a share of the largest of its terms."""
-        e, time = self.equations, self.time
-        terms = [e.times_mass(self.a), e.times_damping(self.v, time), e.times_stiffness(self.u, time)]
+        e = self.equations
+        terms = [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time)]
         terms.append(-e.load(time))
         largest = max(float(np.abs(term).max(initial=0.0)) for term in terms)
         left = np.abs(e.system.reduced.reduce(np.sum(terms, axis=0))).max(initial=0.0)
         return float(left) / largest if largest else 0.0
+
+    def result(self, moment: Moment | None = None) -> Result:
+        """Return a moment, or now, as a `Result` with strains and stresses; its loads are those of that time.
+
+        The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative.
+        """
+        at, e = self.moment() if moment is None else moment, self.equations
+        model, local = e.model, e.system.local
+        loads = e.system.whole(e.load(at.time)).copy()
+        report = Report(
+            unknowns=len(e.system.reduced.free),
+            total_load=loads.sum(axis=0),
+            total_reaction=at.reactions.sum(axis=0),
+            solver=self.scheme.name,
+            reason=f"step {at.step}, t = {at.time:g} s",
+            iterations=0,
+            backward_error=self._imbalance(local(at.u), local(at.v), local(at.a), at.time),
+            force_error=None,
+            moment_error=None,
+            seconds={},
+            peak_memory=peak_memory(),
+            warnings=list(e.warnings),
+            notes=list(model.notes),
+            kernels=described(),
+        )
+        u0 = model.initial_displacement
+        return Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""

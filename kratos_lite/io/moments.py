@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.io.output import write_arrays, write_whole
+from kratos_lite.io.results import fields
 from kratos_lite.io.vtu import check_mode, write_pvd, write_vtu
 
 if TYPE_CHECKING:
@@ -56,10 +57,14 @@ class Frames(Writer):
         check_mode(mode)
         self.frames: list[tuple[float, str]] = []
 
-    def frame(self, time: float, mesh: Mesh, data: dict[str, Array]) -> None:
-        """Write the mesh at a time in s with nodal data by name."""
+    def frame(
+        self, time: float, mesh: Mesh, data: dict[str, Array], cells: dict[str, Array] | None = None
+    ) -> None:
+        """Write the mesh at a time in s with data of nodes and elements by name."""
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
-        write_vtu(self.path.with_name(name), mesh, {**data, "NODE_ID": mesh.node_ids}, mode=self.mode)
+        write_vtu(
+            self.path.with_name(name), mesh, {**data, "NODE_ID": mesh.node_ids}, cells or {}, mode=self.mode
+        )
         self.frames.append((time, name))
 
     def write(self) -> None:
@@ -106,19 +111,15 @@ class Arrays(Writer):
 
 
 class MomentFrames(Frames):
-    """DISPLACEMENT, VELOCITY, ACCELERATION and REACTION on the nodes."""
+    """DISPLACEMENT, VELOCITY, ACCELERATION, REACTION and stresses."""
 
     owner: Transient
 
     def add(self, state: Moment) -> None:
         """Write the frame of a moment."""
-        data = {
-            "DISPLACEMENT": state.u,
-            "VELOCITY": state.v,
-            "ACCELERATION": state.a,
-            "REACTION": state.reactions,
-        }
-        self.frame(state.time, self.owner.equations.model.mesh, data)
+        points, cells = fields(self.owner.result(state))
+        data = {**points, "VELOCITY": state.v, "ACCELERATION": state.a}
+        self.frame(state.time, self.owner.equations.model.mesh, data, cells)
 
 
 class MomentTable(Table):

@@ -120,6 +120,23 @@ def test_periodic_window_has_its_discrete_symbol(share, wheels):
         assert np.abs(values - value).min() < 1e-11 * top
 
 
+@pytest.mark.parametrize("rate", [0.0, 1e-3])
+def test_repeated_frequencies_are_found_at_rest(rate, monkeypatch):
+    """Waves come in pairs that a slow rate splits by n times itself."""
+    from kratos_lite.dynamics import modal
+
+    monkeypatch.setattr(modal, "DENSE_MODES", 100)
+    model = kl.Model(kl.annulus(0.1, 0.3, 0.02, (2, 16, 1)), kl.Isotropic3D(210e9, 0.3, 7850.0))
+    model.fix("inner")
+    model.add(Rotation("z", rate))
+    omega, _ = model.modes(6)
+    values, _ = model.complex_modes(8)
+    upper = np.sort(values.imag[values.imag > 0])
+    np.testing.assert_allclose(upper, omega[: len(upper)], rtol=0, atol=1e-6 * omega[0] + 4 * rate)
+    assert len(upper) == 4
+    assert np.abs(values.real).max() < 1e-7 * omega[0]
+
+
 def test_faster_than_its_waves_a_window_is_unstable(wheels):
     for share, stable in ((0.98, True), (1.02, False)):
         model = wheels.bar("8N", 12, 3.0, tied="below")

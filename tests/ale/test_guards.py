@@ -141,6 +141,55 @@ def test_no_density():
         model.solve()
 
 
+@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize(
+    ("other", "what"),
+    [(kl.Isotropic3D(210e6, 0.3, 3 * 7620.0), "density"), (kl.Isotropic3D(21e6, 0.3, 7620.0), "stiffness")],
+)
+def test_sectors_of_another_material_are_no_body_of_revolution(other, what, sectors, wheels):
+    model = wheels.disk("8N", 2, 60)
+    centres = np.mean(model.mesh.points[model.mesh.blocks[0].nodes], axis=1)
+    angle = np.arctan2(centres[:, 1], centres[:, 0]) % (2 * np.pi)
+    model.assign(other, np.flatnonzero(angle * sectors % (2 * np.pi) < np.pi))
+    with pytest.raises(
+        ModelError, match=rf"the {what} of the body is not spread evenly about its axis \(harmonic"
+    ):
+        spun(model, rate=5.0)
+
+
+def test_rings_of_another_material_are_one(wheels):
+    for element, cells in (("8N", (3, 12)), ("20N", (3, 16))):
+        model = wheels.disk(element, *cells)
+        centres = np.mean(model.mesh.points[model.mesh.blocks[0].nodes], axis=1)
+        ring = np.flatnonzero(np.hypot(centres[:, 0], centres[:, 1]) > 0.6)
+        model.assign(kl.Isotropic3D(21e6, 0.3, 3 * 7620.0), ring)
+        spun(model, rate=5.0)
+
+
+def test_a_window_must_be_alike_along_its_way(wheels):
+    tapered = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
+    tapered.fix("z-")
+    tapered.mesh.points[:, 1:] *= 1 + 0.03 * tapered.mesh.points[:, :1]
+    tapered.add(Translation("x", rate=5.0))
+    assert any("through the sides of the window" in text for text in tapered.solve().report.warnings)
+    cone = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
+    cone.mesh.points[:, 1:] *= 1 + 0.3 * cone.mesh.points[:, :1]
+    with pytest.raises(ModelError, match=r"not straight along the axis \[1\.0, 0\.0, 0\.0\]"):
+        cone.add(Translation("x", rate=5.0))
+    series = wheels.bar("8N", 10)
+    series.fix("x-", "x")
+    series.assign(kl.Isotropic3D(21e6, 0.3, 7620.0), np.arange(4))
+    series.add(Translation("x", rate=5.0))
+    with pytest.raises(ModelError, match="the stiffness of the body is not spread evenly along the window"):
+        series.solve()
+    layered = kl.Model(kl.box((10, 1, 1), (10, 1, 2)), wheels.steel)
+    layered.fix("z-")
+    low = layered.mesh.points[layered.mesh.blocks[0].nodes].mean(axis=1)[:, 2] < 0.5
+    layered.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
+    layered.add(Translation("x", rate=5.0))
+    layered.solve()
+
+
 def test_one_motion_to_a_model(wheels):
     model = wheels.disk("20N", 2, 24)
     model.add(Rotation("z", rate=1.0))

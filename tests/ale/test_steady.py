@@ -5,7 +5,7 @@ import pytest
 from scipy.special import jv, yv
 
 import kratos_lite as kl
-from kratos_lite.ale import Rotation
+from kratos_lite.ale import Rotation, Translation
 from kratos_lite.dynamics import EquationsOfMotion
 
 E_PLANE, NU_PLANE = 210e6 / (1 - 0.3**2), 0.3 / 0.7
@@ -258,3 +258,28 @@ def test_hub_reactions(wheels):
     result = model.solve()
     total = wheels.rim_load(model.mesh, contact).sum(axis=0)
     np.testing.assert_allclose(result.reactions.sum(axis=0), -total, atol=1e-8 * np.abs(total).max())
+
+
+# ---- a window with damping -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ends", ["natural", "absorbing"])
+@pytest.mark.parametrize("rate", [40.0, -40.0])
+def test_a_damped_window_has_its_closed_form(rate, ends, wheels):
+    """(Mc - ρ v²) u'' + ρ α v u' + f = 0 with u(0) = 0 and u'(L) = 0."""
+    rho, length, alpha, f = wheels.steel.density, 10.0, 60.0, 1e5
+    D, b = wheels.steel.C[0, 0] - rho * rate**2, rho * alpha * rate
+
+    def exact(x):
+        return f / b * (np.exp(b * length / D) * (-D / b) * (np.exp(-b * x / D) - 1) - x)
+
+    errors = []
+    for n in (20, 40):
+        model = wheels.bar("8N", n, length / 2)
+        model.fix("x-", "x")
+        model.add(kl.BodyForce((f, 0, 0)))
+        model.add(Translation("x", rate=rate, ends=ends, damping=alpha))
+        u, x = model.solve().u[:, 0], model.mesh.points[:, 0] + length / 2
+        errors.append(np.abs(u - exact(x)).max() / np.abs(exact(x)).max())
+    assert errors[1] < 2e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)

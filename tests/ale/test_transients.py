@@ -11,6 +11,7 @@ from kratos_lite.ale import Rotation, Translation
 from kratos_lite.dynamics import EquationsOfMotion
 from kratos_lite.loads import Varying
 from kratos_lite.rotations import exp
+from kratos_lite.voigt import acoustic_tensor
 
 A = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -77,6 +78,21 @@ def test_order_two_while_the_rate_changes(scheme, wheels, reference):
         errors.append(np.abs(transient.u[free] - reference).max() / np.abs(reference).max())
     assert errors[1] < 1e-3
     assert 1.95 < np.log2(errors[0] / errors[1]) < 2.05
+
+
+@pytest.mark.parametrize("given", [kl.TimeSeries([0.0, 1.0], [10.0, 40.0]), lambda t: 10 + 30 * t])
+def test_the_acceleration_is_the_slope_of_the_rate(given, wheels):
+    ends = []
+    for acceleration in (30.0, None):
+        model = wheels.disk("8N", 1, 12)
+        model.add(Rotation("z", given, acceleration))
+        *_, end = model.transient().march(1e-3, 20, every=20)
+        ends.append(end.u)
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-9 * np.abs(ends[0]).max())
+    steady = model.solve()  # at the time 0, as if the rate stayed
+    model.motion = None
+    model.add(Rotation("z", 10.0))
+    np.testing.assert_array_equal(steady.u, model.solve().u)
 
 
 def test_a_rate_that_passes_the_critical_one_is_told_once(wheels, caplog):
@@ -322,6 +338,30 @@ def test_pulse_through_absorbing_ends(element, n, steps, spin, tolerances, wheel
         exact = (pulse(x + z - c * moment.time) + pulse(x + z + c * moment.time)) / 2
         if round(moment.time, 6) != 0.12:
             assert np.abs(moment.u[:, 0] - exact).max() < next(wanted) * 1e-3
+
+
+ORTHOTROPIC = kl.Orthotropic3D(4e6, 1e6, 2e6, 0.0, 0.0, 0.0, 5e5, 2e5, 3e5, 1000.0)
+
+
+@pytest.mark.parametrize("along", "xyz")
+@pytest.mark.parametrize("polarised", "xyz")
+def test_absorbing_ends_of_an_anisotropic_material(along, polarised):
+    """Waves of each polarisation leave along each axis of the material."""
+    i, j, n, length = "xyz".index(along), "xyz".index(polarised), 60, 6.0
+    size, cells = np.full(3, 0.5), [1, 1, 1]
+    size[i], cells[i] = length, n
+    mesh = kl.box(tuple(size), tuple(cells), "KinematicLinear3D8N")
+    model = kl.Model(mesh, ORTHOTROPIC)
+    for axis in set("xyz") - {polarised}:
+        model.fix(range(mesh.n_nodes), axis)
+    model.add(Translation(along, rate=1e-6, ends="absorbing"))
+    u = np.zeros_like(mesh.points)
+    u[:, j] = np.exp(-(((mesh.points[:, i] - length / 2) / 0.5) ** 2))
+    speed = np.sqrt(acoustic_tensor(ORTHOTROPIC.C, np.eye(3)[i])[j, j] / 1000.0)
+    transient, h = model.transient(displacement=u), length / n / speed / 2
+    start = transient.energy()
+    list(transient.march(h, int(1.2 * length / speed / h), every=1000))
+    assert transient.energy() < 1e-4 * start
 
 
 def test_pulse_in_a_natural_window_comes_back(wheels):

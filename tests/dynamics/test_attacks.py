@@ -93,7 +93,7 @@ def test_moments_that_do_not_fit_are_refused():
         ("time", np.nan, "time of a moment must be finite"),
         ("step", -4, "got 0.001 s and -4"),
         ("step", 1.5, "got 0.001 s and 1.5"),
-        ("u", off, "does not fit the supports: at t = 0.001 s node 1 along x is off by 1 m"),
+        ("u", off, "at t = 0.001 s the moment does not fit the supports: node 1 along x is 1 m off"),
         ("v", np.full_like(off, np.nan), "v of a moment must be finite"),
         ("a", off.astype(complex), "a of a moment must be made of real numbers"),
     ):

@@ -1,0 +1,46 @@
+"""Moment: a model at one time, saved and read again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.output import read_arrays, write_arrays
+
+Array = NDArray[np.float64]
+FIELDS = ("u", "v", "a", "time", "step")
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A model at one time.
+
+    Attributes
+    ----------
+    time, step : s, and number of steps taken.
+    u, v, a : displacement, velocity, acceleration (n, 3) in m, m/s, m/s².
+    reactions : (n, 3) N, forces of supports and constraints on the body; 0 where nothing acts.
+    """
+
+    time: float
+    step: int
+    u: Array
+    v: Array
+    a: Array
+    reactions: Array
+
+    def save(self, path: str | Path) -> None:
+        """Write what a march needs to go on to an .npz file, as a whole or not at all."""
+        write_arrays(path, {name: np.asarray(getattr(self, name)) for name in FIELDS})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Moment:
+        """Read a moment; InputError if the file holds none."""
+        u, v, a, time, step = read_arrays(path, FIELDS, "a moment that Moment.save wrote").values()
+        if time.shape or step.shape:
+            raise InputError(f"{path}: a series of moments, not one that Moment.save wrote")
+        return cls(time.item(), step.item(), u, v, a, np.zeros(u.shape))
