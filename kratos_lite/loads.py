@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite import fields
-from kratos_lite.arguments import finite
+from kratos_lite.arguments import finite, number
 from kratos_lite.batches import Batch, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
@@ -112,20 +112,34 @@ def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES)
     return faces
 
 
+OfPlace: TypeAlias = Callable[[Array], ArrayLike]
+"""A function of places (m, 3) in m."""
+
+
+def _at_nodes(function: OfPlace, X: Array, what: str, width: tuple[int, ...]) -> Array:
+    """Return what a function gives at the nodes (m, k, 3) of faces, (m, k, *width)."""
+    given = finite(function(X.reshape(-1, 3)), what)
+    wanted = (X.shape[0] * X.shape[1], *width)
+    if given.shape not in (wanted, width):
+        raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {given.shape}")
+    return np.broadcast_to(given, wanted).reshape(*X.shape[:2], *width)
+
+
 class Traction(Load):
     """Force per area on the faces of a part.
 
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    traction : (3,) float, Pa.
+    traction : (3,) float, Pa; or a function of places (m, 3) that returns (m, 3), interpolated from nodes.
     """
 
     cells: ClassVar[tuple[str, ...]] = SURFACES
 
-    def __init__(self, where: Where, traction: ArrayLike) -> None:
-        self.where = where
-        self.traction = _vectors(traction, "a traction", "(3,) in Pa")
+    def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
+        self.where, self.traction = where, traction
+        if not callable(traction):
+            self.traction = _vectors(traction, "a traction", "(3,) in Pa")
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return ∫ N t dA as nodal forces (n, 3) in N."""
@@ -133,7 +147,9 @@ class Traction(Load):
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
-            add_nodal(total, block.nodes, surface_load(block.shape, mesh.points[block.nodes], self.traction))
+            X, t = mesh.points[block.nodes], self.traction
+            at = _at_nodes(t, X, what, (3,)) if callable(t) else t
+            add_nodal(total, block.nodes, surface_load(block.shape, X, at))
         return total
 
 
@@ -181,25 +197,28 @@ class Pressure(Load):
     Parameters
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
-    pressure : float, Pa.
+    pressure : float, Pa; or a function of places (m, 3) that returns (m,), interpolated from nodes.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
     """
 
-    def __init__(self, where: Where, pressure: float, normal: str = "outward") -> None:
+    def __init__(self, where: Where, pressure: float | OfPlace, normal: str = "outward") -> None:
         if normal not in ("outward", "nodes"):
             raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
-        if finite(pressure, "a pressure").ndim:
-            raise InputError(f"a pressure must be one number in Pa; got {pressure}")
-        self.where, self.pressure, self.normal = where, float(pressure), normal
+        if not callable(pressure):
+            pressure = number(pressure, "a pressure")
+        self.where, self.pressure, self.normal = where, pressure, normal
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return -∫ N p n dA as nodal forces (n, 3) in N."""
         total = np.zeros_like(mesh.points)
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
-            p = self.pressure * (outward(mesh, block) if self.normal == "outward" else np.ones(len(block)))
-            add_nodal(total, block.nodes, surface_pressure(block.shape, mesh.points[block.nodes], p))
+            X, p = mesh.points[block.nodes], self.pressure
+            at = _at_nodes(p, X, "a pressure", ()) if callable(p) else np.full(block.nodes.shape, p)
+            if self.normal == "outward":
+                at = at * outward(mesh, block)[:, None]
+            add_nodal(total, block.nodes, surface_pressure(block.shape, X, at))
         return total
 
 

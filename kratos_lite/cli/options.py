@@ -114,12 +114,12 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         if options.damping:
             raise InputError("--damping belongs to --rotation or --translation; give one of them too")
         return None
-    rates, given = _rates(text, option), {"damping": number(options.damping or "0", "--damping")}
+    rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
     try:
         if passes:
-            return Translation(*rates, ends=options.ends or "absorbing", **given)
+            return Translation(*rates, ends=options.ends or "absorbing", damping=damping)
         centre = vector(options.centre, "--centre") if options.centre else (0.0, 0.0, 0.0)
-        return Rotation(*rates, centre=centre, stiffening=options.stiffening, **given)
+        return Rotation(*rates, centre=centre, stiffening=options.stiffening, damping=damping)
     except InputError as error:
         raise InputError(f"{option} {text}: {error}") from None
 

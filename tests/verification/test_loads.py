@@ -230,3 +230,42 @@ def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
     load = ConditionLoads(np.zeros((1, 3)), {"line": np.zeros((8, 3))}, np.ones(1), np.zeros(8))
     with pytest.raises(kl.ModelError, match=r"a pressure acts on faces; .*Line"):
         nodal(mesh, load)
+
+
+# ---- loads that vary over a surface -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D20N", "KinematicLinear3D10N"])
+def test_a_hydrostatic_pressure_has_its_force_and_moment(element):
+    """ρ g depth on a wall of 2 m x 3 m: ∫ p dA = 27 kN · g/9, a third above the ground."""
+    mesh = kl.box((1.0, 2.0, 3.0), (1, 2, 3), element)
+    forces = nodal(mesh, kl.Pressure("x+", lambda X: 1e4 * (3.0 - X[:, 2])))
+    np.testing.assert_allclose(forces.sum(axis=0), [-9e4, 0, 0], atol=1e-9)
+    assert forces[:, 0] @ mesh.points[:, 2] == pytest.approx(-9e4, rel=1e-12)
+    traction = nodal(mesh, kl.Traction("x+", lambda X: np.outer(3.0 - X[:, 2], (-1e4, 0, 0))))
+    np.testing.assert_allclose(traction, forces, atol=1e-9)
+
+
+def test_the_same_everywhere_by_a_function_or_a_number():
+    mesh = kl.annulus(0.3, 1.0, 0.25, (1, 12, 1))
+    given = nodal(mesh, kl.Pressure("outer", lambda X: 2.0))
+    np.testing.assert_allclose(given, nodal(mesh, kl.Pressure("outer", 2.0)), atol=1e-15)
+    given = nodal(mesh, kl.Traction("outer", lambda X: (1.0, 2.0, 3.0)))
+    np.testing.assert_allclose(given, nodal(mesh, kl.Traction("outer", (1.0, 2.0, 3.0))), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [
+        (
+            kl.Pressure("x+", lambda X: X),
+            r"a pressure at places \(m, 3\) must have shape \('m',\)",
+        ),
+        (kl.Pressure("x+", lambda X: "deep"), "a pressure must be made of real numbers"),
+        (kl.Pressure("x+", lambda X: X[:, 0] * np.nan), "a pressure must be finite"),
+        (kl.Traction("x+", lambda X: X[:, 0]), r"a traction at places \(m, 3\) must have shape \('m', 3\)"),
+    ],
+)
+def test_functions_of_places_that_return_nonsense(load, words):
+    with pytest.raises(kl.InputError, match=words):
+        nodal(kl.box(), load)
