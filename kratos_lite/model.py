@@ -363,7 +363,7 @@ class Model:
         if self.supports.links:
             rows.append(("constraints", str(len(self.supports.links))))
         rows += [("load", type(load).__name__) for load in self.loads]
-        rows += [] if self.motion is None else [("motion", type(self.motion).__name__)]
+        rows += [] if self.motion is None else [("motion", str(self.motion))]
         for name, part in mesh.parts.items():
             sizes = (
                 f"{len(part.nodes)} nodes, {len(part.elements)} elements, {len(part.conditions)} conditions"

@@ -195,4 +195,4 @@ def test_transients_and_steady_motions_warn_alike():
     steady = model.solve().report.warnings
     assert [text for text in steady if "critical" not in text] == [w for w in warnings if "critical" not in w]
     assert len(steady) == len(warnings)
-    assert ("motion", "Rotation") in model.table()
+    assert ("motion", "Rotation [0.0, 0.0, 1.0], rate 18") in model.table()

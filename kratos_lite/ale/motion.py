@@ -56,6 +56,10 @@ class Motion(ABC):
         if self.damping < 0:
             raise InputError(f"a damping must be one number in 1/s, ≥ 0; got {damping}")
 
+    def __str__(self) -> str:
+        when = "" if self.steady else " at the time 0"
+        return f"{type(self).__name__} {self.direction.tolist()}, rate {self.rate(0.0):g}{when}"
+
     @abstractmethod
     def field(self, X: Array) -> Array:
         """Return the velocity c of the material through the mesh for the rate 1 at points X (..., 3)."""

@@ -38,7 +38,9 @@ def together(bodies: Sequence[Body]) -> Body:
     7.0
     """
     if not isinstance(bodies, Sequence):
-        raise InputError(f"a body or a sequence of bodies is needed; got {type(bodies).__name__}")
+        raise InputError(
+            f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"
+        )
     members = list(bodies)
     first = _alike(members)
     characteristics = Characteristics.stack([body.characteristics for body in members])

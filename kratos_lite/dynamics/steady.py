@@ -33,7 +33,11 @@ def solve_steady(
     phase = Phases()
     with phase("check"):
         e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
-        warnings = list(e.warnings)
+        warnings, changing = list(e.warnings), []
+        if e.terms is not None and not e.terms.motion.steady:
+            changing = [
+                f"the rate changes; this is the steady state of {e.rates(0.0)[0]:g}, as at the time 0"
+            ]
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.whole(forces).copy()
@@ -76,7 +80,7 @@ def solve_steady(
         seconds=phase.seconds,
         peak_memory=peak_memory(),
         warnings=warnings,
-        notes=list(model.notes),
+        notes=[*model.notes, *changing],
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
         kernels=described(),
     )

@@ -90,6 +90,7 @@ def test_the_acceleration_is_the_slope_of_the_rate(given, wheels):
         ends.append(end.u)
     np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-9 * np.abs(ends[0]).max())
     steady = model.solve()  # at the time 0, as if the rate stayed
+    assert "the rate changes; this is the steady state of 10, as at the time 0" in steady.report.notes
     model.motion = None
     model.add(Rotation("z", 10.0))
     np.testing.assert_array_equal(steady.u, model.solve().u)
