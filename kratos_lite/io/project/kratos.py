@@ -17,8 +17,8 @@ from kratos_lite.io.project.checks import CHECKS, Check
 from kratos_lite.io.project.materials import materials_of
 from kratos_lite.io.project.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.project.settings import Settings, find_file, read_settings
+from kratos_lite.io.scene import Scene
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.model import Model
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
@@ -40,10 +40,8 @@ OTHER_PHYSICS = (
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
-def read_kratos_project(
-    settings: Settings, folder: Path, allow_outside: bool = False
-) -> tuple[Model, list[Check]]:
-    """Return the model and the checks of a Kratos run file.
+def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Scene:
+    """Return what a Kratos run file says.
 
     Parameters
     ----------
@@ -74,7 +72,7 @@ def read_kratos_project(
         model.assign(material, number)
     add_motion(model, settings, times[-1])
     model.notes += notes
-    return model, checks
+    return Scene(model, checks=checks)
 
 
 def _check_root(settings: Settings) -> list[str]:
