@@ -58,21 +58,18 @@ def hht(alpha: float = -0.05) -> Implicit:
     return Implicit(f"hht({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, 0.0, -alpha)
 
 
-def bossak(alpha: float = -0.3, beta: float = 0.25) -> Implicit:
+def bossak(alpha: float = -0.3) -> Implicit:
     """Return the method of Wood, Bossak and Zienkiewicz, -1/3 ≤ α ≤ 0: order 2, high frequencies die out.
 
-    It takes (1 - α) M a⁺ + α M a with γ = 1/2 - α and (1 - α)² β for Newmark's β, as Kratos does.
+    It takes (1 - α) M a⁺ + α M a with γ = 1/2 - α and β = (1 - α)²/4, as Kratos does.
 
     >>> bossak().gamma
     0.8
     """
-    alpha, beta = number(alpha, "the α of Bossak"), number(beta, "the β of Bossak")
+    alpha = number(alpha, "the α of Bossak")
     if not -1 / 3 <= alpha <= 0:
         raise InputError(f"the α of Bossak lies in -1/3 … 0; got {alpha}")
-    if not beta >= 0.25:
-        raise InputError(f"the β of Bossak is 1/4 or more; got {beta}")
-    name = f"bossak({alpha:g})" if beta == 0.25 else f"bossak({alpha:g}, {beta:g})"
-    return Implicit(name, (1 - alpha) ** 2 * beta, 0.5 - alpha, alpha)
+    return Implicit(f"bossak({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, alpha)
 
 
 def generalised_alpha(rho_inf: float = 0.8) -> Implicit:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.arguments import flag, positive_step, whole_number
 from kratos_lite.assembly import Progress
 from kratos_lite.errors import ModelError
+from kratos_lite.loads import NodalForces, Timed
 from kratos_lite.model import Model
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ class March:
     rayleigh : α in 1/s and β in s of the damping α M + β K.
     lumped : whether the mass stands in the nodes.
     displacement, velocity : (n, 3) at the start; at rest if not given.
+    balanced : False lets it start with the acceleration 0 from any displacement and velocity, as Kratos does.
     restart : file of a moment from which to go on, or None.
     """
 
@@ -44,6 +47,7 @@ class March:
     lumped: bool = False
     displacement: NDArray[np.float64] | None = None
     velocity: NDArray[np.float64] | None = None
+    balanced: bool = True
     restart: str | None = None
 
     def __post_init__(self) -> None:
@@ -97,7 +101,10 @@ class Scene:
 
         march = self._march()
         names = ("scheme", "rayleigh", "lumped", "displacement", "velocity")
-        transient = self.model.transient(**{k: getattr(march, k) for k in names}, progress=progress)
+        given = {name: getattr(march, name) for name in names} | {"progress": progress}
+        transient = self.model.transient(**given)
+        if not march.balanced and not (march.displacement is None and march.velocity is None):
+            transient = _held_at_first(transient).transient(**given)
         if march.restart is not None:
             transient.put(Moment.load(march.restart))
         return transient
@@ -111,3 +118,13 @@ class Scene:
         if self.march is None:
             raise ModelError("the input says nothing of a march; give it a section 'time'")
         return self.march
+
+
+def _held_at_first(transient: Transient) -> Model:
+    """Return the model of a transient with a load at its start that balances stiffness and damping there."""
+    e = transient.equations
+    inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)
+    balance = NodalForces(e.system.whole(inner))
+    model = copy(e.model)
+    model.loads = [*model.loads, Timed(lambda time: None if time > 0 else balance)]
+    return model

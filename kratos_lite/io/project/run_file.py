@@ -11,6 +11,7 @@ from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
+from kratos_lite.io.project.kratos_time import DYNAMIC
 from kratos_lite.io.project.march import NO_JSON, NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
@@ -21,8 +22,6 @@ from kratos_lite.model import Model
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
-DYNAMIC = ("Dynamic", "dynamic")
-"""Kratos' solver_type of what moves."""
 LOADS: dict[str, Callable[[str, Any], Load]] = {
     "traction": Traction,
     "pressure": Pressure,
