@@ -202,7 +202,7 @@ ONE_STEP = run_file(
             "assign_scalar_variable_to_conditions_process",
             "Structure.Side",
             "POSITIVE_FACE_PRESSURE",
-            value="1e4*(1+x*z)",
+            value="1e4*(1+x*z+X-Y*Z)",
         ),
         process(
             "assign_vector_variable_to_conditions_process",
@@ -630,7 +630,7 @@ BAD = {
         "DISPLACEMENT_X is held in a part of the run only",
     ),
     "support by place and time": (
-        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", value="t*x")),
+        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", value="t*X")),
         "a support may move with x, y, z or with t, not with both",
     ),
     "two dimensions": (changed(domain_size=2), "domain_size must be 3; got 2"),
@@ -1041,3 +1041,4 @@ def test_expressions_that_kratos_evaluates_on_the_moved_mesh_are_noted(
     content = run_file([CLAMP], [push(expression)], step=step, move_mesh_flag=moves)
     notes = read_project(write(folder, content)).model.notes
     assert sum("as the steps before moved it" in note for note in notes) == noted
+    assert sum("X, Y, Z are 0 on conditions" in note for note in notes) == ("X" in expression)

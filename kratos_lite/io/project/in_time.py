@@ -134,7 +134,7 @@ class ProcessesInTime:
         rows = rows[values.fixed.get(action.component, np.zeros(values.mesh.n_nodes, dtype=bool))[rows]]
         if not len(rows):
             return
-        if action.depends_on_place():
+        if action.mentions("xyzXYZ"):
             raise action.settings.error(
                 "value",
                 f"{action.component}: a support may move with x, y, z or with t, not with both; give each "

@@ -63,19 +63,21 @@ class Action:
 
     def depends_on_place(self) -> bool:
         """Whether an expression holds the place x, y or z of the moved mesh."""
-        return self._mentions("xyz")
+        return self.mentions("xyz")
 
     def depends_on_time(self) -> bool:
         """Whether an expression holds the time t."""
-        return self._mentions("t")
+        return self.mentions("t")
 
-    def _mentions(self, names: str) -> bool:
+    def mentions(self, names: str) -> bool:
+        """Whether an expression holds one of some names of one letter."""
         return any(isinstance(f, str) and re.search(rf"(?<!\w)[{names}](?!\w)", f) for f in self.factors)
 
     def value(self, points: Array, time: float) -> Array | float:
         """Return the value at points (m, 3) in m and a time in s."""
         x, y, z = points.T
-        variables = {"x": x, "y": y, "z": z, "t": time, "X": x, "Y": y, "Z": z}
+        X, Y, Z = 0.0 * points.T if self.on_conditions else points.T  # measured against Kratos 10.4.4
+        variables = {"x": x, "y": y, "z": z, "t": time, "X": X, "Y": Y, "Z": Z}
         product: Any = 1.0
         try:
             for factor in self.factors:
@@ -255,10 +257,13 @@ def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], case: Case) 
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif case.moved and active[-1] > 1 and action.depends_on_place():
             # Before the first step nothing has moved yet.
+            cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
             notes.append(
                 f"{where}: Kratos evaluates x, y, z at time {times[active[-1]]:g} s on the mesh as the steps "
-                "before moved it, kratos_lite on the undeformed one; write X, Y, Z to mean the same"
+                f"before moved it, kratos_lite on the undeformed one; {cure} to mean the same"
             )
+        if action.on_conditions and action.mentions("XYZ"):
+            notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
     return list(dict.fromkeys(notes))
 
 
