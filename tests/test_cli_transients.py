@@ -147,6 +147,7 @@ def test_a_restart_goes_on_bit_by_bit(run, folder):
     assert run("solve", "run.json", "--march", "1e-3:10:5", "--restart", "half.npz", "-o", "b.npz").code == 0
     write("again.json", time={"step": 1e-3, "steps": 10, "every": 5, "restart": "half.npz"}, output="c.npz")
     assert run("solve", "again.json").code == 0
+    assert run("solve", "again.json", "--state", "half.npz").refuses("is the input or another output already")
     with np.load("whole.npz") as whole, np.load("b.npz") as b, np.load("c.npz") as c:
         for name in ("time", "step", "u", "v", "a"):
             assert np.array_equal(whole[name][2:], b[name])

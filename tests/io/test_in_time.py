@@ -143,6 +143,7 @@ def test_supports_that_move_with_t(write):
     model.fix("Bottom", "yz")
     expected = list(model.transient(scheme=kl.bossak()).march(dt=0.01, steps=20))
     same(moments(scene)[-1], expected[-1])
+    assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
 
 
 def test_a_constant_support_replaces_a_moving_one_that_comes_before(write):
@@ -150,6 +151,32 @@ def test_a_constant_support_replaces_a_moving_one_that_comes_before(write):
     assert not scene.model.supports.movements
     scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "t")))
     assert len(scene.model.supports.movements) == 1
+
+
+def test_a_start_on_a_support_leaves_its_movement(write):
+    pulled = ("Structure", "DISPLACEMENT_X", "0.01*Z", {"interval": [0.0, 0.0], "constrained": False})
+    scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
+    assert len(scene.model.supports.movements) == 1
+    end = moments(scene)[-1]
+    bottom = scene.model.mesh.nodes("Bottom")
+    np.testing.assert_allclose(end.u[bottom, 0], 0.01 * end.time, rtol=1e-12)
+    assert scene.march.displacement[:, 0].max() == 0.02
+
+
+@pytest.mark.parametrize("value", ["t", 0.01])
+def test_a_support_that_changes_for_a_while_is_refused(write, value):
+    path = write(*CLAMP, ("Bottom", "DISPLACEMENT_X", value, {"interval": [0.05, 0.1], "constrained": False}))
+    with pytest.raises(kl.InputError, match=r"run\.json:\d+:\d+: .* changes in a part of the run"):
+        read_project(path)
+
+
+def test_a_kratos_file_with_the_key_of_ours_is_no_march(write, run):
+    path = write(*CLAMP)
+    content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
+    content["solver_settings"]["solver_type"] = "static"
+    path.write_text(json.dumps(content))
+    assert not is_in_time(path)
+    assert "key 'time' is not used" in run("solve", path).out
 
 
 def test_nodal_data_of_the_mesh_file_is_the_start(write):

@@ -66,7 +66,7 @@ class ProcessesInTime:
             if action.fixed:
                 values.fix(action.component, action.rows)
         for i, action in enumerate(self.actions):
-            if action.component.startswith("DISPLACEMENT") and action.depends_on_time():
+            if action.component.startswith("DISPLACEMENT") and action.factors:
                 self._move(i, action, values)
         for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
             mine = [i for i, action in enumerate(self.actions) if action.component in group]
@@ -85,6 +85,10 @@ class ProcessesInTime:
             model.fix(rows, axis, course, override=True)
         if model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
+        if self._moving:
+            model.notes.append(
+                "velocities of supports that move are those of their function; Kratos takes Newmark's formulas"
+            )
         model.notes += self.notes
 
     def at(self, i: int, time: float) -> float | None:
@@ -99,15 +103,14 @@ class ProcessesInTime:
     # ---- supports and start ----------------------------------------------------------------------------
 
     def _check(self, values: Variables) -> None:
-        every = set(range(1, len(self.case.times)))
-        for action, steps in zip(self.actions, self.steps, strict=True):
+        for i, action in enumerate(self.actions):
             if action.fixed and action.component.startswith(HELD):
                 raise action.settings.error(
                     "variable_name",
                     f"{action.component} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
                     '"constrained": false and "interval": [0.0, 0.0] for an initial value',
                 )
-            if action.fixed and action.component.startswith("DISPLACEMENT") and not every <= set(steps):
+            if action.fixed and action.component.startswith("DISPLACEMENT") and not self._acts_always(i):
                 raise action.settings.error(
                     "interval",
                     f"{action.component} is held in a part of the run only; hold it from start to end, "
@@ -128,11 +131,21 @@ class ProcessesInTime:
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
     def _move(self, i: int, action: Action, values: Variables) -> None:
-        """Keep the movement of the supports that an action gives."""
-        taken = [a.rows for a in self.actions[i + 1 :] if a.component == action.component and a.factors]
-        rows = np.setdiff1d(action.rows, np.concatenate([np.zeros(0, dtype=np.int64), *taken]))
-        rows = rows[values.fixed.get(action.component, np.zeros(values.mesh.n_nodes, dtype=bool))[rows]]
-        if not len(rows):
+        """Keep the movement of the supports that an action gives; refuse one of a part of the run."""
+        fixed = values.fixed.get(action.component, np.zeros(values.mesh.n_nodes, dtype=bool))
+        rows = action.rows[fixed[action.rows]]
+        if not len(rows) or self._acts(i) == 0:
+            return
+        if not self._acts_always(i):
+            raise action.settings.error(
+                "interval",
+                f"{action.component} of a support changes in a part of the run only; give it as one function "
+                'of t with the interval [0.0, "End"]',
+            )
+        for k, later in enumerate(self.actions[i + 1 :], start=i + 1):
+            if later.component == action.component and later.factors and self._acts_always(k):
+                rows = np.setdiff1d(rows, later.rows)
+        if not action.depends_on_time() or not len(rows):
             return
         if action.mentions("xyzXYZ"):
             raise action.settings.error(
@@ -140,19 +153,19 @@ class ProcessesInTime:
                 f"{action.component}: a support may move with x, y, z or with t, not with both; give each "
                 "part a process of its own",
             )
-        if len(self.steps[i]) < len(self.case.times) - 1:
-            raise action.settings.error(
-                "interval",
-                f"{action.component} of a support changes in a part of "
-                'the run only; use the interval [0.0, "End"]',
-            )
         point = np.zeros((1, 3))
         self._moving.append((rows, action.component[-1].lower(), lambda t: float(action.value(point, t))))
 
+    def _acts(self, i: int) -> int:
+        """Return the number of steps, without the start, in which an action acts."""
+        return len(self.steps[i]) - (self.steps[i][0] == 0)
+
+    def _acts_always(self, i: int) -> bool:
+        return self._acts(i) == len(self.case.times) - 1
+
     def _is_steady(self, i: int) -> bool:
         """Whether an action does the same in all steps."""
-        active = set(self.steps[i]) - {0}
-        return not self.actions[i].depends_on_time() and len(active) == len(self.case.times) - 1
+        return not self.actions[i].depends_on_time() and self._acts_always(i)
 
 
 def _begun(time: float) -> float:

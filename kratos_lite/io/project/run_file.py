@@ -63,8 +63,10 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
 def is_in_time(path: str | Path) -> bool:
     """Return whether a run file asks for a march, without reading what it names."""
     values = read_settings(path).values
+    if "solver_settings" not in values and "problem_data" not in values:
+        return "time" in values
     solver = values.get("solver_settings")
-    return "time" in values or (isinstance(solver, Object) and solver.get("solver_type") in DYNAMIC)
+    return isinstance(solver, Object) and solver.get("solver_type") in DYNAMIC
 
 
 def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
