@@ -87,7 +87,7 @@ class ProcessesInTime:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self._moving:
             model.notes.append(
-                "velocities of supports that move are those of their function; Kratos takes Newmark's formulas"
+                "supports that move have the velocity of their function; Kratos takes Newmark's formulas"
             )
         model.notes += self.notes
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from kratos_lite.dynamics import bossak, newmark
-from kratos_lite.dynamics.schemes import Implicit
+from typing import TYPE_CHECKING
+
 from kratos_lite.errors import InputError
 from kratos_lite.io.project.case import times_of
 from kratos_lite.io.project.in_time import ProcessesInTime
 from kratos_lite.io.project.settings import Settings
 from kratos_lite.io.scene import March
+
+if TYPE_CHECKING:
+    from kratos_lite.dynamics.schemes import Implicit
 
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
@@ -43,6 +46,8 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
 
 def _scheme(solver: Settings) -> Implicit:
     """Return the scheme that Kratos would take."""
+    from kratos_lite.dynamics import bossak, newmark
+
     method = solver.text("time_integration_method", "implicit")
     if method != "implicit":
         raise solver.error(

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kratos_lite.arguments import positive_step, whole_number
-from kratos_lite.dynamics import CentralDifference, bossak, generalised_alpha, hht, newmark
-from kratos_lite.dynamics.schemes import Implicit
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.project.settings import Settings, inside, is_number, shown
 from kratos_lite.io.project.strict_json import Object
@@ -16,19 +14,23 @@ from kratos_lite.io.scene import March
 from kratos_lite.loads import Load, Varying
 from kratos_lite.series import TimeSeries
 
+if TYPE_CHECKING:
+    from kratos_lite.dynamics import CentralDifference
+    from kratos_lite.dynamics.schemes import Implicit
+
 KEYS = ("step", "steps", "every", "scheme", "rayleigh", "lumped", "restart")
 SERIES = (".pvd", ".csv", ".npz")
 """Endings of files that hold a march."""
 NO_JSON = "a march has no .json; its numbers by time go to an output .csv or .npz"
 NO_RESULT = "{}: a march is written as .pvd (for ParaView), .csv or .npz"
-SCHEMES: dict[str, tuple[Callable[..., Implicit | CentralDifference], tuple[int, ...]]] = {
-    "newmark": (newmark, (0, 2)),
-    "hht": (hht, (0, 1)),
-    "bossak": (bossak, (0, 1)),
-    "generalised_alpha": (generalised_alpha, (0, 1)),
-    "central_difference": (CentralDifference, (0,)),
+SCHEMES = {
+    "newmark": (0, 2),
+    "hht": (0, 1),
+    "bossak": (0, 1),
+    "generalised_alpha": (0, 1),
+    "central_difference": (0,),
 }
-"""Schemes by name, and how many numbers each takes."""
+"""How many numbers each scheme takes."""
 
 
 def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
@@ -39,9 +41,13 @@ def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
     """
     if name not in SCHEMES:
         raise InputError(f"unknown scheme {name!r}.{nearest(name, SCHEMES)} Known are {', '.join(SCHEMES)}")
-    make, counts = SCHEMES[name]
+    counts = SCHEMES[name]
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
+    from kratos_lite import dynamics
+
+    make: Callable[..., Implicit | CentralDifference]
+    make = getattr(dynamics, "CentralDifference" if name == "central_difference" else name)
     return make(*numbers)
 
 
