@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         CentralDifference,
         Moment,
         Transient,
+        bossak,
         critical_rate,
         generalised_alpha,
         hht,
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
         NodalForces,
         PointLoad,
         Pressure,
+        Timed,
         Traction,
         Varying,
     )
@@ -99,8 +101,8 @@ _HOME = {
     ),
     "kratos_lite.characteristics": "Characteristics",
     "kratos_lite.dynamics": (
-        "CentralDifference Moment Transient critical_rate generalised_alpha hht material_velocity newmark "
-        "reaction_resultant"
+        "CentralDifference Moment Transient bossak critical_rate generalised_alpha hht material_velocity "
+        "newmark reaction_resultant"
     ),
     "kratos_lite.elements": (
         "ELEMENTS KinematicLinear KinematicLinear3D4N KinematicLinear3D5N KinematicLinear3D6N "
@@ -111,7 +113,7 @@ _HOME = {
     "kratos_lite.generate": "annulus box",
     "kratos_lite.io.files": "read write",
     "kratos_lite.io.trajectory": "Series trajectory_picture",
-    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Traction Varying",
+    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Timed Traction Varying",
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",
     "kratos_lite.model": "Model",
@@ -176,6 +178,7 @@ __all__ = [
     "Spring",
     "State",
     "TimeSeries",
+    "Timed",
     "Torque",
     "Traction",
     "Transient",
@@ -183,6 +186,7 @@ __all__ = [
     "__version__",
     "ale",
     "annulus",
+    "bossak",
     "box",
     "convert",
     "critical_rate",

@@ -170,13 +170,50 @@ class Varying(Load):
     """
 
     def __init__(self, load: Load, factor: Factor) -> None:
-        if not isinstance(load, Load) or isinstance(load, Varying):
+        if not isinstance(load, Load) or isinstance(load, (Varying, Timed)):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         self.load, self.factor = load, function_of(factor, "the factor of a load")
 
     def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
         """Return the nodal forces (n, 3) in N at the time 0."""
         return self.factor(0.0) * self.load.forces(mesh, batches)
+
+
+class Timed(Load):
+    """A load that a function of the time gives, such as one that moves.
+
+    Where nothing moves it is what it is at the time 0.
+
+    Parameters
+    ----------
+    load : function of the time in s that returns a load, or None where nothing acts.  As long as it returns
+        the same object, the nodal forces of that are kept; a factor alone is better told by `Varying`.
+
+    Examples
+    --------
+    >>> moving = Timed(lambda t: PointLoad(lambda X: abs(X[:, 0] - 3.0 * t) < 0.01, (0.0, 0.0, -1e3)))
+    >>> moving.at(0.5).force
+    array([    0.,     0., -1000.])
+    """
+
+    def __init__(self, load: Callable[[float], Load | None]) -> None:
+        if not callable(load) or isinstance(load, Load):
+            raise InputError(f"a function of the time that returns a load is needed; got {load!r}")
+        self.load = load
+
+    def at(self, time: float) -> Load | None:
+        """Return the load at a time in s, or None; InputError if the function returns anything else."""
+        found = self.load(time)
+        if found is not None and (not isinstance(found, Load) or isinstance(found, (Varying, Timed))):
+            raise InputError(
+                f"the load at t = {time:g} s must be a PointLoad or another, or None; got {found!r}"
+            )
+        return found
+
+    def forces(self, mesh: Mesh, batches: Sequence[Batch]) -> Array:
+        """Return the nodal forces (n, 3) in N at the time 0."""
+        found = self.at(0.0)
+        return np.zeros_like(mesh.points) if found is None else found.forces(mesh, batches)
 
 
 class LineLoad(Traction):

@@ -91,6 +91,24 @@ def test_cantilever_folder_of_kratos_bends_as_a_beam(tmp_path):
     assert result["total_reaction"][2] == pytest.approx(F, rel=1e-9)
 
 
+def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
+    gust, table = EXAMPLES / "tower" / "gust.json", tmp_path / "swing.csv"
+    out = run(sys.executable, "-m", "kratos_lite", "solve", gust, "-o", table)
+    rows = np.array([line.split(",") for line in table.read_text().splitlines()[1:]], dtype=float)
+    assert len(rows) == 201
+    largest, time = rows[:, 2].max(), rows[rows[:, 2].argmax(), 0]
+    q, length, EI, mass = 1000.0 * 2, 20.0, 30e9 * 2**4 / 12, 2500.0 * 4
+    still = q * length**4 / (8 * EI)
+    omega = 1.8751041**2 * (EI / (mass * length**4)) ** 0.5
+    ratio = 0.3 / (2 * omega) + 0.001 * omega / 2  # of Rayleigh damping
+    assert largest == pytest.approx(still * (1 + np.exp(-np.pi * ratio)), rel=0.03)
+    assert time == pytest.approx(np.pi / omega, abs=0.02)
+    assert f"{largest:.6e} m at node" in out
+    assert json.loads(gust.read_text()) == json.loads(
+        re.findall(r"```json\n(.*?)```", (EXAMPLES.parent / "docs" / "dynamics.md").read_text(), re.DOTALL)[0]
+    )
+
+
 def test_own_element_passes_its_conformance_kit():
     out = run(sys.executable, "-m", "kratos_lite", "check", EXAMPLES / "my_wedge.py")
     assert "0 failed" in out

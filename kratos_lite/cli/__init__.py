@@ -77,10 +77,15 @@ SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve ProjectParameters.json --json result.json
   kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
   kratos-lite solve bridge.mdpa --modes 10
+  kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --march 1e-3:500:10 -o swing.pvd
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
 
 
+SCHEMES = (
+    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalised_alpha[:RHO] or "
+    "central_difference (newmark, the trapezoidal rule)"
+)
 RESTART = (
     "go on from a state that --state wrote; series and picture then hold the rest of the march only, and "
     "replace those of the same name, so give them new names"
@@ -108,10 +113,17 @@ def _add(commands: object, name: str, text: str, example: str) -> argparse.Argum
 
 
 def _add_solve(commands: object) -> None:
-    solve = _add(commands, "solve", "solve a static linear model and print a summary", SOLVE_EXAMPLES)
+    solve = _add(
+        commands, "solve", "solve a linear model, at rest or in time, and print a summary", SOLVE_EXAMPLES
+    )
     solve.add_argument("input", help=INPUT)
     out = solve.add_argument_group("output")
-    out.add_argument("-o", "--output", metavar="OUT.vtu", help="results for ParaView (or .vtk, .json)")
+    out.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT.vtu",
+        help="results for ParaView (or .vtk, .json); of a march .pvd, .csv or .npz",
+    )
     out.add_argument("--json", metavar="OUT.json", help="summary, displacements and reactions by node id")
     out.add_argument(
         "--vtu",
@@ -142,6 +154,7 @@ def _add_solve(commands: object) -> None:
     ):
         given.add_argument(option, metavar=meta, help=text, **repeat)  # type: ignore[arg-type]
     _add_motion(solve)
+    _add_time(solve)
     how = solve.add_argument_group("solver")
     how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
@@ -168,6 +181,21 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         help="what the cut faces of the window do (absorbing)",
     )
     ale.add_argument("--damping", metavar="ALPHA", help="by mass, relative to the motion, in 1/s (0)")
+
+
+def _add_time(solve: argparse.ArgumentParser) -> None:
+    time = solve.add_argument_group("motion in time, instead of rest (docs/dynamics.md)")
+    time.add_argument(
+        "--march", metavar="STEP:STEPS[:EVERY]", help="step in s, their number, and every how many is kept"
+    )
+    for option, meta, text in (
+        ("--scheme", "NAME[:NUMBERS]", SCHEMES),
+        ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K, in 1/s and s"),
+        ("--restart", "MOMENT.npz", "go on from a moment that --state wrote"),
+        ("--state", "OUT.npz", "the last moment, for --restart; written after Ctrl-C too"),
+    ):
+        time.add_argument(option, metavar=meta, help=text)
+    time.add_argument("--lumped", action="store_true", help="mass in the nodes")
 
 
 def _add_march(commands: object) -> None:
@@ -267,7 +295,7 @@ def _discard_output() -> None:
 
 def _join_negative(arguments: Sequence[str]) -> list[str]:
     """Join ``--gravity -9.81,0,0`` and the like to one word, which argparse would take for another option."""
-    numeric = ("--gravity", "--centre", "--center", "--rotation", "--translation")
+    numeric = ("--gravity", "--centre", "--center", "--rotation", "--translation", "--rayleigh", "--march")
     joined: list[str] = []
     for word in arguments:
         if joined and joined[-1] in numeric and word[:1] == "-":

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from kratos_lite.cli.options import apply, material
+from kratos_lite.cli.options import apply, marches, material
 from kratos_lite.cli.targets import check_targets, files_read
 from kratos_lite.errors import InputError, ModelError, SolveError
 
@@ -43,6 +43,12 @@ class TerminalProgress:
                 f"\r{phase:<10} {share:5.0%}  {now - self.start:6.1f} s", end="", file=sys.stderr, flush=True
             )
 
+    def __enter__(self) -> TerminalProgress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """Wipe the line."""
         if self.shown:
@@ -70,11 +76,8 @@ def march(options: Namespace) -> int:
     use_threads(options.threads)
     from kratos_lite.cli.marching import march_scene
 
-    progress = TerminalProgress(options.progress)
-    try:
+    with TerminalProgress(options.progress) as progress:
         return march_scene(options, progress)
-    finally:
-        progress.close()
 
 
 def use_threads(count: int | None) -> None:
@@ -92,6 +95,8 @@ def _solve(options: Namespace, clock: float) -> int:
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     read = files_read(options.input)
+    if marches(options):
+        return _solve_in_time(options, read)
     _targets(options, {}, read)
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
@@ -110,11 +115,8 @@ def _solve(options: Namespace, clock: float) -> int:
 
         print(modes_table(scene.model, options.modes))
         return 0
-    progress = TerminalProgress()
-    try:
+    with TerminalProgress() as progress:
         result = scene.model.solve(solver, tolerance, progress)
-    finally:
-        progress.close()
     result.report.seconds = {**seconds, **result.report.seconds}
     lines: list[str] = []
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
@@ -127,7 +129,21 @@ def _solve(options: Namespace, clock: float) -> int:
         _write(result, targets, options)
         for line in lines:
             print(line)
-    return EXIT_CHECK_FAILED if any(" failed " in line for line in lines) else 0
+    return EXIT_CHECK_FAILED if any(map(_is_failed, lines)) else 0
+
+
+def _solve_in_time(options: Namespace, read: list[Path]) -> int:
+    """March the model of a file, print the summary and the checks."""
+    from kratos_lite.cli.transients import march_file
+
+    with TerminalProgress() as progress:
+        lines = march_file(options, read, progress)
+    print("\n".join(lines), end="\n" if lines else "")
+    return EXIT_CHECK_FAILED if any(map(_is_failed, lines)) else 0
+
+
+def _is_failed(line: str) -> bool:
+    return line.startswith("check ") and " failed " in line
 
 
 def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dict[str, str]:
@@ -137,6 +153,9 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
     """
     from kratos_lite.io.results import check_picture, check_result_ending
 
+    if Path(options.output or given.get("output", "")).suffix.lower() in (".pvd", ".csv", ".npz"):
+        path = options.output or given["output"]
+        raise InputError(f"{path}: that is for a march; add --march STEP:STEPS, or write .vtu")
     asked = {key: getattr(options, key) for key in ("output", "json", "picture")}
     targets = {key: given.get(key) if path is None else path for key, path in asked.items()}
     found = {key: path for key, path in targets.items() if path is not None}
@@ -165,7 +184,7 @@ def info(options: Namespace) -> int:
     """Describe a file; of a run file, the model that it means."""
     from kratos_lite.io.describe import describe
     from kratos_lite.io.documents import ending
-    from kratos_lite.io.files import read
+    from kratos_lite.io.files import load
     from kratos_lite.io.scenes.kinds import is_scene
 
     if is_scene(options.input):
@@ -175,7 +194,10 @@ def info(options: Namespace) -> int:
         scene = read_scene(options.input, strict=not options.lenient)
         print(f"{'file':<22}{Path(options.input).name}\n{describe_scene(scene)}")
     elif ending(options.input) == ".json":
-        print(f"{'file':<12}{Path(options.input).name}\n{read(options.input)}")
+        found = load(options.input)
+        print(f"{'file':<12}{Path(options.input).name}\n{found.model}")
+        if found.march is not None:
+            print(f"{'time':<12}{found.march}")
     else:
         print(describe(_document(options)))
     return 0
@@ -216,15 +238,22 @@ def check(options: Namespace) -> int:
         return check_scene(path, strict=not options.lenient)
     if path.suffix == ".py":
         return _check_python(path)
-    from kratos_lite.io.files import read
+    from kratos_lite.io.files import load
 
-    model = read(path, strict=not options.lenient)
-    needs, warnings = _needs(model)
-    print(f"{path}: {model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements, no errors")
+    scene = load(path, strict=not options.lenient)
+    model, march = scene.model, scene.march
+    if march is None:
+        needs, warnings = _needs(model)
+    else:
+        from kratos_lite.cli.transients import needs_of_march
+
+        needs, warnings = needs_of_march(scene)
+    size = f"{model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements"
+    print(f"{path}: {size}{'' if march is None else f', {march}'}, no errors")
     for text in (*warnings, *model.notes):
         print(f"note     {text}")
     for text in needs:
-        print(f"to solve {text}")
+        print(f"to {'solve' if march is None else 'march'} {text}")
     return 0
 
 

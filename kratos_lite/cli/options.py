@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from kratos_lite.materials import LinearMaterial
     from kratos_lite.model import Model
 
+MARCHING = ("scheme", "rayleigh", "lumped", "restart", "state")
+"""Options that say how a model marches."""
+
 
 def number(text: str, option: str) -> float:
     """Return a finite number or say which option holds what instead."""
@@ -163,3 +166,20 @@ def apply(model: Model, options: Namespace) -> None:
         model.add(PointLoad(part, vector(rest, "--point-load")))
     if (given_motion := motion(model, options)) is not None:
         model.add(given_motion)
+
+
+def marches(options: Namespace) -> bool:
+    """Whether a march is asked for by the options or by a run file."""
+    from kratos_lite.io.documents import ending
+
+    if options.march is not None:
+        return True
+    if ending(options.input) == ".json":
+        from kratos_lite.io.project import is_in_time
+
+        if is_in_time(options.input):
+            return True
+    for name in MARCHING:
+        if getattr(options, name):
+            raise InputError(f"--{name} belongs to a march; add --march STEP:STEPS")
+    return False

@@ -9,7 +9,7 @@ from typing import Any
 
 from kratos_lite.errors import InputError
 
-KEYS_READ = ("model", "input_filename", "materials_filename", "input_file_name")
+KEYS_READ = ("model", "input_filename", "materials_filename", "input_file_name", "restart")
 """Keys of run files that name files to be read."""
 
 

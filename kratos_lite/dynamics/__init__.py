@@ -4,7 +4,7 @@ from kratos_lite.dynamics.equations import EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rate
 from kratos_lite.dynamics.moment import Moment
 from kratos_lite.dynamics.outputs import material_velocity, reaction_resultant
-from kratos_lite.dynamics.schemes import CentralDifference, generalised_alpha, hht, newmark
+from kratos_lite.dynamics.schemes import CentralDifference, bossak, generalised_alpha, hht, newmark
 from kratos_lite.dynamics.transient import Transient
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "EquationsOfMotion",
     "Moment",
     "Transient",
+    "bossak",
     "critical_rate",
     "generalised_alpha",
     "hht",

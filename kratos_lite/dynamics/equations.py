@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -20,7 +20,7 @@ from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.loads import Varying
+from kratos_lite.loads import Load, Timed, Varying
 from kratos_lite.mass import Mass
 from kratos_lite.mobility import check_supports
 from kratos_lite.solvers.banded import add_scalar
@@ -105,18 +105,25 @@ class EquationsOfMotion:
     # ---- loads and supports ------------------------------------------------------------------------------
 
     @cached_property
-    def _loads(self) -> tuple[Array, list[tuple[Array, Callable[[float], float]]]]:
-        """Constant nodal forces, and those that change with their factors."""
+    def _loads(self) -> tuple[Array, list[Callable[[float], Array]]]:
+        """Constant nodal forces (3a,), and functions of the time that give those that change."""
         mesh, batches = self.model.mesh, self.model.batches()
-        constant, changing = np.zeros(self.size), []
+        constant = np.zeros(self.size)
+        changing: list[Callable[[float], Array]] = []
+
+        def local(load: Load) -> Array:
+            return self.system.local(load.forces(mesh, batches))
+
         initial = initial_loads(self.model, batches)
         if initial is not None:
             constant -= self.system.local(initial)
         for load in self.model.loads:
             if isinstance(load, Varying):
-                changing.append((self.system.local(load.load.forces(mesh, batches)), load.factor))
+                changing.append(partial(_scaled, load.factor, local(load.load)))
+            elif isinstance(load, Timed):
+                changing.append(_TimedForces(load, local, self.size))
             else:
-                constant += self.system.local(load.forces(mesh, batches))
+                constant += local(load)
         return constant, changing
 
     @property
@@ -135,8 +142,8 @@ class EquationsOfMotion:
         """Return the nodal forces (3a,) at a time, those of the motion among them."""
         constant, changing = self._loads
         total = constant.copy()
-        for forces, factor in changing:
-            total += factor(time) * forces
+        for forces in changing:
+            total += forces(time)
         return total + self.inertia_load(time)
 
     def inertia_load(self, time: float) -> Array:
@@ -376,3 +383,29 @@ def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:
     if values.shape != (2,) or (values < 0).any():
         raise InputError(f"Rayleigh damping is α ≥ 0 in 1/s and β ≥ 0 in s; got {rayleigh!r}")
     return float(values[0]), float(values[1])
+
+
+def _scaled(factor: Callable[[float], float], forces: Array, time: float) -> Array:
+    return factor(time) * forces
+
+
+class _TimedForces:
+    """Nodal forces (3a,) of a `Timed` load; those of the last two times are kept."""
+
+    def __init__(self, timed: Timed, forces_of: Callable[[Load], Array], size: int) -> None:
+        self.timed, self.forces_of, self.size = timed, forces_of, size
+        self.kept: list[tuple[float, Load | None, Array]] = []
+
+    def __call__(self, time: float) -> Array:
+        """Return the forces at a time."""
+        for at, _, forces in self.kept:
+            if at == time:
+                return forces
+        load = self.timed.at(time)
+        same = [forces for _, one, forces in self.kept if one is load]
+        if same:
+            forces = same[0]
+        else:
+            forces = np.zeros(self.size) if load is None else self.forces_of(load)
+        self.kept = [*self.kept[-1:], (time, load, forces)]
+        return forces

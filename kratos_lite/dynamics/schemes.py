@@ -5,7 +5,8 @@ The generalised-α method takes M a at t⁺ - αm h, and C v + K u - f at t⁺ -
     a⁺ = (Δu - h v) / (β h²) - (1/(2β) - 1) a,    v⁺ = v + h ((1 - γ) a + γ a⁺)
 
 Source: Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375; Hilber, Hughes & Taylor, Earthq. Eng. Struct. Dyn.
-5 (1977) 283-292; Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94.
+5 (1977) 283-292; Wood, Bossak & Zienkiewicz, Int. J. Numer. Meth. Eng. 15 (1980) 1562-1566; Newmark, J. Eng.
+Mech. Div. ASCE 85 (1959) 67-94.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from kratos_lite.errors import InputError
 
 @dataclass(frozen=True)
 class Implicit:
-    """A generalised-α method by its four numbers; see `newmark`, `hht` and `generalised_alpha`."""
+    """A generalised-α method by its four numbers; see `newmark`, `hht`, `bossak` and `generalised_alpha`."""
 
     name: str
     beta: float
@@ -55,6 +56,20 @@ def hht(alpha: float = -0.05) -> Implicit:
     if not -1 / 3 <= alpha <= 0:
         raise InputError(f"the α of HHT lies in -1/3 … 0; got {alpha}")
     return Implicit(f"hht({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, 0.0, -alpha)
+
+
+def bossak(alpha: float = -0.3) -> Implicit:
+    """Return the method of Wood, Bossak and Zienkiewicz, -1/3 ≤ α ≤ 0: order 2, high frequencies die out.
+
+    It takes (1 - α) M a⁺ + α M a with γ = 1/2 - α and β = (1 - α)²/4, as Kratos does.
+
+    >>> bossak().gamma
+    0.8
+    """
+    alpha = number(alpha, "the α of Bossak")
+    if not -1 / 3 <= alpha <= 0:
+        raise InputError(f"the α of Bossak lies in -1/3 … 0; got {alpha}")
+    return Implicit(f"bossak({alpha:g})", (1 - alpha) ** 2 / 4, 0.5 - alpha, alpha)
 
 
 def generalised_alpha(rho_inf: float = 0.8) -> Implicit:

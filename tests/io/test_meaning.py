@@ -90,7 +90,7 @@ def test_properties_without_use_are_noted_but_not_those_that_are_zero(load):
 @pytest.mark.parametrize(
     ("block", "variable"),
     [
-        ("NodalData VELOCITY\n1 0 [3] (0,0,0)\nEnd NodalData", "VELOCITY"),
+        ("NodalData ACCELERATION\n1 0 [3] (0,0,0)\nEnd NodalData", "ACCELERATION"),
         ("ConditionalData FANCY\n3 [3] (0,0,-77)\nEnd ConditionalData", "FANCY"),
         ("NodalData LOCAL_INERTIA_TENSOR\n1 0 [1,1] ((2))\nEnd NodalData", "LOCAL_INERTIA_TENSOR"),
     ],

@@ -202,7 +202,7 @@ ONE_STEP = run_file(
             "assign_scalar_variable_to_conditions_process",
             "Structure.Side",
             "POSITIVE_FACE_PRESSURE",
-            value="1e4*(1+x*z)",
+            value="1e4*(1+x*z+X-Y*Z)",
         ),
         process(
             "assign_vector_variable_to_conditions_process",
@@ -356,7 +356,7 @@ def test_plastic_law_is_refused_by_name_and_part(shared):
 
 
 def test_eigenvalue_run_is_refused(shared):
-    with pytest.raises(InputError, match="solver_type 'eigen_value': only static"):
+    with pytest.raises(InputError, match="solver_type 'eigen_value': run files are solved as"):
         read_project(shared / "cases" / "eigen_cube_8N" / "Eigen_TL_3D8N_Cube_test_parameters.json")
 
 
@@ -597,8 +597,42 @@ def misplaced():
     return {**content, "loads_process_list": []}
 
 
+def in_time(*constraints):
+    return run_file([CLAMP, *constraints], [GRAVITY], step=0.1, solver_type="dynamic")
+
+
 BAD = {
-    "dynamic": (changed(solver_type="Dynamic"), "only static"),
+    "explicit": (
+        changed(solver_type="Dynamic", time_integration_method="explicit"),
+        "time_integration_method 'explicit' is not supported: take 'implicit' with 'newmark'",
+    ),
+    "scheme": (changed(solver_type="dynamic", scheme_type="bdf2"), "scheme_type 'bdf2' is not supported"),
+    "Bossak's number": (
+        changed(solver_type="dynamic", damp_factor_m=0.5),
+        "the α of Bossak lies in -1/3 … 0",
+    ),
+    "Newmark's number": (changed(solver_type="dynamic", newmark_beta=0.0), "newmark_beta must be 0.25"),
+    "damping": (changed(solver_type="dynamic", rayleigh_beta=-1.0), "rayleigh_beta must be ≥ 0"),
+    "late start": (
+        {**changed(solver_type="dynamic"), "problem_data": {"start_time": 0.5, "end_time": 1.0}},
+        "start_time must be 0 for dynamic solutions",
+    ),
+    "fixed velocity": (
+        in_time(process("assign_scalar_variable_process", "Top", "VELOCITY_X", value=1.0)),
+        "VELOCITY_X cannot be fixed",
+    ),
+    "support that ends": (
+        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", interval=[0.0, 0.5])),
+        "DISPLACEMENT_X is held in a part of the run only",
+    ),
+    "support that begins": (
+        in_time(process("fix_scalar_variable_process", "Top", "DISPLACEMENT_X", interval=[0.5, "End"])),
+        "DISPLACEMENT_X is held in a part of the run only",
+    ),
+    "support by place and time": (
+        in_time(process("assign_scalar_variable_process", "Top", "DISPLACEMENT_X", value="t*X")),
+        "a support may move with x, y, z or with t, not with both",
+    ),
     "two dimensions": (changed(domain_size=2), "domain_size must be 3; got 2"),
     "domain size as text": (
         changed(domain_size="3"),
@@ -1007,3 +1041,4 @@ def test_expressions_that_kratos_evaluates_on_the_moved_mesh_are_noted(
     content = run_file([CLAMP], [push(expression)], step=step, move_mesh_flag=moves)
     notes = read_project(write(folder, content)).model.notes
     assert sum("as the steps before moved it" in note for note in notes) == noted
+    assert sum("X, Y, Z are 0 on conditions" in note for note in notes) == ("X" in expression)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
-from kratos_lite.loads import Gravity, Varying
+from kratos_lite.loads import Gravity, Timed, Varying
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model import Model
@@ -34,7 +34,7 @@ def document_from(model: Model) -> Document:
         "an initial displacement": model.initial_displacement is not None,
         "a motion of the material": model.motion is not None,
         "a support that moves in time": bool(model.supports.movements),
-        "a load that changes in time": any(isinstance(load, Varying) for load in model.loads),
+        "a load that changes in time": any(isinstance(load, (Varying, Timed)) for load in model.loads),
     }
     for what, given in unwritten.items():
         if given:

@@ -11,9 +11,11 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
-from kratos_lite.io.kratos.variables import LOADING, VECTORS, Variables, components
+from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.mesh import Block, distinct, rows_of_ids
 from kratos_lite.model import Model
+
+STATIC_ONLY = "do not matter in linear statics"
 
 
 def model_from(
@@ -99,7 +101,7 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
         if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
         elif data.variable.startswith("DISPLACEMENT") and data.values.any():
-            text = f"initial values of {data.variable} do not matter in linear statics"
+            text = f"initial values of {data.variable} {STATIC_ONLY}"
             model.notes.append(str(Note(data.line, text, data.source)))
     if document.condition_data:
         ids = np.concatenate([np.zeros(0, dtype=np.int64), *(block.ids for block in mesh.conditions)])
@@ -115,7 +117,7 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
 
 def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
     """Whether the values have the size of their variable; note what is unused, refuse what is wrong."""
-    wanted = (3,) if data.variable in VECTORS else ()
+    wanted = (3,) if data.variable in SPLIT else ()
     if not data.values.size or data.values.shape[1:] == wanted:
         return True
     size = list(data.values.shape[1:]) or "of one number"

@@ -6,7 +6,7 @@ turns them into supports and loads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,10 @@ LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
 
 
+SPLIT = (*VECTORS, "VELOCITY")
+"""Vector variables that are kept by component; velocities are those at the start of a march."""
+
+
 def components(variable: str, values: ArrayLike) -> dict[str, Array]:
     """Return a vector variable as its three components, a scalar as itself.
 
@@ -36,7 +40,7 @@ def components(variable: str, values: ArrayLike) -> dict[str, Array]:
     ['POINT_LOAD_X', 'POINT_LOAD_Y', 'POINT_LOAD_Z']
     """
     array = np.asarray(values, dtype=float)
-    if variable in VECTORS and array.shape[-1:] == (3,):
+    if variable in SPLIT and array.shape[-1:] == (3,):
         return {f"{variable}_{axis}": array[..., i] for i, axis in enumerate("XYZ")}
     return {variable: array}
 
@@ -67,15 +71,40 @@ class Variables:
             field = self.conditional.setdefault(name, np.zeros(self.mesh.n_conditions))
             field[np.asarray(rows, dtype=np.int64)] = value
 
+    def copy(self) -> Variables:
+        """Return a copy that can be changed without changing this."""
+        return self.only({*self.nodal, *self.fixed, *self.conditional})
+
+    def only(self, names: Container[str]) -> Variables:
+        """Return a copy of some scalars and components."""
+        other = Variables(self.mesh)
+        other.nodal = {k: v.copy() for k, v in self.nodal.items() if k in names}
+        other.fixed = {k: v.copy() for k, v in self.fixed.items() if k in names}
+        other.conditional = {k: v.copy() for k, v in self.conditional.items() if k in names}
+        return other
+
+    def drop(self, names: Iterable[str]) -> None:
+        """Forget the values of some scalars and components."""
+        for name in names:
+            self.nodal.pop(name, None)
+            self.conditional.pop(name, None)
+
+    def vector(self, variable: str) -> Array:
+        """Return the values (n, 3) of a vector variable on the nodes."""
+        return self._vector(self.nodal, variable, self.mesh.n_nodes)
+
+    def gravity(self) -> Gravity | None:
+        """Return the weight that the nodes state, or None."""
+        g = self.vector("VOLUME_ACCELERATION")
+        return Gravity(g) if g.any() else None
+
     def apply(self, model: Model) -> None:
         """Add the supports and loads that the values mean to a model, and note those without effect."""
         self._apply_supports(model)
-        g = self._vector(self.nodal, "VOLUME_ACCELERATION", self.mesh.n_nodes)
-        if g.any():
-            model.add(Gravity(g))
-        loads = self._condition_loads(model)
-        if loads is not None:
-            model.add(loads)
+        for load in (self.gravity(), self.condition_loads()):
+            if load is not None:
+                model.add(load)
+        self.note_idle(model.notes)
         for name in sorted({*self.nodal, *self.conditional} - LOADING):
             if any(name in fields and fields[name].any() for fields in (self.nodal, self.conditional)):
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
@@ -96,7 +125,8 @@ class Variables:
         zero = np.zeros(count)
         return np.stack([fields.get(f"{variable}_{axis}", zero) for axis in "XYZ"], axis=1)
 
-    def _condition_loads(self, model: Model) -> ConditionLoads | None:
+    def condition_loads(self) -> ConditionLoads | None:
+        """Return the loads that conditions carry, or None."""
         mesh = self.mesh
         force = np.zeros((mesh.n_conditions, 3))
         nodal_force = {cell: self._vector(self.nodal, name, mesh.n_nodes) for cell, name in LOADS.items()}
@@ -106,31 +136,36 @@ class Variables:
                 variable = LOADS[block.shape.cell]
                 carried.add(variable)
                 force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
-        self._note_idle(model)
         zero, nodal_zero = np.zeros(mesh.n_conditions), np.zeros(mesh.n_nodes)
         positive, negative = PRESSURES
         pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
         nodal_pressure = self.nodal.get(positive, nodal_zero) - self.nodal.get(negative, nodal_zero)
-        if pressure.any() or nodal_pressure.any():
-            self._note_followers(model)
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
         if not carried or not any(value.any() for value in values):
             return None
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
 
-    def _note_followers(self, model: Model) -> None:
+    def _note_followers(self, notes: list[str]) -> None:
         """Note pressures that Kratos lets follow the deformed faces even in a linear analysis.
 
         It adds the stiffness of the pressure to K; its small-displacement conditions do not.
         """
         names = {block.name for block in self.mesh.conditions if len(block)}
         for name in sorted(n for n in names if n.startswith("SurfaceLoadCondition")):
-            model.notes.append(
+            notes.append(
                 f"{name}: the pressure acts on the undeformed body, as that of SmallDisplacement{name} in "
                 f"Kratos; {name} adds a pressure stiffness there"
             )
 
-    def _note_idle(self, model: Model) -> None:
+    def note_idle(self, notes: list[str], names: Iterable[str] = LOADING) -> None:
+        """Note loads where nothing carries them, and pressures that would follow the faces in Kratos."""
+        shown = self.only(set(names))
+        shown._note_uncarried(notes)
+        loads = shown.condition_loads()
+        if loads is not None and (loads.pressure.any() or loads.nodal_pressure.any()):
+            shown._note_followers(notes)
+
+    def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
         ids = np.concatenate([np.zeros(0, dtype=np.int64), *(b.ids for b in self.mesh.conditions)])
         for variable in (*dict.fromkeys(LOADS.values()), *PRESSURES):
@@ -140,12 +175,12 @@ class Variables:
             idle = _loaded(self.conditional, variable, on_conditions)
             if idle.any():
                 where = f"{idle.sum()} conditions (first {ids[idle][0]})"
-                model.notes.append(f"{variable} on {where} has no effect: only {kinds} carry it")
+                notes.append(f"{variable} on {where} has no effect: only {kinds} carry it")
             idle = _loaded(self.nodal, variable, on_nodes)
             if idle.any():
                 where = f"{idle.sum()} nodes (first {self.mesh.node_ids[idle][0]})"
                 text = f"only {kinds} carry it, and none has these nodes"
-                model.notes.append(f"{variable} on {where} has no effect: {text}")
+                notes.append(f"{variable} on {where} has no effect: {text}")
 
     def _carriers(self, cells: Iterable[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which conditions are of these cells, and which nodes they have."""

@@ -1,5 +1,5 @@
 """Run files in JSON: ``ProjectParameters.json`` of Kratos, and our own."""
 
-from kratos_lite.io.project.run_file import read_project
+from kratos_lite.io.project.run_file import is_in_time, read_project
 
-__all__ = ["read_project"]
+__all__ = ["is_in_time", "read_project"]

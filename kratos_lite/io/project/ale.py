@@ -67,15 +67,15 @@ def read_motion(section: Settings, kind: str) -> Motion:
         elif key == "ends":
             given[key] = section.text(key)
         else:
-            given[key] = section.number(key) if key == "damping" else _series(section, key)
+            given[key] = section.number(key) if key == "damping" else number_or_series(section, key)
     try:
         return Rotation(**given) if kind == "rotation" else Translation(**given)
     except InputError as error:
         raise section.error("", f"{section.path}: {error}") from None
 
 
-def _series(section: Settings, key: str) -> float | TimeSeries:
-    """Return a number, or a time series of an object."""
+def number_or_series(section: Settings, key: str) -> float | TimeSeries:
+    """Return a number, or the time series of ``{"times": […], "values": […]}``."""
     if not isinstance(section.values[key], Object):
         return section.number(key)
     table = section.section(key)

@@ -1,6 +1,6 @@
 """Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh.
 
-Static linear solids, in the style of 2019 and in the present one.
+Linear solids at rest or in time, in the style of 2019 and in the present one.
 """
 
 from __future__ import annotations
@@ -10,15 +10,18 @@ from pathlib import Path
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Document
 from kratos_lite.io.documents import read_document
-from kratos_lite.io.kratos.to_model import check_elements, model_from
+from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
+from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.project.ale import add_motion
 from kratos_lite.io.project.case import Case, module_of, times_of
 from kratos_lite.io.project.checks import CHECKS, Check
+from kratos_lite.io.project.in_time import ProcessesInTime
+from kratos_lite.io.project.kratos_time import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
 from kratos_lite.io.project.materials import materials_of
 from kratos_lite.io.project.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.project.settings import Settings, find_file, read_settings
+from kratos_lite.io.scene import Scene
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.model import Model
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
@@ -40,10 +43,8 @@ OTHER_PHYSICS = (
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
-def read_kratos_project(
-    settings: Settings, folder: Path, allow_outside: bool = False
-) -> tuple[Model, list[Check]]:
-    """Return the model and the checks of a Kratos run file.
+def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Scene:
+    """Return what a Kratos run file says.
 
     Parameters
     ----------
@@ -54,27 +55,39 @@ def read_kratos_project(
     Raises
     ------
     InputError, ModelError
-        With the place of what is wrong, or of what is not a static linear solid.
+        With the place of what is wrong, or of what is not a linear solid.
     """
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
+    dynamic = solver.text("solver_type") in DYNAMIC
     notes = _check_solver(solver) + _check_root(settings)
-    notes.append(f"{len(times) - 1} time step(s): supports, loads, motion are those at t = {times[-1]:g} s")
+    if not dynamic:
+        notes.append(
+            f"{len(times) - 1} time step(s): supports, loads, motion are those at t = {times[-1]:g} s"
+        )
     document = _read_mesh(solver, folder, allow_outside, notes)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     case = Case(document.mesh, root, folder, times, moved, allow_outside)
     materials = _read_materials(solver, case, document, notes)
     actions, checks = _read_processes(settings, case, notes)
-    model = model_from(
-        document,
-        materials=materials is None,
-        processes=lambda values: notes.extend(run(actions, case, values)),
-    )
+    in_time = ProcessesInTime(actions, case) if dynamic else None
+
+    def process(values: Variables) -> None:
+        if in_time is None:
+            notes.extend(run(actions, case, values))
+        else:
+            in_time.prepare(values)
+
+    model = model_from(document, materials=materials is None, processes=process)
     for number, material in (materials or {}).items():
         model.assign(material, number)
-    add_motion(model, settings, times[-1])
+    add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
-    return model, checks
+    if in_time is None:
+        return Scene(model, checks=checks)
+    model.notes = [note for note in model.notes if STATIC_ONLY not in note]
+    in_time.finish(model)
+    return Scene(model, checks=checks, march=march_in_kratos(settings, in_time))
 
 
 def _check_root(settings: Settings) -> list[str]:
@@ -89,13 +102,13 @@ def _check_root(settings: Settings) -> list[str]:
 
 
 def _check_solver(solver: Settings) -> list[str]:
-    """Refuse what is not a static solid in three dimensions; note what is treated otherwise."""
+    """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
     kind = solver.text("solver_type")
-    if kind not in ("Static", "static"):
+    if kind not in ("Static", "static", *DYNAMIC):
         raise solver.error(
             "solver_type",
-            f"solver_type {kind!r}: only static solutions are computed of run files; use 'static', then "
-            "--modes for frequencies, or model.transient() in Python",
+            f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', "
+            "then --modes for frequencies",
         )
     if solver.integer("domain_size") != 3:
         raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
@@ -109,7 +122,8 @@ def _check_solver(solver: Settings) -> list[str]:
             raise solver.error(
                 key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
             )
-    notes = [f"solver setting {key!r} is not used" for key in solver.unknown((*HARMLESS, *OTHER_PHYSICS))]
+    known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
+    notes = [f"solver setting {key!r} is not used" for key in solver.unknown(known)]
     if analysis == "non_linear":
         notes.append(
             "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"

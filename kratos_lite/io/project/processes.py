@@ -21,6 +21,7 @@ from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.project.case import Case, Interval, interval_of
 from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.mesh import Mesh
 
 Array = NDArray[np.float64]
 Value = float | str
@@ -62,12 +63,21 @@ class Action:
 
     def depends_on_place(self) -> bool:
         """Whether an expression holds the place x, y or z of the moved mesh."""
-        return any(isinstance(f, str) and re.search(r"(?<!\w)[xyz](?!\w)", f) for f in self.factors)
+        return self.mentions("xyz")
+
+    def depends_on_time(self) -> bool:
+        """Whether an expression holds the time t."""
+        return self.mentions("t")
+
+    def mentions(self, names: str) -> bool:
+        """Whether an expression holds one of some names of one letter."""
+        return any(isinstance(f, str) and re.search(rf"(?<!\w)[{names}](?!\w)", f) for f in self.factors)
 
     def value(self, points: Array, time: float) -> Array | float:
         """Return the value at points (m, 3) in m and a time in s."""
         x, y, z = points.T
-        variables = {"x": x, "y": y, "z": z, "t": time, "X": x, "Y": y, "Z": z}
+        X, Y, Z = 0.0 * points.T if self.on_conditions else points.T  # measured against Kratos 10.4.4
+        variables = {"x": x, "y": y, "z": z, "t": time, "X": X, "Y": Y, "Z": Z}
         product: Any = 1.0
         try:
             for factor in self.factors:
@@ -79,6 +89,12 @@ class Action:
             key = "value" if "value" in self.settings else "modulus"
             raise self.settings.error(key, f"{self.component}: {error}") from None
         return product  # type: ignore[no-any-return]
+
+    def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
+        """Set the values that they are at a time in s; places are those of nodes and conditions."""
+        value = self.value(places[self.on_conditions][self.rows], time)
+        setter = values.set_conditions if self.on_conditions else values.set_nodes
+        setter(self.component, self.rows, value)
 
 
 def _value(settings: Settings, value: Any, what: str) -> Value:
@@ -226,7 +242,14 @@ def run(actions: Sequence[Action], case: Case, values: Variables) -> list[str]:
     """Bring the values and supports to what they are at the last step; return notes."""
     times = case.times
     steps = [action.active(times) for action in actions]
-    notes = []
+    set_values(actions, steps, times, values)
+    _hold(actions, steps, len(times) - 1, values)
+    return notes_of(actions, steps, case)
+
+
+def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], case: Case) -> list[str]:
+    """Return notes on actions that never act, and on those that Kratos evaluates on a moved mesh."""
+    times, notes = case.times, []
     for action, active in zip(actions, steps, strict=True):
         where = action.settings.path.removesuffix(".Parameters")
         if not active or not len(action.rows):
@@ -234,28 +257,30 @@ def run(actions: Sequence[Action], case: Case, values: Variables) -> list[str]:
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif case.moved and active[-1] > 1 and action.depends_on_place():
             # Before the first step nothing has moved yet.
+            cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
             notes.append(
                 f"{where}: Kratos evaluates x, y, z at time {times[active[-1]]:g} s on the mesh as the steps "
-                "before moved it, kratos_lite on the undeformed one; write X, Y, Z to mean the same"
+                f"before moved it, kratos_lite on the undeformed one; {cure} to mean the same"
             )
-    notes = list(dict.fromkeys(notes))
-    _set(actions, steps, times, values)
-    _hold(actions, steps, len(times) - 1, values)
-    return notes
+        if action.on_conditions and action.mentions("XYZ"):
+            notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
+    return list(dict.fromkeys(notes))
 
 
-def _set(
+def places_of(mesh: Mesh) -> tuple[Array, Array]:
+    """Return where values are evaluated: nodes (n, 3) and centres of conditions (c, 3)."""
+    centres = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
+    return mesh.points, np.concatenate([np.zeros((0, 3)), *centres])
+
+
+def set_values(
     actions: Sequence[Action], steps: Sequence[list[int]], times: Sequence[float], values: Variables
 ) -> None:
-    mesh = values.mesh
-    centres = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
-    points = (mesh.points, np.concatenate([np.zeros((0, 3)), *centres]))
+    """Set what actions set, each at its last active step."""
+    places = places_of(values.mesh)
     order = sorted((active[-1], i) for i, active in enumerate(steps) if active and actions[i].factors)
     for k, i in order:
-        action = actions[i]
-        value = action.value(points[action.on_conditions][action.rows], times[k])
-        setter = values.set_conditions if action.on_conditions else values.set_nodes
-        setter(action.component, action.rows, value)
+        actions[i].put(values, places, times[k])
 
 
 def _hold(actions: Sequence[Action], steps: Sequence[list[int]], last: int, values: Variables) -> None:

@@ -10,11 +10,13 @@ from typing import Any
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.io.project.ale import add_motion
+from kratos_lite.io.project.ale import add_motion, number_or_series
+from kratos_lite.io.project.kratos_time import DYNAMIC
+from kratos_lite.io.project.march import NO_JSON, NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
-from kratos_lite.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model import Model
 
@@ -25,7 +27,7 @@ LOADS: dict[str, Callable[[str, Any], Load]] = {
     "pressure": Pressure,
     "point_load": PointLoad,
 }
-KEYS = ("model", "material", "fix", "gravity", *LOADS, "ale", "solver", "tolerance", *OUTPUTS)
+KEYS = ("model", "material", "fix", "gravity", *LOADS, "ale", "time", "solver", "tolerance", *OUTPUTS)
 
 
 def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
@@ -34,8 +36,9 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     Our own has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
     for each part), `fix` (``{part: "xyz"}`` or ``{part: {"x": 0.001}}``, m), `gravity` (m/s²),
     `traction` and `pressure` by part (Pa), `point_load` by part (N on each node), `ale` (a motion of the
-    material, see `add_motion`), `solver` (``{"type", "tolerance"}``), `tolerance`, and the files to
-    write: `output`, `json`, `picture`.
+    material, see `add_motion`), `time` (a march, see `march_of`), `solver` (``{"type", "tolerance"}``),
+    `tolerance`, and the files to write: `output`, `json`, `picture`.  A prescribed displacement may be
+    ``{"times": […], "values": […]}``, a load ``{"value": …, "times": […], "factors": […]}``.
 
     Parameters
     ----------
@@ -51,11 +54,19 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     if "solver_settings" in settings or "problem_data" in settings:
         from kratos_lite.io.project.kratos import read_kratos_project
 
-        model, checks = read_kratos_project(settings, folder, allow_outside)
-        return Scene(model, checks=checks)
+        return read_kratos_project(settings, folder, allow_outside)
     if "properties" in settings and "model" not in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     return _read_own(settings, folder, allow_outside)
+
+
+def is_in_time(path: str | Path) -> bool:
+    """Return whether a run file asks for a march, without reading what it names."""
+    values = read_settings(path).values
+    if "solver_settings" not in values and "problem_data" not in values:
+        return "time" in values
+    solver = values.get("solver_settings")
+    return isinstance(solver, Object) and solver.get("solver_type") in DYNAMIC
 
 
 def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
@@ -66,7 +77,9 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
     output = problems.of(_outputs, settings, folder, outside)
     path = problems.of(_model_path, settings, folder, outside)
     sections = {key: problems.of(settings.section, key) for key in ("material", "fix", *LOADS)}
-    gravity = problems.of(settings.vector, "gravity") if "gravity" in settings else None
+    gravity = problems.of(_gravity, settings) if "gravity" in settings else None
+    march = problems.of(march_of, settings, folder, outside)
+    problems.of(_check_outputs, settings)
     problems.raise_if_any()
     material = sections["material"]
     model = model_from(read_document(path), materials=not material.values or _is_by_part(material))
@@ -80,17 +93,28 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
         _add_gravity(model, gravity)
     problems.of(add_motion, model, settings)
     problems.raise_if_any()
-    return Scene(model, solver, tolerance, output)
+    if march is None and _changes(model):
+        model.notes.append("what changes with the time is that at t = 0, unless the model marches")
+    return Scene(model, solver, tolerance, output, march=march)
 
 
-def _add_gravity(model: Model, gravity: list[float]) -> None:
+def _changes(model: Model) -> bool:
+    """Whether loads or supports change with the time."""
+    return bool(model.supports.movements) or any(isinstance(load, Varying) for load in model.loads)
+
+
+def _gravity(settings: Settings) -> Load:
+    return varying(settings, "gravity", lambda owner, key: Gravity(owner.vector(key)))
+
+
+def _add_gravity(model: Model, gravity: Load) -> None:
     """Add gravity, and note what the mesh file has of its kind already."""
     for load in model.loads:
         if isinstance(load, BodyForce):
             name = "VOLUME_ACCELERATION" if isinstance(load, Gravity) else "BODY_FORCE"
             place = "the nodes" if load.where is None else f"Properties {load.where}"
             model.notes.append(f"gravity is added to the {name} of {place} in the mesh file")
-    model.add(Gravity(gravity))
+    model.add(gravity)
 
 
 def _model_path(settings: Settings, folder: Path, outside: bool) -> Path:
@@ -127,6 +151,16 @@ def _outputs(settings: Settings, folder: Path, outside: bool) -> dict[str, str]:
             except ValueError as error:
                 raise settings.error(key, f"{key}: {error}") from None
     return found
+
+
+def _check_outputs(settings: Settings) -> None:
+    """Refuse files that hold no march, where there is one."""
+    if "time" in settings and "json" in settings:
+        raise settings.error("json", f"json: {NO_JSON}")
+    if "time" in settings and "output" in settings:
+        name = settings.text("output")
+        if Path(name).suffix.lower() not in SERIES:
+            raise settings.error("output", f"output: {NO_RESULT.format(name)}")
 
 
 def _is_by_part(material: Settings) -> bool:
@@ -187,10 +221,13 @@ def _fix(model: Model, section: Settings, part: str) -> None:
     axes = section.section(part)
     axes.check_keys(("x", "y", "z"))
     for axis in axes.values:
-        _at(axes, axis, model.fix, part, axis, axes.number(axis))
+        _at(axes, axis, model.fix, part, axis, number_or_series(axes, axis))
 
 
 def _load(model: Model, section: Settings, part: str, load: Callable[[str, Any], Load]) -> None:
-    value = section.number(part) if load is Pressure else section.vector(part)
+    def of_value(owner: Settings, key: str) -> Load:
+        return load(part, owner.number(key) if load is Pressure else owner.vector(key))
+
+    made = varying(section, part, of_value)
     _at(section, part, model.mesh.part, part)
-    model.add(load(part, value))
+    model.add(made)

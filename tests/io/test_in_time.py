@@ -1,0 +1,229 @@
+"""Dynamic run files of Kratos: what processes mean in time."""
+
+import json
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.io.project import is_in_time, read_project
+
+TO_NODES = "assign_scalar_variable_process"
+TO_CONDITIONS = "assign_scalar_variable_to_conditions_process"
+CLAMP = (
+    ("Bottom", "DISPLACEMENT_X", 0.0),
+    ("Bottom", "DISPLACEMENT_Y", 0.0),
+    ("Bottom", "DISPLACEMENT_Z", 0.0),
+)
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Return a function that writes a run file of processes (part, variable, value, settings)."""
+    monkeypatch.chdir(tmp_path)
+    mesh = kl.box((0.5, 0.5, 2.0), cells=(1, 1, 4))
+    (faces,) = mesh.faces("z+")
+    mesh.parts = {
+        "Bottom": kl.Part(mesh.nodes("z-"), *(np.zeros(0, dtype=np.int64),) * 2),
+        "Top": kl.Part(mesh.nodes("z+"), np.zeros(0, dtype=np.int64), np.arange(1)),
+    }
+    name = "SmallDisplacementSurfaceLoadCondition3D4N"
+    mesh.conditions = [kl.Block(name, faces.nodes, np.ones(1, dtype=np.int64), faces.properties, faces.shape)]
+    kl.write("bare.mdpa", mesh)
+    text = (tmp_path / "bare.mdpa").read_text()
+    constants = "YOUNG_MODULUS 1e8\nPOISSON_RATIO 0.2\nDENSITY 2000\n"
+    head = "Begin Properties 1\n"
+    (tmp_path / "mesh.mdpa").write_text(text.replace(head, head + constants))
+
+    def write(*entries, step=0.01, end=0.2, data="", processes=(), **solver):
+        lists = []
+        for part, variable, value, *more in entries:
+            on_conditions = variable.startswith("SURFACE")
+            parameters = {"model_part_name": part, "variable_name": variable, "value": value}
+            if not on_conditions:
+                parameters["constrained"] = variable.startswith("DISPLACEMENT")
+            parameters.update(*more)
+            module = TO_CONDITIONS if on_conditions else TO_NODES
+            lists.append({"python_module": module, "Parameters": parameters})
+        content = {
+            "problem_data": {"start_time": 0.0, "end_time": end},
+            "solver_settings": {
+                "solver_type": "Dynamic",
+                "time_integration_method": "implicit",
+                "domain_size": 3,
+                "analysis_type": "linear",
+                "model_import_settings": {"input_filename": "mesh"},
+                "time_stepping": {"time_step": step},
+                **solver,
+            },
+            "processes": {"list": [*lists, *processes]},
+        }
+        (tmp_path / "run.json").write_text(json.dumps(content, indent=1))
+        if data:
+            with open("mesh.mdpa", "a") as file:
+                file.write(data)
+        return tmp_path / "run.json"
+
+    return write
+
+
+def moments(scene):
+    return list(scene.moments(scene.transient()))
+
+
+def same(found, expected):
+    for name in ("u", "v", "a", "reactions"):
+        one, other = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * max(np.abs(other).max(), 1e-300))
+
+
+def by_hand(load=None, **options):
+    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+    model.fix("Bottom")
+    if load is not None:
+        model.add(load)
+    return list(model.transient(**options).march(dt=0.01, steps=20))
+
+
+def test_the_scheme_damping_and_steps(write):
+    scene = read_project(write(*CLAMP, rayleigh_alpha=0.5, rayleigh_beta=1e-4))
+    assert str(scene.march) == "20 steps of 0.01 s by bossak(-0.3)"
+    assert scene.march.rayleigh == (0.5, 1e-4)
+    assert is_in_time("run.json")
+    assert scene.transient().equations.rayleigh == (0.5, 1e-4)
+    newmark = read_project(write(*CLAMP, scheme_type="newmark", damp_factor_m=-0.1))
+    assert str(newmark.march) == "20 steps of 0.01 s by newmark(0.25, 0.5)"
+    assert str(read_project(write(*CLAMP, damp_factor_m=-0.1)).march).endswith("bossak(-0.1)")
+
+
+def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
+    scene = read_project(
+        write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", "-9.81*(1+Z)"), ("Top", "SURFACE_LOAD_X", 1e4))
+    )
+    assert [type(load).__name__ for load in scene.model.loads] == ["Varying", "Varying"]
+    calls = []
+    for kind in (kl.Gravity, type(scene.model.loads[1].load)):
+        forces = kind.forces
+
+        def counted(self, mesh, batches, forces=forces):
+            calls.append(type(self).__name__)
+            return forces(self, mesh, batches)
+
+        monkeypatch.setattr(kind, "forces", counted)
+    moments(scene)
+    assert sorted(calls) == ["ConditionLoads", "Gravity"]
+
+
+def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
+    write(*CLAMP, ("Top", "SURFACE_LOAD_X", "1e5*t", {"interval": [0.0, 0.055]}))
+    scene = read_project("run.json")
+    (load,) = scene.model.loads
+    forces = [load.at(t) for t in (0.0, 0.01, 0.05, 0.06, 0.2)]
+    assert forces[0] is None
+    assert forces[2] is not forces[1]
+    assert forces[4] is forces[3]
+    ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
+    expected = by_hand(kl.Varying(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), scheme=kl.bossak())
+    for one, other in zip(moments(scene), expected, strict=True):
+        same(one, other)
+
+
+def test_gravity_stays_assembled_while_another_load_changes(write):
+    scene = read_project(
+        write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", -9.81), ("Top", "SURFACE_LOAD_X", "t"))
+    )
+    assert [type(load).__name__ for load in scene.model.loads] == ["Varying", "Timed"]
+
+
+def test_supports_that_move_with_t(write):
+    moved = [("Bottom", "DISPLACEMENT_X", "0.01*t^2"), *CLAMP[1:]]
+    scene = read_project(write(*moved))
+    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+    model.fix("Bottom", "x", lambda t: 0.01 * t * t)
+    model.fix("Bottom", "yz")
+    expected = list(model.transient(scheme=kl.bossak()).march(dt=0.01, steps=20))
+    same(moments(scene)[-1], expected[-1])
+    assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
+
+
+def test_a_constant_support_replaces_a_moving_one_that_comes_before(write):
+    scene = read_project(write(("Bottom", "DISPLACEMENT_X", "t"), *CLAMP))
+    assert not scene.model.supports.movements
+    scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "t")))
+    assert len(scene.model.supports.movements) == 1
+
+
+def test_a_start_on_a_support_leaves_its_movement(write):
+    pulled = ("Structure", "DISPLACEMENT_X", "0.01*Z", {"interval": [0.0, 0.0], "constrained": False})
+    scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
+    assert len(scene.model.supports.movements) == 1
+    end = moments(scene)[-1]
+    bottom = scene.model.mesh.nodes("Bottom")
+    np.testing.assert_allclose(end.u[bottom, 0], 0.01 * end.time, rtol=1e-12)
+    assert scene.march.displacement[:, 0].max() == 0.02
+
+
+@pytest.mark.parametrize("value", ["t", 0.01])
+def test_a_support_that_changes_for_a_while_is_refused(write, value):
+    path = write(*CLAMP, ("Bottom", "DISPLACEMENT_X", value, {"interval": [0.05, 0.1], "constrained": False}))
+    with pytest.raises(kl.InputError, match=r"run\.json:\d+:\d+: .* changes in a part of the run"):
+        read_project(path)
+
+
+def test_a_kratos_file_with_the_key_of_ours_is_no_march(write, run):
+    path = write(*CLAMP)
+    content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
+    content["solver_settings"]["solver_type"] = "static"
+    path.write_text(json.dumps(content))
+    assert not is_in_time(path)
+    assert "key 'time' is not used" in run("solve", path).out
+
+
+def test_nodal_data_of_the_mesh_file_is_the_start(write):
+    rows = "".join(f"{i} 0 {i * 0.01}\n" for i in range(1, 21))
+    scene = read_project(write(*CLAMP, data=f"Begin NodalData VELOCITY_X\n{rows}End NodalData\n"))
+    velocity = scene.march.velocity
+    assert velocity[:, 0].tolist() == pytest.approx([i * 0.01 for i in range(1, 21)])
+    assert not any("VELOCITY" in note for note in scene.model.notes)
+    assert np.abs(moments(scene)[-1].u).max() > 0
+
+
+def test_a_velocity_that_the_mesh_file_fixes_is_refused(write):
+    path = write(*CLAMP, data="Begin NodalData VELOCITY_X\n1 1 0.0\nEnd NodalData\n")
+    with pytest.raises(kl.InputError, match=r"mesh\.mdpa: VELOCITY_X is fixed; only DISPLACEMENT can be"):
+        read_project(path)
+
+
+def test_options_change_a_dynamic_run_file(write, run):
+    write(*CLAMP, ("Top", "SURFACE_LOAD_X", "1e5*t"))
+    words = ("--march", "5e-3:40:40", "--scheme", "newmark", "-o", "end.npz")
+    done = run("solve", "run.json", *words)
+    assert done.rows["scheme"] == "newmark(0.25, 0.5)"
+    model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
+    model.fix("Bottom")
+    model.add(kl.Varying(kl.Traction("Top", (1e5, 0.0, 0.0)), lambda t: t))
+    *_, last = model.transient().march(dt=5e-3, steps=40)
+    with np.load("end.npz") as file:
+        np.testing.assert_allclose(file["u"][-1], last.u, rtol=0, atol=1e-10 * np.abs(last.u).max())
+    assert "time        20 steps of 0.01 s by bossak(-0.3)" in run("info", "run.json").out
+    assert "20 steps of 0.01 s by bossak(-0.3), no errors" in run("check", "run.json").out
+
+
+@pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
+def test_checks_compare_the_end_of_the_march(write, run, value, word, code):
+    push = ("Top", "SURFACE_LOAD_X", "1e5*t")
+    end = moments(read_project(write(*CLAMP, push)))[-1]
+    mesh = kl.read("mesh.mdpa").mesh
+    found = float(end.u[mesh.nodes("Top"), 0].mean())
+    check = {
+        "python_module": "check_scalar_to_nodes_process",
+        "Parameters": {
+            "model_part_name": "Top",
+            "variable_name": "DISPLACEMENT_X",
+            "value": found if value is None else value,
+            "tolerance_rank": 6,
+        },
+    }
+    done = run("solve", write(*CLAMP, push, processes=[check]))
+    assert f"check DISPLACEMENT_X on Top {word}" in done.out
+    assert done.code == code
