@@ -31,7 +31,7 @@ FLOORS = [
     {"statics"},
     {"dynamics"},
     {"model"},
-    {"io.kratos", "io.describe", "io.reached", "io.scene"},
+    {"io.kratos", "io.describe", "io.scene"},
     {"io.project"},
     {"io.files"},
     {"io.scenes"},

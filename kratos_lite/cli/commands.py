@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from kratos_lite.cli.options import apply, marches, material
-from kratos_lite.cli.targets import check_targets, files_read
+from kratos_lite.cli.targets import check_json, check_targets, files_read
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 EXIT_CHECK_FAILED = 3
@@ -162,8 +162,7 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
     check_targets(read, found.values())
     if "output" in found:
         check_result_ending(found["output"], options.vtu)
-    if "json" in found and Path(found["json"]).suffix.lower() != ".json":
-        raise InputError(f"{found['json']}: the ending must be .json; other results go to --output")
+    check_json(found.get("json"))
     if "picture" in found:
         check_picture(found["picture"])
     return found

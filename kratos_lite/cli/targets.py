@@ -38,6 +38,12 @@ def check_targets(read: Iterable[Path], targets: Iterable[str | None], *, new_fo
         taken |= {os.path.realpath(path) for path in _set_of(Path(target))}
 
 
+def check_json(path: str | None) -> None:
+    """Refuse a target of --json with another ending."""
+    if path is not None and Path(path).suffix.lower() != ".json":
+        raise InputError(f"{path}: the ending must be .json; other results go to --output")
+
+
 def files_read(source: str) -> list[Path]:
     """Return the files that an input stands for: itself, its whole set, and what a run file names."""
     from kratos_lite.io.documents import ending

@@ -12,11 +12,10 @@ import numpy as np
 
 from kratos_lite.assembly import Progress
 from kratos_lite.cli.options import apply, material, number
-from kratos_lite.cli.targets import check_targets
+from kratos_lite.cli.targets import check_json, check_targets
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.files import load
-from kratos_lite.io.project.march import NO_JSON, NO_RESULT, SERIES, scheme_of
-from kratos_lite.io.reached import End
+from kratos_lite.io.project.march import NO_RESULT, SERIES, scheme_of
 from kratos_lite.io.results import check_picture
 from kratos_lite.io.scene import March, Scene
 from kratos_lite.io.trajectory import Series, make_folder
@@ -78,14 +77,13 @@ def _rayleigh(text: str) -> tuple[float, float]:
 
 def march_targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dict[str, str]:
     """Return the files of a march to write by key, those of the options first; all are checked."""
-    targets = {key: getattr(options, key) or given.get(key) for key in ("output", "picture")}
+    targets = {key: getattr(options, key) or given.get(key) for key in ("output", "json", "picture")}
     targets["state"] = options.state
     found = {key: path for key, path in targets.items() if path}
     if options.restart:
         read = [*read, Path(options.restart)]
     check_targets(read, found.values(), new_folders=True)
-    if options.json or "json" in given:
-        raise InputError(f"{options.json or given['json']}: {NO_JSON}: -o OUT.csv")
+    check_json(found.get("json"))
     ending = Path(found.get("output", "")).suffix.lower()
     if "output" in found and ending not in SERIES:
         raise InputError(f"{NO_RESULT.format(found['output'])}; use -o OUT.pvd")
@@ -145,7 +143,9 @@ def run_march(scene: Scene, targets: dict[str, str], options: Namespace, progres
     seconds = perf_counter() - clock
     if "picture" in targets:
         _draw(targets["picture"], scene, course.last)
-    end = End(scene.model.mesh, course.last.u, course.last.reactions)
+    end = transient.result(course.last)
+    if "json" in targets:
+        end.save(targets["json"])
     lines = [] if options.quiet else [*course.summary(scene, seconds), *_written(targets)]
     return lines + scene.evaluate(end)
 

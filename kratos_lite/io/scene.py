@@ -12,6 +12,7 @@ from kratos_lite.assembly import Progress
 from kratos_lite.errors import ModelError
 from kratos_lite.loads import NodalForces, Timed
 from kratos_lite.model import Model
+from kratos_lite.result import Result
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
     from kratos_lite.dynamics import CentralDifference, Moment, Transient
     from kratos_lite.dynamics.schemes import Implicit
-    from kratos_lite.io.reached import Reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +85,10 @@ class Scene:
     solver: str = "auto"
     tolerance: float = 1e-10
     output: dict[str, str] = field(default_factory=dict)
-    checks: list[Callable[[Reached], str]] = field(default_factory=list)
+    checks: list[Callable[[Result], str]] = field(default_factory=list)
     march: March | None = None
 
-    def evaluate(self, result: Reached) -> list[str]:
+    def evaluate(self, result: Result) -> list[str]:
         """Return one line for each check, "check passed/failed/not evaluated: …", with the numbers."""
         return [check(result) for check in self.checks]
 

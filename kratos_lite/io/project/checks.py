@@ -13,10 +13,10 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.project.case import Case, interval_of
 from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, find_file, is_number, read_settings, shown
-from kratos_lite.io.reached import Reached
+from kratos_lite.result import Result
 
 Array = NDArray[np.float64]
-Check: TypeAlias = Callable[[Reached], str]
+Check: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
 FIELDS = ("DISPLACEMENT", "REACTION")
 NODE_KEYS = (
@@ -45,9 +45,9 @@ class NodeCheck:
     what: str
     component: str
     rows: NDArray[np.int64]
-    expected: Callable[[Reached], tuple[Array, Array]]
+    expected: Callable[[Result], tuple[Array, Array]]
 
-    def __call__(self, result: Reached) -> str:
+    def __call__(self, result: Result) -> str:
         """Return ``check … passed`` or ``failed`` with the numbers of the worst node."""
         name, _, axis = self.component.rpartition("_")
         if name not in FIELDS or axis not in ("X", "Y", "Z"):
@@ -111,7 +111,7 @@ class Analytic:
     time: float
     deformed: bool
 
-    def __call__(self, result: Reached) -> tuple[Array, Array]:
+    def __call__(self, result: Result) -> tuple[Array, Array]:
         """Return the expected values and the allowed differences."""
         points = result.mesh.points[self.rows]
         if self.deformed:
@@ -157,7 +157,7 @@ class Tabled:
     time: float
     tolerances: tuple[float, float]
 
-    def __call__(self, result: Reached) -> tuple[Array, Array]:
+    def __call__(self, result: Result) -> tuple[Array, Array]:
         """Return the expected values and the allowed differences."""
         times = self.data.numbers("TIME")
         if not times or not times[0] - 1e-9 <= self.time <= times[-1] + 1e-9:

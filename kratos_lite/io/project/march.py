@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 KEYS = ("step", "steps", "every", "scheme", "rayleigh", "lumped", "restart")
 SERIES = (".pvd", ".csv", ".npz")
 """Endings of files that hold a march."""
-NO_JSON = "a march has no .json; its numbers by time go to an output .csv or .npz"
 NO_RESULT = "{}: a march is written as .pvd (for ParaView), .csv or .npz"
 SCHEMES = {
     "newmark": (0, 2),

@@ -12,7 +12,7 @@ from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
 from kratos_lite.io.project.kratos_time import DYNAMIC
-from kratos_lite.io.project.march import NO_JSON, NO_RESULT, SERIES, march_of, varying
+from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
@@ -155,8 +155,6 @@ def _outputs(settings: Settings, folder: Path, outside: bool) -> dict[str, str]:
 
 def _check_outputs(settings: Settings) -> None:
     """Refuse files that hold no march, where there is one."""
-    if "time" in settings and "json" in settings:
-        raise settings.error("json", f"json: {NO_JSON}")
     if "time" in settings and "output" in settings:
         name = settings.text("output")
         if Path(name).suffix.lower() not in SERIES:
