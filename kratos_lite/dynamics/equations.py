@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -19,13 +19,12 @@ from kratos_lite.ale.symmetry import check_materials
 from kratos_lite.arguments import finite
 from kratos_lite.assembly import Progress
 from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.dynamics.forcing import AppliedLoads, Prescribed
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.loads import Load, Timed, Varying
 from kratos_lite.mass import Mass
 from kratos_lite.mobility import check_supports
 from kratos_lite.solvers.banded import add_scalar
-from kratos_lite.statics import initial_loads
-from kratos_lite.supports import reduction, resolve
+from kratos_lite.supports import resolve
 from kratos_lite.system import System
 
 if TYPE_CHECKING:
@@ -55,6 +54,8 @@ class EquationsOfMotion:
     system : pattern, K and supports.
     mass : M.
     terms : the matrices of the motion, or None.
+    applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
+    prescribed : function of the time that gives the displacements (3a,) where the free ones are 0.
     warnings : what the checks of the model and of its motion at the time 0 found.
 
     Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
@@ -89,7 +90,7 @@ class EquationsOfMotion:
             patterns=model.patterns,
             progress=progress,
         )
-        self._links = links
+        self.applied, self.prescribed = AppliedLoads(model, self.system), Prescribed(model, self.system)
         placed = self.system.points, self.system.batches, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
@@ -103,28 +104,6 @@ class EquationsOfMotion:
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
 
     # ---- loads and supports ------------------------------------------------------------------------------
-
-    @cached_property
-    def _loads(self) -> tuple[Array, list[Callable[[float], Array]]]:
-        """Constant nodal forces (3a,), and functions of the time that give those that change."""
-        mesh, batches = self.model.mesh, self.model.batches()
-        constant = np.zeros(self.size)
-        changing: list[Callable[[float], Array]] = []
-
-        def local(load: Load) -> Array:
-            return self.system.local(load.forces(mesh, batches))
-
-        initial = initial_loads(self.model, batches)
-        if initial is not None:
-            constant -= self.system.local(initial)
-        for load in self.model.loads:
-            if isinstance(load, Varying):
-                changing.append(partial(_scaled, load.factor, local(load.load)))
-            elif isinstance(load, Timed):
-                changing.append(_TimedForces(load, local, self.size))
-            else:
-                constant += local(load)
-        return constant, changing
 
     @property
     def size(self) -> int:
@@ -140,11 +119,7 @@ class EquationsOfMotion:
 
     def load(self, time: float) -> Array:
         """Return the nodal forces (3a,) at a time, those of the motion among them."""
-        constant, changing = self._loads
-        total = constant.copy()
-        for forces in changing:
-            total += forces(time)
-        return total + self.inertia_load(time)
+        return self.applied(time) + self.inertia_load(time)
 
     def inertia_load(self, time: float) -> Array:
         """Return the centrifugal and Euler load (3a,) of the motion at a time."""
@@ -157,44 +132,6 @@ class EquationsOfMotion:
         if acceleration:
             total += acceleration * self.terms.euler
         return total.ravel()
-
-    def prescribed(self, time: float) -> Array:
-        """Return the displacements (3a,) at a time where the free ones are 0."""
-        if not self.model.supports.movements:
-            return self.system.reduced.c
-        resting, shares = self._moved
-        return resting + sum(value(time) * share for value, share in shares)
-
-    @cached_property
-    def _moved(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
-        """What is prescribed while all that moves is at 0, and the share (3a,) of each that moves, at 1."""
-        supports = self.model.supports
-        kept = supports.values.copy()
-        try:
-            for one in supports.movements:
-                supports.values[one.rows, one.axis] = 0.0
-            resting, shares = self._held_at(), []
-            for one in supports.movements:
-                supports.values[one.rows, one.axis] = 1.0
-                shares.append((one.course, self._held_at() - resting))
-                supports.values[one.rows, one.axis] = 0.0
-            return resting, shares
-        finally:
-            supports.values[...] = kept
-
-    def _held_at(self) -> Array:
-        """Return the displacements (3a,) that values of the supports prescribe, 0 where they are free."""
-        supports = self.model.supports
-        links = resolve(supports, self._used, agree=False) if supports.links else {}
-        found = reduction(supports, self.system.nodes, links)
-        found.c[found.free] = 0.0
-        return found.c
-
-    @cached_property
-    def _used(self) -> NDArray[np.bool_]:
-        used = np.zeros(self.system.n_nodes, dtype=bool)
-        used[self.system.nodes] = True
-        return used
 
     # ---- matrices ----------------------------------------------------------------------------------------
 
@@ -383,29 +320,3 @@ def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:
     if values.shape != (2,) or (values < 0).any():
         raise InputError(f"Rayleigh damping is α ≥ 0 in 1/s and β ≥ 0 in s; got {rayleigh!r}")
     return float(values[0]), float(values[1])
-
-
-def _scaled(factor: Callable[[float], float], forces: Array, time: float) -> Array:
-    return factor(time) * forces
-
-
-class _TimedForces:
-    """Nodal forces (3a,) of a `Timed` load; those of the last two times are kept."""
-
-    def __init__(self, timed: Timed, forces_of: Callable[[Load], Array], size: int) -> None:
-        self.timed, self.forces_of, self.size = timed, forces_of, size
-        self.kept: list[tuple[float, Load | None, Array]] = []
-
-    def __call__(self, time: float) -> Array:
-        """Return the forces at a time."""
-        for at, _, forces in self.kept:
-            if at == time:
-                return forces
-        load = self.timed.at(time)
-        same = [forces for _, one, forces in self.kept if one is load]
-        if same:
-            forces = same[0]
-        else:
-            forces = np.zeros(self.size) if load is None else self.forces_of(load)
-        self.kept = [*self.kept[-1:], (time, load, forces)]
-        return forces

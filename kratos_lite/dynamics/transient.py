@@ -52,7 +52,7 @@ class Transient:
     Parameters
     ----------
     model : elements with density, supports, loads, and its motion if it has one.
-    scheme : `newmark()`, `hht()`, `generalised_alpha()` or `CentralDifference()`.
+    scheme : `newmark()`, `hht()`, `bossak()`, `generalised_alpha()` or `CentralDifference()`.
     displacement, velocity : (n, 3) at the time 0; at rest if not given, and as the supports say where they
         hold.
     lumped : whether the mass stands in the nodes; central differences always lump it.
