@@ -118,7 +118,7 @@ OfPlace: TypeAlias = Callable[[Array], ArrayLike]
 
 def _at_nodes(function: OfPlace, X: Array, what: str, width: tuple[int, ...]) -> Array:
     """Return what a function gives at the nodes (m, k, 3) of faces, (m, k, *width)."""
-    given = finite(function(X.reshape(-1, 3)), what)
+    given = finite(function(X.reshape(-1, 3).copy()), what)
     wanted = (X.shape[0] * X.shape[1], *width)
     if given.shape not in (wanted, width):
         raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {given.shape}")

@@ -41,7 +41,7 @@ class Report:
     unknowns : free degrees of freedom.
     total_load, total_reaction : (3,) N.
     solver, reason, iterations : how it was solved and why that way.
-    backward_error : |b - A x| / (|A| |x| + |b|).
+    backward_error : |b - A x| / (|A| |x| + |b|), or None.
     force_error, moment_error : what loads and reactions miss to equilibrium, relative; None where material
         that moves through the mesh carries momentum, so that they need not balance.
     seconds : per phase.
@@ -58,7 +58,7 @@ class Report:
     solver: str
     reason: str
     iterations: int
-    backward_error: float
+    backward_error: float | None
     force_error: float | None
     moment_error: float | None
     seconds: dict[str, float]
@@ -232,7 +232,8 @@ class Result:
         ]
         if report.iterations:
             rows.append(("iterations", str(report.iterations)))
-        rows.append(("backward error", f"{report.backward_error:.1e}"))
+        if report.backward_error is not None:
+            rows.append(("backward error", f"{report.backward_error:.1e}"))
         if report.force_error is not None:
             balance = f"forces {report.force_error:.1e}, moments {report.moment_error:.1e}"
             rows.append(("equilibrium", balance))

@@ -48,8 +48,11 @@ class TimeSeries:
         >>> ramp.slope(0.0), ramp.slope(1.0), ramp.slope(2.0), ramp.slope(3.0)
         (5.0, 5.0, 2.5, 0.0)
         """
-        slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
-        near = 1e-9 * float(np.abs(self.times).max())
+        gaps = np.diff(self.times)
+        slopes = np.concatenate([[0.0], np.diff(self.values) / gaps, [0.0]])
+        near = min(
+            1e-9 * abs(time) + 1e-15, 1e-3 * float(gaps.min(initial=np.inf))
+        )  # for times that are sums
         after = slopes[np.searchsorted(self.times, time + near)]
         before = slopes[np.searchsorted(self.times, time - near)] if time > near else after
         return float(before + after) / 2

@@ -125,6 +125,12 @@ class Supports:
             self.fixed[rows, axis], self.values[rows, axis] = True, start
             self.movements.append(Movement(rows, axis, checked, course))
 
+    def course(self, dof: int) -> object:
+        """Return the function that moves a degree of freedom, as the caller gave it, or None."""
+        node, axis = divmod(dof, 3)
+        mine = (m.given for m in self.movements if m.axis == axis and (m.rows == node).any())
+        return next(mine, None)
+
     def _stop(self, rows: Ints, axes: list[int], given: object, override: bool) -> None:
         """Take nodes out of the movements that they have along axes, all but those given alike."""
         kept = []
@@ -261,6 +267,11 @@ def _mutual(link: Link, supports: Supports, agree: bool) -> Link | None:
     if not supports.fixed.flat[master]:
         return Link(master, (slave,), (1.0,))
     one, other = supports.values.flat[slave], supports.values.flat[master]
+    if agree and supports.course(slave) is not supports.course(master):
+        raise ModelError(
+            f"{supports.name(slave)} and {supports.name(master)} are joined, but moved otherwise: let one "
+            "function move both, or hold one of them only"
+        )
     if agree and one != other:
         raise ModelError(
             f"{supports.name(slave)} and {supports.name(master)} are joined, but prescribed as "

@@ -249,9 +249,7 @@ def test_scenes_and_run_files_are_not_mixed_up(run, folder):
     for words in (("solve", "box.json"), ("convert", "box.json", "a.mdpa")):
         assert run(*words).refuses("a scene of a body is not for", "kratos-lite march box.json")
     (folder / "run.json").write_text('{"model": "a.mdpa"}')
-    assert run("march", "run.json").refuses(
-        "this is a run file of a static model: kratos-lite solve run.json"
-    )
+    assert run("march", "run.json").refuses("this is a run file of a model: kratos-lite solve run.json")
     assert run("march", "none.json").refuses("none.json")
     assert run("march", "a.mdpa").refuses("a scene is a .json file or a .py script")
 

@@ -192,7 +192,9 @@ def test_a_summary_with_the_numbers(run, folder):
     assert rows["scheme"] == "newmark(0.25, 0.5)"
     assert rows["time"] == "0 … 0.02 s, 20 steps of 0.001 s"
     node = model.mesh.node_ids[size.argmax()]
-    assert rows["largest displacement"] == f"{size.max():.6e} m at node {node}, t = {largest.time:.6g} s"
+    assert rows["largest displacement"] == (
+        f"{size.max():.6e} m at node {node}, t = {largest.time:.6g} s, of {len(moments)} kept"
+    )
     assert rows["energy"] == f"0.000000e+00 J at the start, {transient.energy():.6e} J at the end"
     force = [float(f) for f in re.findall(r"-?[\d.]+(?:e[+-]\d+)?", rows["total reaction"])]
     np.testing.assert_allclose(force, moments[-1].reactions.sum(axis=0), rtol=1e-5, atol=1e-8)
@@ -327,7 +329,7 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
         (("--march", "1:3", "--rayleigh", "1"), ("--rayleigh: ALPHA,BETA",)),
         (("--march", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: ALPHA,BETA",)),
         (("--march", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
-        (("--march", "1:3", "--modes", "2"), ("--modes is not for a model that marches",)),
+        (("--march", "1:3", "--modes", "2"), ("--modes and --march: give one of them",)),
         (("--march", "1:3", "--solver", "amg"), ("--solver and --tolerance are for statics",)),
         (("--march", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
         (("--march", "1:3", "-o", "a.vtu"), ("a march is written as .pvd", "-o OUT.pvd")),
@@ -355,6 +357,18 @@ def test_wrong_options_are_explained(run, folder, words, fragments):
     assert [path.name for path in folder.iterdir()] == ["tower.mdpa"]
 
 
-def test_modes_of_a_file_that_marches_are_refused(run, folder):
+def test_modes_of_a_file_that_marches_are_those_of_its_model(run, folder):
     write()
-    assert run("solve", "run.json", "--modes", "2").refuses("--modes is not for a model that marches")
+    told = run("solve", "run.json", "--modes", "2")
+    omega, _ = tower().modes(2)
+    assert [float(line.split()[2]) for line in told.out.splitlines()[1:]] == pytest.approx(omega, rel=1e-7)
+
+
+def test_what_is_doubtful_is_told(run, folder):
+    """Supports that jump at the start, and bodies that nothing but inertia holds."""
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--march", "1e-3:3")
+    told = run("solve", "tower.mdpa", *held, "--fix", "z-:xyz", "--fix", "z+:x=0.01").out
+    assert "supports are displaced by 0.01 m at the start of a model at rest" in told
+    told = run("solve", "tower.mdpa", *held, "--traction", "z+:1e3,0,0").out
+    assert "rigid motions are held by inertia alone" in told
+    assert "displaced" not in told

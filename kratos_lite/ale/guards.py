@@ -115,10 +115,10 @@ def near_critical(motion: Motion, time: float, limit: float, of_mesh: bool) -> l
     rate, unit = abs(motion.rate(time)), unit_of(motion)
     if rate < NEAR_CRITICAL * limit:
         return []
-    where = "above a" if rate >= limit else "near the"
+    where = "above" if rate >= limit else "near"
     whose = f"{limit:.4g} {unit} on this mesh" if of_mesh else f"about {limit:.4g} {unit} by wave speeds"
     return [
-        f"the rate {rate:g} {unit} is {where} critical one, {whose}: a steady state resonates there, and "
+        f"the rate {rate:g} {unit} is {where} the critical one, {whose}: a steady state resonates there, and "
         "motion may grow without bound"
     ]
 

@@ -14,6 +14,7 @@ its loads and a factor 2 put right; Nackenhorst, Comput. Methods Appl. Mech. Eng
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.arguments import finite, flag, number
 from kratos_lite.errors import InputError
 from kratos_lite.rotations import hat
-from kratos_lite.series import Factor, function_of, slope_of
+from kratos_lite.series import Factor, TimeSeries, function_of, slope_of
 
 Array = NDArray[np.float64]
 
@@ -46,12 +47,14 @@ class Motion(ABC):
         self, direction: ArrayLike | str, rate: Factor, acceleration: Factor | None, damping: float
     ) -> None:
         self.direction = _unit(direction)
-        self.rate = function_of(rate, "a rate")
-        self.acceleration = (
-            slope_of(rate, "a rate") if acceleration is None else function_of(acceleration, "an acceleration")
-        )
         self.is_accelerated = acceleration is not None
-        self.steady = not (callable(rate) or callable(acceleration))
+        self.rate = function_of(rate, "a rate")
+        self.acceleration = slope_of(rate, "a rate")
+        if acceleration is not None:
+            self.acceleration = function_of(acceleration, "an acceleration")
+        self.steady = not (callable(rate) or callable(acceleration) or acceleration)
+        if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
+            self.rate = _accelerated(self.rate(0.0), acceleration)
         self.damping = number(damping, "a damping")
         if self.damping < 0:
             raise InputError(f"a damping must be one number in 1/s, ≥ 0; got {damping}")
@@ -75,7 +78,8 @@ class Rotation(Motion):
     ----------
     axis : ``"x"``, ``"y"``, ``"z"`` or (3,).
     rate : rad/s; number, `TimeSeries` or function of the time.
-    acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.
+    acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A
+        number or `TimeSeries` changes a rate that is a number as the time goes on.
     centre : (3,) m, a point of the axis.
     skew : take the skew part of G, which keeps the energy on every mesh.
     stiffening : add the stiffness that the centrifugal stress gives; a rotor that may turn freely needs it.
@@ -117,7 +121,8 @@ class Translation(Motion):
     ----------
     direction : ``"x"``, ``"y"``, ``"z"`` or (3,): the way of the window for a positive rate.
     rate : m/s; number, `TimeSeries` or function of the time.
-    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.
+    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A number
+        or `TimeSeries` changes a rate that is a number as the time goes on.
     ends : what the two faces across the direction do: ``absorbing`` lets waves out (Lysmer's dashpots),
         ``periodic`` joins them, ``fixed`` holds them, ``natural`` leaves them to what the model says.
     damping : α in 1/s.
@@ -140,6 +145,13 @@ class Translation(Motion):
     def field(self, X: Array) -> Array:
         """Return -e."""
         return np.broadcast_to(-self.direction, X.shape)
+
+
+def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:
+    """Return the rate in time from its start."""
+    if isinstance(acceleration, TimeSeries):
+        return lambda time: start + acceleration.integral(0.0, time)
+    return lambda time: start + (acceleration or 0.0) * time
 
 
 def _unit(direction: ArrayLike | str) -> Array:

@@ -14,10 +14,10 @@ from kratos_lite.mesh import Mesh
 
 Array = NDArray[np.float64]
 
-HARMONICS = 6
+HARMONICS = 12
 """Waves around the axis, or along the window, that are looked for."""
 UNEVEN = 1e-2
-"""Share of a harmonic that is too much; 5 times as much of those whose integrals coarse meshes miss."""
+"""Share of a harmonic that is too much."""
 
 
 def leak(motion: Motion, mesh: Mesh) -> float:
@@ -46,17 +46,20 @@ def leak(motion: Motion, mesh: Mesh) -> float:
 def check_materials(terms: MotionMatrices) -> None:
     """Raise ModelError if density or stiffness is not spread evenly about the axis, or along the window.
 
-    The integrals of ρ r² e^{i n φ} and tr(C) r² e^{i n φ} must vanish for n = 1 … 6; along a window φ goes
-    once around, and r = 1.  One material alone is even where the boundary is.
+    For n = 1 … 12 the integrals of ρ r² e^{i n φ} must be those of the mean density, which are 0 but for the
+    quadrature of the mesh, and so those of measures of C.  Along a window φ goes once around, and r = 1.  One
+    material alone is even where the boundary is.
     """
     materials = {id(batch.material): batch.material for batch in terms.batches}
     if len(materials) < 2:
         return
     turns = isinstance(terms.motion, Rotation)
-    for what, values in _harmonics(terms).items():
-        share = np.abs(values[1:]) / np.abs(values[0])
-        n = int(np.argmax(share / np.where(np.arange(1, HARMONICS + 1) > 3, 5.0, 1.0))) + 1
-        if share[n - 1] > UNEVEN * (5.0 if n > 3 else 1.0):
+    found = _harmonics(terms)
+    one = found[0] / found[0][0]
+    for what, values in zip(("density", *["stiffness"] * 3), found[1:], strict=True):
+        share = np.abs(values[1:] / values[0] - one[1:])
+        n = int(np.argmax(share)) + 1
+        if share[n - 1] > UNEVEN:
             where, alike = ("about its axis", "one of revolution") if turns else ("along the window", "alike")
             raise ModelError(
                 f"the {what} of the body is not spread evenly {where} (harmonic {n} is {share[n - 1]:.1%}): "
@@ -64,18 +67,23 @@ def check_materials(terms: MotionMatrices) -> None:
             )
 
 
-def _harmonics(terms: MotionMatrices) -> dict[str, NDArray[np.complex128]]:
-    """Return the integrals of density and stiffness times r² e^{i n φ}, n = 0 … 6."""
-    found = {name: np.zeros(HARMONICS + 1, dtype=complex) for name in ("density", "stiffness")}
+def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
+    """Return the integrals (5, 13) of 1, density and measures of C times r² e^{i n φ}, n = 0 … 12.
+
+    C is measured by two invariants, and in a window, whose axes do not turn, by all of its components.
+    """
+    found = np.zeros((5, HARMONICS + 1), dtype=complex)
     for batch in terms.batches:
-        values = batch.material.density, float(np.trace(batch.material.C))
+        C = batch.material.C
+        bulk, trace = C[:3, :3].sum(), np.trace(C)
+        every = trace if isinstance(terms.motion, Rotation) else (C * np.arange(36, 72).reshape(6, 6)).sum()
+        values = np.array([1.0, batch.material.density, bulk, trace, every])
         for chunk in batch.chunks():
             element = batch.at(terms.points, chunk)
             r, wave = _polar(terms, element.gauss_points())
             power = (element.dV * r * r).astype(complex)
             for n in range(HARMONICS + 1):
-                for total, value in zip(found.values(), values, strict=True):
-                    total[n] += value * power.sum()
+                found[:, n] += values * power.sum()
                 power *= wave
     return found
 

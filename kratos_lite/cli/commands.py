@@ -95,13 +95,13 @@ def _solve(options: Namespace, clock: float) -> int:
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     read = files_read(options.input)
+    if options.modes is not None:
+        return _print_modes(options)
     if marches(options):
         return _solve_in_time(options, read)
     _targets(options, {}, read)
     everywhere = any(material(text)[0] is None for text in options.material)
     scene = load(options.input, materials=not everywhere, strict=not options.lenient)
-    if options.modes is not None and (options.output or options.json or options.picture):
-        raise InputError("--modes prints a table; it writes no files")
     targets = _targets(options, scene.output, read)
     if options.vtu and "output" not in targets:
         raise InputError(f"--vtu {options.vtu}: there is no output to write so; add -o OUT.vtu")
@@ -110,11 +110,6 @@ def _solve(options: Namespace, clock: float) -> int:
     solver, tolerance = options.solver or scene.solver, scene.tolerance
     if options.tolerance is not None:
         tolerance = options.tolerance
-    if options.modes is not None:
-        from kratos_lite.cli.modes import modes_table
-
-        print(modes_table(scene.model, options.modes))
-        return 0
     with TerminalProgress() as progress:
         result = scene.model.solve(solver, tolerance, progress)
     result.report.seconds = {**seconds, **result.report.seconds}
@@ -130,6 +125,22 @@ def _solve(options: Namespace, clock: float) -> int:
         for line in lines:
             print(line)
     return EXIT_CHECK_FAILED if any(map(_is_failed, lines)) else 0
+
+
+def _print_modes(options: Namespace) -> int:
+    """Print natural frequencies of a model; what its file says of time and output does not matter."""
+    from kratos_lite.cli.modes import modes_table
+    from kratos_lite.io.files import load
+
+    if options.output or options.json or options.picture:
+        raise InputError("--modes prints a table; it writes no files")
+    if options.march is not None:
+        raise InputError("--modes and --march: give one of them")
+    everywhere = any(material(text)[0] is None for text in options.material)
+    model = load(options.input, materials=not everywhere, strict=not options.lenient).model
+    apply(model, options)
+    print(modes_table(model, options.modes))
+    return 0
 
 
 def _solve_in_time(options: Namespace, read: list[Path]) -> int:

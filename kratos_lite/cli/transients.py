@@ -29,8 +29,6 @@ WIDTH = 22
 
 def march_of(options: Namespace, given: March | None) -> March:
     """Return the march that the options and a file ask for; options win."""
-    if options.modes is not None:
-        raise InputError("--modes is not for a model that marches; leave --march or the section 'time' out")
     if options.solver or options.tolerance is not None:
         raise InputError("--solver and --tolerance are for statics; a march chooses its own solver")
     march = given
@@ -167,7 +165,7 @@ class _Course:
 
     def __init__(self, transient: Transient, start: Moment) -> None:
         self.transient, self.start, self.last = transient, start, start
-        self.energy, self.farthest = transient.energy(), (0.0, start, 0)
+        self.energy, self.farthest, self.count = transient.energy(), (0.0, start, 0), 0
         self._compare(start)
 
     def add(self, moment: Moment) -> None:
@@ -176,6 +174,7 @@ class _Course:
         self._compare(moment)
 
     def _compare(self, moment: Moment) -> None:
+        self.count += 1
         length = np.linalg.norm(moment.u, axis=1)
         row = int(length.argmax())
         if length[row] > self.farthest[0]:
@@ -201,14 +200,19 @@ class _Course:
             ("unknowns", str(len(e.system.reduced.free))),
             ("scheme", self.transient.scheme.name + (", lumped mass" if e.mass.lumped else "")),
             ("time", span),
-            ("largest displacement", f"{size:.6e} m at node {mesh.node_ids[row]}, t = {moment.time:.6g} s"),
+            (
+                "largest displacement",
+                f"{size:.6e} m at node {mesh.node_ids[row]}, t = {moment.time:.6g} s, of {self.count} kept",
+            ),
             ("energy", f"{self.energy:.6e} J at the start, {self.transient.energy():.6e} J at the end"),
             ("total reaction", f"{vector(force, scale)} N at the end"),
             ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"),
         ]
         if any(march.rayleigh):
             rows.insert(4, ("damping", "{:g} 1/s × M + {:g} s × K".format(*e.rayleigh)))
+        rows += self.transient.result(self.last).report.motion_rows()
         still = [] if size else ["no load, no support that moves and no velocity: nothing moves"]
+        still += [f"rigid motions are held by inertia alone: {e.free_motions}"] if e.free_motions else []
         rows += [("warning", text) for text in (*e.warnings, *still)] + [
             ("note", text) for text in scene.model.notes
         ]

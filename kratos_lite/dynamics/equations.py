@@ -284,14 +284,14 @@ class EquationsOfMotion:
         stays = self._steady and not motion.is_accelerated
         return motion.rate(time), 0.0 if stays else motion.acceleration(time)
 
-    @property
-    def is_held(self) -> bool:
-        """Whether supports hold all rigid motions."""
+    @cached_property
+    def free_motions(self) -> str:
+        """What the supports leave free of rigid motions; empty where they hold all."""
         try:
             check_supports(self.model.mesh, self.model.supports)
-        except ModelError:
-            return False
-        return True
+        except ModelError as error:
+            return str(error).removeprefix("the supports leave rigid motions free: ")
+        return ""
 
     def is_symmetric(self, time: float, c: float) -> bool:
         """Return whether a matrix with the share c of damping is symmetric at a time."""

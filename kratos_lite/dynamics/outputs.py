@@ -126,11 +126,12 @@ def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) 
     return np.asarray(v + rate * along)
 
 
-def motion_summary(e: EquationsOfMotion, of: Reacting, beside: tuple[float, float] | None) -> dict[str, Any]:
-    """Return the figures of a steady motion for its report; `beside` are the critical rates next to it."""
+def motion_summary(
+    e: EquationsOfMotion, of: Reacting, critical: float | None, time: float = 0.0
+) -> dict[str, Any]:
+    """Return the figures of a motion at a time for a report; `critical` is the lowest critical rate."""
     assert e.terms is not None
-    rate, waves = e.rates(0.0)[0], critical_rate_estimate(e.terms)
-    critical = (beside[0] or beside[1]) if beside else None
+    (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
     turns = isinstance(e.terms.motion, Rotation)
     noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
     force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))
@@ -139,7 +140,7 @@ def motion_summary(e: EquationsOfMotion, of: Reacting, beside: tuple[float, floa
         "unit": "rad/s" if turns else "m/s",
         "direction": e.terms.motion.direction.tolist(),
         "rate": rate,
-        "acceleration": e.rates(0.0)[1],
+        "acceleration": acceleration,
         "critical_rate": critical,
         "critical_rate_of_waves": waves,
         "margin": 1 - abs(rate) / (critical or waves),

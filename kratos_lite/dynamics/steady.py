@@ -12,7 +12,7 @@ from kratos_lite.ale.guards import critical_rate_estimate, near_critical
 from kratos_lite.assembly import Progress
 from kratos_lite.checks import equilibrium
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
-from kratos_lite.dynamics.modal import critical_rates_beside
+from kratos_lite.dynamics.modal import critical_rates, critical_rates_beside
 from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
 from kratos_lite.native import described
@@ -60,13 +60,15 @@ def solve_steady(
         inner = e.system.whole(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
         balance = equilibrium(model.mesh.points, nodal - inner, reactions)
         judge(solution, u, balance)
-        beside = None
+        critical = None
         rate, terms = e.rates(0.0)[0], e.terms
         if terms is not None and rate:
             if solution.method == "direct":
-                beside = critical_rates_beside(e, rate, equations.factors if symmetric else None)
-            limit = (beside[0] or beside[1]) if beside else critical_rate_estimate(terms)
-            warnings += near_critical(terms.motion, 0.0, limit, beside is not None)
+                below, critical = critical_rates_beside(e, rate, equations.factors if symmetric else None)
+                if below:  # there may be more below, and the lowest counts
+                    critical = float(critical_rates(e, 1)[0])
+            limit = critical or critical_rate_estimate(terms)
+            warnings += near_critical(terms.motion, 0.0, limit, critical is not None)
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=nodal.sum(axis=0),
@@ -86,5 +88,5 @@ def solve_steady(
     )
     u0 = model.initial_displacement
     result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report, u0)
-    report.motion = motion_summary(e, result, beside)
+    report.motion = motion_summary(e, result, critical)
     return result

@@ -16,7 +16,7 @@ from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates
 from kratos_lite.dynamics.moment import Moment
 from kratos_lite.dynamics.movement import Course, at_start, prescribed_part, with_prescribed
-from kratos_lite.dynamics.outputs import velocity_of_material
+from kratos_lite.dynamics.outputs import motion_summary, velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
 from kratos_lite.dynamics.steps import explicit_step, implicit_step, is_trapezoidal
 from kratos_lite.errors import InputError, ModelError, SolveError
@@ -101,7 +101,8 @@ class Transient:
         if explicit and model.supports.links:
             raise ModelError("central differences do not take constraints; use newmark()")
         self._state = model_state(model)
-        self._limit, self._of_mesh = self._critical_rate()
+        self._critical, self._of_mesh = self._critical_rate()
+        self._watching = self._critical < np.inf
         self._watch_rate(0.0)
         self.time, self.step = 0.0, 0
         rest = np.zeros((self.equations.system.n_nodes, 3))
@@ -111,6 +112,11 @@ class Transient:
         course = at_start(self.equations)
         if displacement is not None:
             self._check_supports(self.u, course[0], "the initial displacement")
+        elif jump := float(np.abs(prescribed_part(self.equations, course[0])).max(initial=0.0)):
+            self.equations.warnings.append(
+                f"supports are displaced by {jump:g} m at the start of a model at rest, which is struck: "
+                "give the displacement of model.solve(), or let them move from 0"
+            )
         self._start(*course)
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
@@ -217,19 +223,20 @@ class Transient:
     def _critical_rate(self) -> tuple[float, bool]:
         """Return the lowest critical rate, and whether it is that of the mesh; infinite without a motion."""
         e = self.equations
-        if e.terms is None or (e.terms.motion.steady and not e.rates(0.0)[0]):
+        moves = e.terms is not None and len(e.system.reduced.free)
+        if e.terms is None or not moves or (e.terms.motion.steady and not e.rates(0.0)[0]):
             return np.inf, False
-        if len(e.system.reduced.free) <= DIRECT_MAX and e.is_held:
+        if len(e.system.reduced.free) <= DIRECT_MAX and not e.free_motions:
             return float(critical_rates(e, 1)[0]), True
         return critical_rate_estimate(e.terms), False
 
     def _watch_rate(self, time: float) -> None:
         """Warn once, when the rate comes near the critical one."""
         e = self.equations
-        if self._limit == np.inf or e.terms is None:
+        if not self._watching or e.terms is None:
             return
-        for text in near_critical(e.terms.motion, time, self._limit, self._of_mesh):
-            self._limit = np.inf
+        for text in near_critical(e.terms.motion, time, self._critical, self._of_mesh):
+            self._watching = False
             e.warnings.append(f"at t = {time:g} s {text}" if time else text)
             if time:
                 _log.warning("%s", e.warnings[-1])
@@ -252,7 +259,9 @@ class Transient:
         """Return the model as it is now."""
         system = self.equations.system
         u, v, a = (system.whole(x).copy() for x in (self.u, self.v, self.a))
-        return Moment(self.time, self.step, u, v, a, self.reactions())
+        left = self._left()
+        reactions = self.equations.model.supports.carried(system.whole(left))
+        return Moment(self.time, self.step, u, v, a, reactions, self._free_part(left))
 
     def put(self, moment: Moment) -> None:
         """Go on from a moment, such as `Moment.load` gives, of this model or of one that was held otherwise.
@@ -271,26 +280,36 @@ class Transient:
         self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the moment")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
         self._untouched = not step
-        if is_trapezoidal(self.scheme) and self._imbalance(u, v, a, time) > OFF_BALANCE:
+        left, largest = self._imbalance(u, v, a, time)
+        other = abs(left - moment.imbalance) > OFF_BALANCE * largest  # another load, if it is known
+        if other or (is_trapezoidal(self.scheme) and left > OFF_BALANCE * largest):
             self.a = self._balanced(prescribed_part(self.equations, a))
 
-    def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> float:
-        """Return the largest free component of M a + C v + K u - f as a share of the largest of its terms."""
+    def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> tuple[float, float]:
+        """Return the largest free component of M a + C v + K u - f, and the largest of its terms, in N."""
         e = self.equations
-        terms = [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time)]
-        terms.append(-e.load(time))
-        largest = max(float(np.abs(term).max(initial=0.0)) for term in terms)
-        left = np.abs(e.system.reduced.reduce(np.sum(terms, axis=0))).max(initial=0.0)
-        return float(left) / largest if largest else 0.0
+        terms = [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
+        noise = 1e-10 * float(np.abs(e.K.data).max() * np.abs(u).max(initial=0.0))  # rounding of K u comes in
+        largest = max(noise, *(float(np.abs(term).max(initial=0.0)) for term in terms))
+        return self._free_part(np.sum(terms, axis=0)), largest
+
+    def _free_part(self, forces: Array) -> float:
+        """Return the largest free component of forces (3a,)."""
+        return float(np.abs(self.equations.system.reduced.reduce(forces)).max(initial=0.0))
 
     def result(self, moment: Moment | None = None) -> Result:
         """Return a moment, or now, as a `Result` with strains and stresses; its loads are those of that time.
 
-        The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative.
+        The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative; None for
+        schemes that do not take the balance at the end of a step.
         """
         at, e = self.moment() if moment is None else moment, self.equations
         model, local = e.model, e.system.local
         loads = e.system.whole(e.load(at.time)).copy()
+        left = None  # schemes that take the balance before the end of a step do not meet it there
+        if is_trapezoidal(self.scheme):
+            free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
+            left = free / largest if largest else 0.0
         report = Report(
             unknowns=len(e.system.reduced.free),
             total_load=loads.sum(axis=0),
@@ -298,7 +317,7 @@ class Transient:
             solver=self.scheme.name,
             reason=f"step {at.step}, t = {at.time:g} s",
             iterations=0,
-            backward_error=self._imbalance(local(at.u), local(at.v), local(at.a), at.time),
+            backward_error=left,
             force_error=None,
             moment_error=None,
             seconds={},
@@ -308,14 +327,22 @@ class Transient:
             kernels=described(),
         )
         u0 = model.initial_displacement
-        return Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
+        result = Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
+        if e.terms is not None:
+            critical = self._critical if self._of_mesh else None
+            report.motion = motion_summary(e, result, critical, at.time)
+        return result
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
+        return self.equations.model.supports.carried(self.equations.system.whole(self._left()))
+
+    def _left(self) -> Array:
+        """Return M a + C v + K u - f, (3a,) in N."""
         e = self.equations
         left = e.times_mass(self.a) + e.times_damping(self.v, self.time)
         left += e.times_stiffness(self.u, self.time) - e.load(self.time)
-        return e.model.supports.carried(e.system.whole(left))
+        return left
 
     def energy(self, moment: Moment | None = None) -> float:
         """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.

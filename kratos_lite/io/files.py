@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from kratos_lite.io.scene import Scene
 
 if TYPE_CHECKING:
     from kratos_lite.io.document import Document
+    from kratos_lite.mesh import Mesh
     from kratos_lite.model import Model
 
 
@@ -67,8 +69,18 @@ def write(path: str | Path, thing: Any) -> list[str]:
         document = document_from(thing)
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
-        return write_document(path, Document(thing) if isinstance(thing, Mesh) else thing)
+        return write_document(path, Document(_with_named_sides(thing)) if isinstance(thing, Mesh) else thing)
     raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
+
+
+def _with_named_sides(mesh: Mesh) -> Mesh:
+    """Return a mesh whose parts for the sides, such as ``z+`` of a box, have names for files."""
+    from kratos_lite.io.kratos.to_document import kratos_name
+    from kratos_lite.mesh.mesh import SIDES
+
+    named = copy(mesh)
+    named.parts = {kratos_name(name) if name in SIDES else name: part for name, part in mesh.parts.items()}
+    return named
 
 
 def write_document(path: str | Path, document: Document) -> list[str]:

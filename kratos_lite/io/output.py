@@ -32,7 +32,7 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
             return {name: file[name] for name in names}
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error, NotImplementedError):
+    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error, RuntimeError):
         raise InputError(f"{path}: not {what}, or not all of it") from None
 
 

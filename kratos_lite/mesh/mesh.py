@@ -145,6 +145,10 @@ class Mesh:
         ``x- x+ y- y+ z- z+`` mean the nodes on the sides of the bounding box where the mesh
         has no part of that name.
         """
+        if not isinstance(name, str):
+            raise MeshError(
+                f"a part is known by its name; got {name!r}: see nodes(where) and add_part(name, where)"
+            )
         if name in self.parts:
             return self.parts[name]
         if name in SIDES and self.n_nodes:
@@ -157,6 +161,21 @@ class Mesh:
         have = ", ".join(part for part in self.parts if part not in SIDES)
         have = f"have {have} and" if have else "have"
         raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, self.parts)}")
+
+    def add_part(self, name: str, where: Where) -> None:
+        """Give nodes a name: those of a part, a predicate on the points, a mask or rows.
+
+        >>> mesh = Mesh([[0, 0, 0], [1, 0, 0]])
+        >>> mesh.add_part("tip", lambda X: X[:, 0] > 0.5)
+        >>> mesh.nodes("tip")
+        array([1])
+        """
+        if not isinstance(name, str) or not name:
+            raise MeshError(f"a part needs a name; got {name!r}")
+        rows = self.nodes(where)
+        if not len(rows):
+            raise MeshError(f"no node is chosen for part {name!r}")
+        self.parts[name] = Part(nodes=rows)
 
     def _side(self, axis: int, end: int) -> Ints:
         x = self.points[:, axis]
@@ -175,7 +194,7 @@ class Mesh:
         """
         if isinstance(where, str):
             return self.part(where).nodes
-        chosen = np.asarray(where(self.points) if callable(where) else where)
+        chosen = np.asarray(where(self.points.copy()) if callable(where) else where)
         if chosen.dtype == bool:
             if chosen.shape != (self.n_nodes,):
                 raise MeshError(f"a node mask must have shape ({self.n_nodes},); got {chosen.shape}")

@@ -47,7 +47,7 @@ def test_rates_near_the_critical_one(wheels):
     said = {rate: " ".join(spun(wheels.disk("20N", 2, 24), rate=rate)) for rate in (80.0, 92.0, 99.0, -99.0)}
     assert "critical" not in said[80.0]
     assert "the rate 92 rad/s is near the critical one, 98.21 rad/s on this mesh" in said[92.0]
-    assert "the rate 99 rad/s is above a critical one" in said[99.0]
+    assert "the rate 99 rad/s is above the critical one" in said[99.0]
     assert "above" in said[-99.0]
     free = wheels.disk("20N", 2, 24, hub="free")
     free.add(Rotation("z", rate=87.0, stiffening=True))
@@ -62,8 +62,8 @@ def test_rates_near_the_critical_one(wheels):
     [
         (35.0, ""),
         (41.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
-        (-43.7, "the rate 43.7 rad/s is above a critical one, 43.6 rad/s on this mesh"),
-        (64.0, "the rate 64 rad/s is above a critical one, 58.46 rad/s on this mesh"),
+        (-43.7, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (64.0, "the rate 64 rad/s is above the critical one, 43.6 rad/s on this mesh"),
     ],
 )
 def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, words, damping, wheels):
@@ -72,10 +72,9 @@ def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, words, da
     model.fix("inner")
     model.add(Rotation("z", rate=rate, damping=damping))
     result = model.solve()
-    lowest = words.replace("58.46", "43.6")
-    for warnings, told in ((result.report.warnings, words), (model.transient().equations.warnings, lowest)):
+    for warnings in (result.report.warnings, model.transient().equations.warnings):
         said = [text for text in warnings if "critical" in text]
-        assert (len(said) == 1 and said[0].startswith(told)) if told else not said
+        assert (len(said) == 1 and said[0].startswith(words)) if words else not said
     assert (result.report.motion["margin"] < 0) == ("above" in words)
 
 
@@ -141,7 +140,7 @@ def test_no_density():
         model.solve()
 
 
-@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 5, 6, 7, 8])
 @pytest.mark.parametrize(
     ("other", "what"),
     [(kl.Isotropic3D(210e6, 0.3, 3 * 7620.0), "density"), (kl.Isotropic3D(21e6, 0.3, 7620.0), "stiffness")],
@@ -188,6 +187,13 @@ def test_a_window_must_be_alike_along_its_way(wheels):
     layered.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
     layered.add(Translation("x", rate=5.0))
     layered.solve()
+    graded = kl.Model(kl.box((10, 1, 1), (8, 1, 2)), wheels.steel)
+    graded.mesh.points[:, 0] = (graded.mesh.points[:, 0] / 10) ** 3 * 10
+    graded.fix("z-")
+    low = graded.mesh.points[graded.mesh.blocks[0].nodes].mean(axis=1)[:, 2] < 0.5
+    graded.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
+    graded.add(Translation("x", rate=5.0))
+    graded.solve()
 
 
 def test_one_motion_to_a_model(wheels):
@@ -214,6 +220,21 @@ def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels)
     np.testing.assert_array_equal(*found)
     pulled = 4e3 * 10 / (2 * wheels.steel.C[0, 0])
     assert found[0][:, 0].max() == pytest.approx(1e-3 + pulled, rel=1e-5)
+
+
+def test_joined_ends_move_by_one_function(wheels):
+    model = wheels.bar("8N", 4)
+    model.add(Translation("x", rate=1.0, ends="periodic"))
+    way = kl.TimeSeries([0.0, 1.0], [0.0, 1e-3])
+    model.fix("x-", "x", way)
+    *_, one = model.transient().march(1e-2, 5)
+    model.fix("x+", "x", way)
+    *_, both = model.transient().march(1e-2, 5)
+    np.testing.assert_allclose(both.u, one.u, atol=1e-16)
+    for other in (0.0, kl.TimeSeries([0.0, 1.0], [0.0, 2e-3])):
+        model.fix("x+", "x", other, override=True)
+        with pytest.raises(ModelError, match="are joined, but moved otherwise"):
+            model.transient()
 
 
 def test_joined_ends_cannot_be_held_in_two_places(wheels):

@@ -96,6 +96,26 @@ def test_the_acceleration_is_the_slope_of_the_rate(given, wheels):
     np.testing.assert_array_equal(steady.u, model.solve().u)
 
 
+def test_a_constant_acceleration_changes_the_rate(wheels):
+    for acceleration in (200.0, kl.TimeSeries([0.0, 1.0], [200.0, 200.0])):
+        motion = Rotation("z", 10.0, acceleration)
+        assert [motion.rate(t) for t in (0.0, 0.5)] == pytest.approx([10.0, 110.0])
+        assert motion.acceleration(0.5) == 200.0
+        assert not motion.steady
+    model = wheels.disk("8N", 1, 12)
+    model.add(Rotation("z", 10.0, 200.0))
+    other = wheels.disk("8N", 1, 12)
+    other.add(Rotation("z", lambda t: 10.0 + 200.0 * t, 200.0))
+    ends = [list(one.transient().march(1e-3, 20, every=20))[-1].u for one in (model, other)]
+    np.testing.assert_allclose(*ends, rtol=1e-12, atol=1e-18)
+
+
+def test_a_far_knot_leaves_the_slope_of_the_others():
+    rate = kl.TimeSeries([0.0, 0.1, 1e9], [0.0, 10.0, 10.0])
+    assert [rate.slope(t) for t in (0.0, 0.05, 0.1, 0.2, 2e9)] == [100.0, 100.0, 50.0, 0.0, 0.0]
+    assert rate.slope(sum([0.01] * 10)) == 50.0  # 0.09999999999999999
+
+
 def test_a_rate_that_passes_the_critical_one_is_told_once(wheels, caplog):
     model = wheels.disk("8N", 1, 12)
     model.add(Rotation("z", lambda t: 2000 * t, 2000.0))

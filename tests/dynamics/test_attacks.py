@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.dynamics import EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rate
 
 
@@ -65,6 +66,83 @@ def spring(force=0.0):
     model.add(kl.Varying(kl.Traction("z+", (0, 0, 1e3)), lambda t: np.sin(20 * t)))
     model.add(kl.Traction("z+", (0, 0, force)))
     return model
+
+
+@pytest.mark.parametrize(
+    "scheme", [kl.hht(-0.1), kl.bossak(), kl.generalised_alpha(0.5), kl.newmark(0.3025, 0.6)]
+)
+def test_what_is_let_go_begins_with_the_acceleration_of_its_new_load(scheme, tmp_path):
+    """A moment of another load, put or read from a file, is the start of a new transient from there."""
+    model = spring(1e3)
+    *_, moment = model.transient(scheme=scheme).march(1e-3, 100, every=100)
+    moment.save(tmp_path / "loaded.npz")
+    ends = []
+    for given in (moment, kl.Moment.load(tmp_path / "loaded.npz")):
+        released = spring(-2e3).transient(scheme=scheme)
+        released.put(given)
+        *_, end = released.march(1e-3, 40, every=40)
+        ends.append(end.u)
+    np.testing.assert_array_equal(*ends)
+    e = EquationsOfMotion(spring(-2e3))
+    balance = e.load(0.1) - e.times_stiffness(e.system.local(moment.u), 0.0)
+    put = spring(-2e3).transient(scheme=scheme)
+    put.put(moment)
+    free = e.system.reduced.free
+    assert e.times_mass(put.a)[free] == pytest.approx(balance[free], rel=1e-9)
+    again = model.transient(scheme=scheme)
+    again.put(moment)  # the same load: as it was, so that restarts are bitwise
+    np.testing.assert_array_equal(again.a, e.system.local(moment.a))
+
+
+def test_supports_that_rest_elsewhere_fit_their_own_moments():
+    """A constant displacement of all supports is no movement of the free nodes."""
+    model = kl.Model(kl.box(cells=(1, 1, 2)), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    model.fix("z-", "x", 1e-3)
+    model.fix("z-", "yz")
+    transient = model.transient(displacement=model.solve().u)
+    transient.put(transient.moment())
+    *_, end = transient.march(1e-3, 20, every=20)
+    transient.put(end)
+    np.testing.assert_allclose(end.u[:, 0], 1e-3, rtol=1e-9)
+    assert not transient.equations.warnings
+    (warning,) = model.transient().equations.warnings
+    assert "supports are displaced by 0.001 m at the start of a model at rest" in warning
+
+
+def test_reactions_are_saved_with_a_moment(tmp_path):
+    *_, moment = spring(1e3).transient().march(1e-3, 5)
+    moment.save(tmp_path / "a.npz")
+    loaded = kl.Moment.load(tmp_path / "a.npz")
+    for name in ("u", "v", "a", "reactions", "time", "step", "imbalance"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(moment, name))
+    assert np.abs(loaded.reactions).max() > 1.0
+
+
+def test_functions_of_places_get_places_of_their_own():
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+
+    def scaled(X):
+        X *= 1e3
+        return X[:, 0] * 0 + 1.0
+
+    before = model.mesh.points.copy()
+    force = kl.Pressure("x+", scaled).forces(model.mesh, model.batches())
+    np.testing.assert_allclose(force.sum(axis=0), [-1.0, 0, 0], atol=1e-14)
+
+    def shifted(X):
+        X -= 0.5
+        return X[:, 2] < 0
+
+    model.fix(shifted)
+    np.testing.assert_array_equal(model.mesh.points, before)
+    assert model.supports.fixed.sum() == 12
+
+
+def test_a_transient_of_a_model_that_is_held_everywhere():
+    model = wheel(kl.ale.Rotation("z", 5.0))
+    model.fix(range(model.mesh.n_nodes))
+    *_, end = model.transient().march(1e-3, 3)
+    assert not end.u.any()
 
 
 @pytest.mark.parametrize(

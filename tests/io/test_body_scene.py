@@ -235,7 +235,7 @@ MISTAKES = [
     ({"output": {"vtu": "a.vtu"}}, r"unknown key 'output\.vtu'"),
     ({"output": {"pvd": "../a.pvd"}}, r"output\.pvd: path '\.\./a\.pvd' leaves the folder"),
     ({"restart": "none.npz"}, r"restart: there is no file"),
-    ({"model": "a.mdpa"}, "this is a run file of a static model: kratos-lite solve"),
+    ({"model": "a.mdpa"}, "this is a run file of a model: kratos-lite solve"),
 ]  # fmt: skip
 
 

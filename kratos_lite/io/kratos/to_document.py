@@ -125,12 +125,20 @@ def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block
 
 
 def _parts(mesh: Mesh) -> dict[str, Part]:
-    """Return the parts with names that Kratos can read (``z+`` becomes ``z_plus``)."""
-    rename = {name: name.replace("+", "_plus").replace("-", "_minus") for name in mesh.parts}
+    """Return the parts with names that Kratos can read."""
     return {
-        rename[name]: Part(nodes=part.nodes, elements=part.elements, properties=())
+        kratos_name(name): Part(nodes=part.nodes, elements=part.elements, properties=())
         for name, part in mesh.parts.items()
     }
+
+
+def kratos_name(part: str) -> str:
+    """Return the name of a part, or of a side, that Kratos can read.
+
+    >>> kratos_name("z+")
+    'z_plus'
+    """
+    return part.replace("+", "_plus").replace("-", "_minus")
 
 
 def _links(model: Model) -> list[Constraint]:

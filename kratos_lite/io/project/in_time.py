@@ -127,7 +127,17 @@ class ProcessesInTime:
             if steps[0] == 0 and action.factors:
                 value = action.value(points[action.rows], self.case.times[0])
                 start.set_nodes(action.component, action.rows, value)
+                if action.component.startswith("ACCELERATION") and np.any(value):
+                    raise action.settings.error(
+                        "variable_name",
+                        f"{action.component} cannot be given; the acceleration at the start is 0",
+                    )
+            if action.fixed and action.component.startswith("DISPLACEMENT"):
+                start.fix(action.component, action.rows)
         u, v = start.vector("DISPLACEMENT"), start.vector("VELOCITY")
+        held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
+        if v[np.transpose(held)].any():
+            self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
     def _move(self, i: int, action: Action, values: Variables) -> None:

@@ -123,7 +123,7 @@ def _check_solver(solver: Settings) -> list[str]:
                 key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
             )
     known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
-    notes = [f"solver setting {key!r} is not used" for key in solver.unknown(known)]
+    notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
     if analysis == "non_linear":
         notes.append(
             "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"

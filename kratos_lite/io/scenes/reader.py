@@ -75,7 +75,7 @@ def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
     """
     settings, problems = read_settings(path), Problems()
     if "model" in settings or "solver_settings" in settings:
-        raise InputError(f"{path}: this is a run file of a static model: kratos-lite solve {path}")
+        raise InputError(f"{path}: this is a run file of a model: kratos-lite solve {path}")
     for key in settings.unknown(KEYS):
         problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
     files = [path]
