@@ -100,6 +100,11 @@ class EquationsOfMotion:
             self.terms = MotionMatrices(model.motion, *placed, exact)
             check_materials(self.terms)
             self.warnings += warnings_of(self.terms, model)
+            if self.rayleigh[1]:
+                self.warnings.append(
+                    "Rayleigh's β K u' damps in fixed axes, not along with the material that moves; take the "
+                    "damping of the motion"
+                )
         self._kept: tuple[Any, Solve] | None = None
         self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
 

@@ -11,8 +11,11 @@ from kratos_lite.ale import Rotation
 from kratos_lite.ale.guards import critical_rate_estimate
 from kratos_lite.arguments import finite
 from kratos_lite.dynamics.equations import EquationsOfMotion
+from kratos_lite.dynamics.moment import Moment
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
+from kratos_lite.native import described
+from kratos_lite.result import Report, Result, peak_memory
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -147,3 +150,31 @@ def motion_summary(
         "support_force": force.tolist(),
         "support_moment": moment.tolist(),
     }
+
+
+def result_of(
+    e: EquationsOfMotion, at: Moment, scheme: str, left: float | None, critical: float | None
+) -> Result:
+    """Return a moment as a result; `left` is what its balance misses, where that is known."""
+    model, loads = e.model, e.system.whole(e.load(at.time)).copy()
+    report = Report(
+        unknowns=len(e.system.reduced.free),
+        total_load=loads.sum(axis=0),
+        total_reaction=at.reactions.sum(axis=0),
+        solver=scheme,
+        reason=f"step {at.step}, t = {at.time:g} s",
+        iterations=0,
+        backward_error=left,
+        force_error=None,
+        moment_error=None,
+        seconds={},
+        peak_memory=peak_memory(),
+        warnings=list(e.warnings),
+        notes=list(model.notes),
+        kernels=described(),
+    )
+    u0 = model.initial_displacement
+    result = Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
+    if e.terms is not None:
+        report.motion = motion_summary(e, result, critical, at.time)
+    return result

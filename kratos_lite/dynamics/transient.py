@@ -16,13 +16,12 @@ from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates
 from kratos_lite.dynamics.moment import Moment
 from kratos_lite.dynamics.movement import Course, at_start, prescribed_part, with_prescribed
-from kratos_lite.dynamics.outputs import motion_summary, velocity_of_material
+from kratos_lite.dynamics.outputs import result_of, velocity_of_material
 from kratos_lite.dynamics.schemes import CentralDifference, Implicit, newmark
 from kratos_lite.dynamics.steps import explicit_step, implicit_step, is_trapezoidal
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.finite_strain import highest_frequency
-from kratos_lite.native import described
-from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.result import Result
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.statics import same_state
 
@@ -303,35 +302,12 @@ class Transient:
         The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative; None for
         schemes that do not take the balance at the end of a step.
         """
-        at, e = self.moment() if moment is None else moment, self.equations
-        model, local = e.model, e.system.local
-        loads = e.system.whole(e.load(at.time)).copy()
-        left = None  # schemes that take the balance before the end of a step do not meet it there
+        at, local, left = self.moment() if moment is None else moment, self.equations.system.local, None
         if is_trapezoidal(self.scheme):
             free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
             left = free / largest if largest else 0.0
-        report = Report(
-            unknowns=len(e.system.reduced.free),
-            total_load=loads.sum(axis=0),
-            total_reaction=at.reactions.sum(axis=0),
-            solver=self.scheme.name,
-            reason=f"step {at.step}, t = {at.time:g} s",
-            iterations=0,
-            backward_error=left,
-            force_error=None,
-            moment_error=None,
-            seconds={},
-            peak_memory=peak_memory(),
-            warnings=list(e.warnings),
-            notes=list(model.notes),
-            kernels=described(),
-        )
-        u0 = model.initial_displacement
-        result = Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
-        if e.terms is not None:
-            critical = self._critical if self._of_mesh else None
-            report.motion = motion_summary(e, result, critical, at.time)
-        return result
+        critical = self._critical if self._of_mesh else None
+        return result_of(self.equations, at, self.scheme.name, left, critical)
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""

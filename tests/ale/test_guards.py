@@ -196,6 +196,14 @@ def test_a_window_must_be_alike_along_its_way(wheels):
     graded.solve()
 
 
+def test_rayleigh_damping_by_stiffness_is_doubtful(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.add(Rotation("z", rate=1.0))
+    (warning,) = model.transient(rayleigh=(0.0, 1e-4)).equations.warnings
+    assert warning.startswith("Rayleigh's β K u' damps in fixed axes")
+    assert not model.transient(rayleigh=(1.0, 0.0)).equations.warnings
+
+
 def test_one_motion_to_a_model(wheels):
     model = wheels.disk("20N", 2, 24)
     model.add(Rotation("z", rate=1.0))
