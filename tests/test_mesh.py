@@ -78,3 +78,23 @@ def test_faces_between_different_cells_are_inside():
         ("Quadrilateral4", 8),
         ("Triangle3", 4),
     ]
+
+
+def test_parts_are_given_by_places_and_written_by_their_names(tmp_path):
+    mesh = kl.box(cells=(2, 1, 1))
+    mesh.add_part("middle", lambda X: X[:, 0] == 0.5)
+    mesh.add_part("again", "middle")
+    assert mesh.nodes("again").tolist() == mesh.nodes("middle").tolist()
+    assert mesh.points[mesh.nodes("middle"), 0].tolist() == [0.5] * 4
+    kl.write(tmp_path / "box.mdpa", mesh)
+    written = kl.read(tmp_path / "box.mdpa").mesh
+    assert {"middle", "again", "x_plus", "z_minus"} <= set(written.parts)
+    assert "x+" in mesh.parts
+    for name, where, words in (
+        ("", "x-", "a part needs a name"),
+        ("none", lambda X: X[:, 0] > 9, "no node is chosen for part 'none'"),
+    ):
+        with pytest.raises(kl.MeshError, match=words):
+            mesh.add_part(name, where)
+    with pytest.raises(kl.MeshError, match="a part is known by its name"):
+        mesh.part(3)
