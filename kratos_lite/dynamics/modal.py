@@ -128,7 +128,7 @@ def critical_rates_beside(
 
 def _beside(K: Any, H: Any, square: float, factors: direct.Factorisation) -> Array:
     """Return eigenvalues of K φ = λ H φ on either side of a number, by Lanczos on (K - number H)^-1 K."""
-    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     n = K.shape[0]
     inverse = LinearOperator((n, n), matvec=factors.apply, dtype=np.float64)
@@ -136,8 +136,8 @@ def _beside(K: Any, H: Any, square: float, factors: direct.Factorisation) -> Arr
     way = {"mode": "buckling", "which": "BE", "OPinv": inverse, "v0": start, "return_eigenvectors": False}
     try:
         return np.asarray(eigsh(K, 2, H, sigma=square, tol=1e-2, ncv=FEW // 2, maxiter=3, **way))
-    except ArpackNoConvergence as error:
-        return np.asarray(error.eigenvalues)
+    except ArpackError as error:  # what it has found, if anything
+        return np.asarray(getattr(error, "eigenvalues", ()), dtype=float)
 
 
 def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:

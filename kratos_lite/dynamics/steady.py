@@ -63,11 +63,12 @@ def solve_steady(
         critical = None
         rate, terms = e.rates(0.0)[0], e.terms
         if terms is not None and rate:
+            waves = critical_rate_estimate(terms)
             if solution.method == "direct":
                 below, critical = critical_rates_beside(e, rate, equations.factors if symmetric else None)
-                if below:  # there may be more below, and the lowest counts
+                if below or abs(rate) > waves:  # there may be more below, and the lowest counts
                     critical = float(critical_rates(e, 1)[0])
-            limit = critical or critical_rate_estimate(terms)
+            limit = critical or waves
             warnings += near_critical(terms.motion, 0.0, limit, critical is not None)
     report = Report(
         unknowns=len(e.system.reduced.free),

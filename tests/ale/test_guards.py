@@ -63,6 +63,7 @@ def test_rates_near_the_critical_one(wheels):
         (35.0, ""),
         (41.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
         (-43.7, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (1e6, "the rate 1e+06 rad/s is above the critical one, 43.6 rad/s on this mesh"),
         (64.0, "the rate 64 rad/s is above the critical one, 43.6 rad/s on this mesh"),
     ],
 )
