@@ -56,6 +56,7 @@ class EquationsOfMotion:
     terms : the matrices of the motion, or None.
     applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
     prescribed : function of the time that gives the displacements (3a,) where the free ones are 0.
+    step : s, over which an acceleration is taken from the rate; 0 for its slope.
     warnings : what the checks of the model and of its motion at the time 0 found.
 
     Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
@@ -72,6 +73,7 @@ class EquationsOfMotion:
         progress: Progress | None = None,
     ) -> None:
         self.model, self.progress, self._steady = model, progress, steady
+        self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)
         batches, part, self.warnings = model.checked(free=free)
         for batch in batches:
@@ -286,8 +288,13 @@ class EquationsOfMotion:
         if self.terms is None:
             return 0.0, 0.0
         motion = self.terms.motion
-        stays = self._steady and not motion.is_accelerated
-        return motion.rate(time), 0.0 if stays else motion.acceleration(time)
+        if motion.is_accelerated or not (self._steady or self.step):
+            return motion.rate(time), motion.acceleration(time)
+        if self._steady:
+            return motion.rate(time), 0.0
+        start = max(time - self.step / 2, 0.0)  # the mean over a step: in all the whole change
+        end = time + self.step / 2
+        return motion.rate(time), (motion.rate(end) - motion.rate(start)) / (end - start)
 
     @cached_property
     def free_motions(self) -> str:

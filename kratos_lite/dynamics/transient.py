@@ -215,6 +215,7 @@ class Transient:
 
     def _step(self, now: Course, h: float) -> Course:
         """Return displacement, velocity and acceleration a step later."""
+        self.equations.step = h
         if isinstance(self.scheme, CentralDifference):
             return explicit_step(self.equations, now, self.time, h)
         return implicit_step(self.equations, self.scheme, now, self.time, h)

@@ -96,6 +96,19 @@ def test_the_acceleration_is_the_slope_of_the_rate(given, wheels):
     np.testing.assert_array_equal(steady.u, model.solve().u)
 
 
+def test_kinks_between_the_steps_give_the_whole_impulse(wheels):
+    """Σ Δt Euler load is that of the whole change of the rate, wherever its kinks lie."""
+    model = wheels.disk("8N", 1, 12)
+    model.add(Rotation("z", kl.TimeSeries([0.0, 0.0203, 0.0517], [0.0, 10.0, 3.0])))
+    transient, h = model.transient(), 1e-2
+    rates = [0.0]
+    for moment in transient.march(h, 8):
+        rates.append(transient.equations.rates(moment.time)[1])
+    first = transient.equations.rates(0.0)[1]
+    assert h * (first / 2 + sum(rates[1:])) == pytest.approx(3.0, rel=1e-12)
+    assert rates[-1] == 0.0
+
+
 def test_a_constant_acceleration_changes_the_rate(wheels):
     for acceleration in (200.0, kl.TimeSeries([0.0, 1.0], [200.0, 200.0])):
         motion = Rotation("z", 10.0, acceleration)
