@@ -135,6 +135,7 @@ def motion_summary(
     """Return the figures of a motion at a time for a report; `critical` is the lowest critical rate."""
     assert e.terms is not None
     (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
+    critical = None if critical == np.inf else critical
     turns = isinstance(e.terms.motion, Rotation)
     noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
     force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))

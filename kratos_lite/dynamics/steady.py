@@ -17,6 +17,7 @@ from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
 from kratos_lite.native import described
 from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.solvers.direct import Factorisation
 from kratos_lite.statics import Phases, check_arguments, judge
 
 if TYPE_CHECKING:
@@ -45,12 +46,7 @@ def solve_steady(
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
-        few = len(e.system.reduced.free) <= DIRECT_MAX
-        method = "direct" if (solver != "amg" and (few or solver == "direct")) or not symmetric else "amg"
-        why = "one of few unknowns" if method == "direct" and symmetric else ""
-        why = why or (
-            "the matrix of a motion with damping is not symmetric" if not symmetric else "many unknowns"
-        )
+        method, why = _way(e, solver, symmetric)
         equations = solvers.Equations(A, e.system.reduced, e.system.points, method, why, symmetric=symmetric)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
@@ -61,15 +57,11 @@ def solve_steady(
         balance = equilibrium(model.mesh.points, nodal - inner, reactions)
         judge(solution, u, balance)
         critical = None
-        rate, terms = e.rates(0.0)[0], e.terms
-        if terms is not None and rate:
-            waves = critical_rate_estimate(terms)
+        if e.terms is not None and e.rates(0.0)[0]:
             if solution.method == "direct":
-                below, critical = critical_rates_beside(e, rate, equations.factors if symmetric else None)
-                if below or abs(rate) > waves:  # there may be more below, and the lowest counts
-                    critical = float(critical_rates(e, 1)[0])
-            limit = critical or waves
-            warnings += near_critical(terms.motion, 0.0, limit, critical is not None)
+                critical = _critical_rate(e, equations.factors if symmetric else None)
+            limit = critical_rate_estimate(e.terms) if critical is None else critical
+            warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=nodal.sum(axis=0),
@@ -91,3 +83,21 @@ def solve_steady(
     result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result, critical)
     return result
+
+
+def _way(e: EquationsOfMotion, solver: str, symmetric: bool) -> tuple[str, str]:
+    """Return how the equations are solved, and why so."""
+    if not symmetric:
+        return "direct", "the matrix of a motion with damping is not symmetric"
+    if solver != "amg" and (solver == "direct" or len(e.system.reduced.free) <= DIRECT_MAX):
+        return "direct", "one of few unknowns"
+    return "amg", "many unknowns"
+
+
+def _critical_rate(e: EquationsOfMotion, factors: Factorisation | None) -> float:
+    """Return the critical rate next above that of a motion, or the lowest if one lies below."""
+    assert e.terms is not None
+    rate = e.rates(0.0)[0]
+    below, above = critical_rates_beside(e, rate, factors)
+    far = abs(rate) > critical_rate_estimate(e.terms)  # where those below are too far away to be found
+    return float(critical_rates(e, 1)[0]) if below or far else above
