@@ -108,6 +108,7 @@ class Transient:
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
         self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
         self._untouched = True
+        self._imbalance_then: float | None = None  # of a moment that was put and has not gone on yet
         course = at_start(self.equations)
         if displacement is not None:
             self._check_supports(self.u, course[0], "the initial displacement")
@@ -180,8 +181,11 @@ class Transient:
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
         if isinstance(self.scheme, CentralDifference):
             self._check_stable(h)
+        self.equations.step = h
         if self._untouched and self.equations.model.supports.movements:
             self._start(*at_start(self.equations, h))
+        elif self._imbalance_then is not None:
+            self._settle()
         self._untouched = False
         return self._moments(h, steps, every, until)
 
@@ -215,7 +219,6 @@ class Transient:
 
     def _step(self, now: Course, h: float) -> Course:
         """Return displacement, velocity and acceleration a step later."""
-        self.equations.step = h
         if isinstance(self.scheme, CentralDifference):
             return explicit_step(self.equations, now, self.time, h)
         return implicit_step(self.equations, self.scheme, now, self.time, h)
@@ -279,11 +282,16 @@ class Transient:
             raise InputError(f"a moment has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
         self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the moment")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
-        self._untouched = not step
-        left, largest = self._imbalance(u, v, a, time)
-        other = abs(left - moment.imbalance) > OFF_BALANCE * largest  # another load, if it is known
+        self._untouched, self._imbalance_then = not step, moment.imbalance
+
+    def _settle(self) -> None:
+        """Balance the acceleration of a moment of another load, or of a scheme that does not balance it."""
+        left, largest = self._imbalance(self.u, self.v, self.a, self.time)
+        assert self._imbalance_then is not None
+        other = abs(left - self._imbalance_then) > OFF_BALANCE * largest
         if other or (is_trapezoidal(self.scheme) and left > OFF_BALANCE * largest):
-            self.a = self._balanced(prescribed_part(self.equations, a))
+            self.a = self._balanced(prescribed_part(self.equations, self.a))
+        self._imbalance_then = None
 
     def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> tuple[float, float]:
         """Return the largest free component of M a + C v + K u - f, and the largest of its terms, in N."""
