@@ -78,6 +78,15 @@ def flag(value: Any, what: str) -> bool:
     return bool(value)
 
 
+def function_or_none(value: Any, must: str) -> None:
+    """Raise InputError, which says what the value must be, for neither a function nor None.
+
+    >>> function_or_none(print, "progress must be a function")
+    """
+    if value is not None and not callable(value):
+        raise InputError(f"{must}; got {_short(value)}")
+
+
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."

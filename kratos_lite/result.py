@@ -16,6 +16,7 @@ from kratos_lite import fields, voigt
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.native import described
 
 Array = NDArray[np.float64]
 PLACES = ("gauss", "element", "node")
@@ -62,11 +63,11 @@ class Report:
     force_error: float | None
     moment_error: float | None
     seconds: dict[str, float]
-    peak_memory: int
+    peak_memory: int = field(default_factory=peak_memory)
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
-    kernels: str = ""
+    kernels: str = field(default_factory=described)
     motion: dict[str, Any] = field(default_factory=dict)
 
     def motion_rows(self) -> list[tuple[str, str]]:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import checks, solvers
+from kratos_lite.arguments import function_or_none
 from kratos_lite.assembly import Progress
 from kratos_lite.batches import Batch
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.fields import internal_load
 from kratos_lite.loads import Load, check_loads
 from kratos_lite.mesh import Mesh
-from kratos_lite.native import described
-from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.result import Report, Result
 from kratos_lite.supports import resolve
 from kratos_lite.system import System, among
 
@@ -68,8 +68,7 @@ def check_arguments(solver: str, tolerance: float, progress: Progress | None) ->
     """Raise InputError for arguments of a solution that are none."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
+    function_or_none(progress, "progress must be a function of a phase and a share")
     solvers.choose(solver, 0)
 
 
@@ -239,18 +238,11 @@ class StaticSystem:
             unknowns=3 * int(self._used.sum()) - self._fixed - len(self.links),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
-            solver=solution.method,
-            reason=solution.reason,
-            iterations=solution.iterations,
-            backward_error=solution.backward_error,
-            force_error=balance[0],
-            moment_error=balance[1],
+            **quality(solution, balance),
             seconds=case.phase.seconds,
-            peak_memory=peak_memory(),
             warnings=warnings,
             notes=list(self.model.notes),
             skipped=self._skipped(case.moving),
-            kernels=described(),
         )
 
     def _at_rest(self) -> Array:
@@ -286,6 +278,18 @@ class StaticSystem:
         if moving.any() and self.equations:
             said += self.equations.skipped
         return [*said, "load steps, as the law is linear", "mass", "strains and stresses until asked for"]
+
+
+def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:
+    """Return how a solution was found and how good it is, by the names of a `Report`."""
+    return {
+        "solver": solution.method,
+        "reason": solution.reason,
+        "iterations": solution.iterations,
+        "backward_error": solution.backward_error,
+        "force_error": balance[0],
+        "moment_error": balance[1],
+    }
 
 
 def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:

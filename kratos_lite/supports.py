@@ -178,13 +178,25 @@ class Reduction:
     c: Array
     T: csr_array[Any, Any] | None = None
 
+    def follow(self, q: NDArray[Any]) -> NDArray[Any]:
+        """Return T q, (N, ...): what the free ones q (q, ...) move, without what is prescribed."""
+        if self.T is not None:
+            return np.asarray(self.T @ q)
+        u = np.zeros((len(self.c), *q.shape[1:]), dtype=q.dtype)
+        u[self.free] = q
+        return u
+
     def expand(self, q: Array) -> Array:
         """Return all displacements (N,) of the free ones."""
-        if self.T is not None:
-            return np.asarray(self.T @ q + self.c)
-        u = self.c.copy()
-        u[self.free] += q
+        u = self.follow(q)
+        u += self.c
         return u
+
+    def restrict(self, A: Any) -> Any:
+        """Return T^T A T of a sparse matrix (N, N) as CSR."""
+        if self.T is not None:
+            return (self.T.T @ A @ self.T).tocsr()
+        return A if len(self.free) == A.shape[0] else A[self.free][:, self.free]
 
     def reduce(self, r: Array) -> Array:
         """Return T^T r."""

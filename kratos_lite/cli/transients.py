@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -34,7 +35,7 @@ def march_of(options: Namespace, given: March | None) -> March:
     march = given
     if options.march is not None:
         dt, steps, every = _steps(options.march)
-        march = given.with_changes(dt=dt, steps=steps, every=every) if given else March(dt, steps, every)
+        march = replace(given, dt=dt, steps=steps, every=every) if given else March(dt, steps, every)
     assert march is not None
     changes: dict[str, Any] = {}
     if options.scheme:
@@ -46,7 +47,7 @@ def march_of(options: Namespace, given: March | None) -> March:
         changes["lumped"] = True
     if options.restart:
         changes["restart"] = options.restart
-    return march.with_changes(**changes)
+    return replace(march, **changes)
 
 
 def _steps(text: str) -> tuple[float, int, int]:

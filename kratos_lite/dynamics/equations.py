@@ -51,6 +51,7 @@ class EquationsOfMotion:
 
     Attributes
     ----------
+    batches : the elements, on all nodes of the mesh.
     system : pattern, K and supports.
     mass : M.
     terms : the matrices of the motion, or None.
@@ -72,11 +73,11 @@ class EquationsOfMotion:
         steady: bool = False,
         progress: Progress | None = None,
     ) -> None:
-        self.model, self.progress, self._steady = model, progress, steady
+        self.model, self._steady = model, steady
         self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)
-        batches, part, self.warnings = model.checked(free=free)
-        for batch in batches:
+        self.batches, part, self.warnings = model.checked(free=free)
+        for batch in self.batches:
             if not batch.material.density > 0:
                 raise ModelError(
                     f"{type(batch.material).__name__} has density {batch.material.density:g}, but what moves "
@@ -85,14 +86,15 @@ class EquationsOfMotion:
         links = resolve(model.supports, part >= 0) if model.supports.links else {}
         self.system = System(
             model.mesh.points,
-            batches,
+            self.batches,
             model.supports,
             links,
             solver="direct",
             patterns=model.patterns,
             progress=progress,
         )
-        self.applied, self.prescribed = AppliedLoads(model, self.system), Prescribed(model, self.system)
+        self.applied = AppliedLoads(model, self.system, self.batches)
+        self.prescribed = Prescribed(model, self.system)
         placed = self.system.points, self.system.batches, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
@@ -221,13 +223,6 @@ class EquationsOfMotion:
             return None
         return dashpots(self.model.mesh, motion, self.system)
 
-    def matrix_of_mass(self) -> BlockMatrix:
-        """Return M alone, (3a, 3a)."""
-        K = self.K
-        M = BlockMatrix(np.zeros_like(K.data), K.indices, K.indptr)
-        add_scalar(M, self.mass_data)
-        return M
-
     def times_mass(self, v: Array) -> Array:
         """Return M v."""
         return self.mass.times(v)
@@ -268,8 +263,8 @@ class EquationsOfMotion:
         K = self.K
         A = BlockMatrix((k + c * self.rayleigh[1]) * K.data, K.indices, K.indptr)
         scalar = m * self.mass_data
-        for factor, terms in ((c, self.damping_terms(time)), (k, self.stiffness_terms(time))):
-            if terms is not None:
+        for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
+            if factor and (terms := made(time)) is not None:
                 scalar = scalar + factor * terms
         add_scalar(A, scalar)
         if c and self.dashpots is not None:

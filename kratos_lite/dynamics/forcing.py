@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 class AppliedLoads:
     """The nodal forces of the loads of a model at a time; what does not change is made once."""
 
-    def __init__(self, model: Model, system: System) -> None:
-        self.model, self.system = model, system
+    def __init__(self, model: Model, system: System, batches: list[Batch]) -> None:
+        self.model, self.system, self._batches = model, system, batches
 
     def __call__(self, time: float) -> Array:
         """Return the nodal forces (3a,) in N at a time in s."""
@@ -38,10 +38,6 @@ class AppliedLoads:
 
     def _of(self, load: Load) -> Array:
         return self.system.local(load.forces(self.model.mesh, self._batches))
-
-    @cached_property
-    def _batches(self) -> list[Batch]:
-        return self.model.batches()
 
     @cached_property
     def _constant(self) -> Array:

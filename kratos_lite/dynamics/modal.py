@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.arguments import whole_number
+from kratos_lite.blockmatrix import BlockMatrix
 from kratos_lite.dynamics.equations import EquationsOfMotion
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.modes import DENSE_MODES, modes
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.banded import add_scalar
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -26,7 +28,7 @@ Complexes = NDArray[np.complex128]
 def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array, Array]:
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
     equations = EquationsOfMotion(model, lumped=lumped)
-    K, M = (reduced(equations, A) for A in (equations.K, equations.matrix_of_mass()))
+    K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
     omega, shapes = modes(K, M, count)
     return omega, expanded(equations, shapes)
 
@@ -142,9 +144,6 @@ def _beside(K: Any, H: Any, square: float, factors: direct.Factorisation) -> Arr
 
 def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:
     """Return K and H, less what stiffens, on the free degrees of freedom."""
-    from kratos_lite.blockmatrix import BlockMatrix
-    from kratos_lite.solvers.banded import add_scalar
-
     assert e.terms is not None
     H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
     add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
@@ -158,22 +157,14 @@ def _dense(K: Any, H: Any) -> Array:
     return np.asarray(eigh(H.toarray(), K.toarray(), eigvals_only=True))
 
 
-def reduced(equations: EquationsOfMotion, A: Any) -> Any:
+def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:
     """Return T^T A T on the free degrees of freedom as CSR."""
-    matrix, supports = A.scipy().tocsr(), equations.system.reduced
-    if supports.T is not None:
-        return (supports.T.T @ matrix @ supports.T).tocsr()
-    return matrix[supports.free][:, supports.free]
+    return equations.system.reduced.restrict(A.scipy().tocsr())
 
 
 def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
     """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
-    system, supports = equations.system, equations.system.reduced
-    full = np.zeros((equations.size, shapes.shape[1]), dtype=shapes.dtype)
-    if supports.T is not None:
-        full = supports.T @ shapes
-    else:
-        full[supports.free] = shapes
-    out = np.zeros((shapes.shape[1], system.n_nodes, 3), dtype=shapes.dtype)
-    out[:, system.nodes] = full.T.reshape(shapes.shape[1], -1, 3)
+    system, count = equations.system, shapes.shape[1]
+    out = np.zeros((count, system.n_nodes, 3), dtype=shapes.dtype)
+    out[:, system.nodes] = system.reduced.follow(shapes).T.reshape(count, -1, 3)
     return out

@@ -21,15 +21,13 @@ Course = tuple[Array, Array, Array]
 def prescribed_part(e: EquationsOfMotion, x: Array) -> Array:
     """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
     reduced = e.system.reduced
-    return np.where(e.held, x, 0.0) if reduced.T is None else x - reduced.T @ x[reduced.free]
+    return np.asarray(x - reduced.follow(x[reduced.free]))
 
 
 def with_prescribed(e: EquationsOfMotion, x: Array, prescribed: Array) -> Array:
     """Return vectors (3a,) with the free components of x; the others follow from supports and constraints."""
     reduced = e.system.reduced
-    if reduced.T is None:
-        return np.where(e.held, prescribed, x)
-    return np.asarray(reduced.T @ x[reduced.free] + prescribed)
+    return np.asarray(reduced.follow(x[reduced.free]) + prescribed)
 
 
 def at_start(e: EquationsOfMotion, h: float = np.inf) -> Course:

@@ -14,8 +14,7 @@ from kratos_lite.dynamics.equations import EquationsOfMotion
 from kratos_lite.dynamics.moment import Moment
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
-from kratos_lite.native import described
-from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.result import Report, Result
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -169,13 +168,11 @@ def result_of(
         force_error=None,
         moment_error=None,
         seconds={},
-        peak_memory=peak_memory(),
         warnings=list(e.warnings),
         notes=list(model.notes),
-        kernels=described(),
     )
     u0 = model.initial_displacement
-    result = Result(model.mesh, model.batches(), at.u.copy(), at.reactions.copy(), loads, report, u0)
+    result = Result(model.mesh, e.batches, at.u.copy(), at.reactions.copy(), loads, report, u0)
     if e.terms is not None:
         report.motion = motion_summary(e, result, critical, at.time)
     return result

@@ -15,10 +15,9 @@ from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates, critical_rates_beside
 from kratos_lite.dynamics.outputs import motion_summary
 from kratos_lite.loads import check_loads
-from kratos_lite.native import described
-from kratos_lite.result import Report, Result, peak_memory
+from kratos_lite.result import Report, Result
 from kratos_lite.solvers.direct import Factorisation
-from kratos_lite.statics import Phases, check_arguments, judge
+from kratos_lite.statics import Phases, check_arguments, judge, quality
 
 if TYPE_CHECKING:
     from kratos_lite.model import Model
@@ -66,21 +65,14 @@ def solve_steady(
         unknowns=len(e.system.reduced.free),
         total_load=nodal.sum(axis=0),
         total_reaction=reactions.sum(axis=0),
-        solver=solution.method,
-        reason=solution.reason,
-        iterations=solution.iterations,
-        backward_error=solution.backward_error,
-        force_error=balance[0],
-        moment_error=balance[1],
+        **quality(solution, balance),
         seconds=phase.seconds,
-        peak_memory=peak_memory(),
         warnings=warnings,
         notes=[*model.notes, *changing],
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
-        kernels=described(),
     )
     u0 = model.initial_displacement
-    result = Result(model.mesh, model.batches(), e.system.whole(u), reactions, nodal, report, u0)
+    result = Result(model.mesh, e.batches, e.system.whole(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result, critical)
     return result
 

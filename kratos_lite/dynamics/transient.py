@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.guards import critical_rate_estimate, near_critical
-from kratos_lite.arguments import finite, flag, number, positive_step, whole_number
+from kratos_lite.arguments import finite, flag, function_or_none, number, positive_step, whole_number
 from kratos_lite.assembly import Progress
 from kratos_lite.dynamics.equations import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.dynamics.modal import critical_rates
@@ -85,8 +85,7 @@ class Transient:
         rayleigh: tuple[float, float] = (0.0, 0.0),
         progress: Progress | None = None,
     ) -> None:
-        if progress is not None and not callable(progress):
-            raise InputError(f"progress must be a function of a phase and a share; got {progress!r}")
+        function_or_none(progress, "progress must be a function of a phase and a share")
         self.scheme = newmark() if scheme is None else scheme
         if not isinstance(self.scheme, (Implicit, CentralDifference)):
             raise InputError(f"a scheme such as newmark() or CentralDifference() is needed; got {scheme!r}")
@@ -174,8 +173,7 @@ class Transient:
         SolveError
             The matrix of a step is singular, or the motion is no longer finite.
         """
-        if until is not None and not callable(until):
-            raise InputError(f"until must be a function of a moment; got {until!r}")
+        function_or_none(until, "until must be a function of a moment")
         h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
         if not same_state(self._state, model_state(self.equations.model)):
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
@@ -293,11 +291,20 @@ class Transient:
             self.a = self._balanced(prescribed_part(self.equations, self.a))
         self._imbalance_then = None
 
+    def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
+        """Return M a, C v, K u and -f, (3a,) in N."""
+        e = self.equations
+        return [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
+
+    def _left(self) -> Array:
+        """Return M a + C v + K u - f, (3a,) in N."""
+        return np.asarray(np.sum(self._terms(self.u, self.v, self.a, self.time), axis=0))
+
     def _imbalance(self, u: Array, v: Array, a: Array, time: float) -> tuple[float, float]:
         """Return the largest free component of M a + C v + K u - f, and the largest of its terms, in N."""
-        e = self.equations
-        terms = [e.times_mass(a), e.times_damping(v, time), e.times_stiffness(u, time), -e.load(time)]
-        noise = 1e-10 * float(np.abs(e.K.data).max() * np.abs(u).max(initial=0.0))  # rounding of K u comes in
+        terms = self._terms(u, v, a, time)
+        # rounding of K u comes in
+        noise = 1e-10 * float(np.abs(self.equations.K.data).max() * np.abs(u).max(initial=0.0))
         largest = max(noise, *(float(np.abs(term).max(initial=0.0)) for term in terms))
         return self._free_part(np.sum(terms, axis=0)), largest
 
@@ -321,13 +328,6 @@ class Transient:
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
         return self.equations.model.supports.carried(self.equations.system.whole(self._left()))
-
-    def _left(self) -> Array:
-        """Return M a + C v + K u - f, (3a,) in N."""
-        e = self.equations
-        left = e.times_mass(self.a) + e.times_damping(self.v, self.time)
-        left += e.times_stiffness(self.u, self.time) - e.load(self.time)
-        return left
 
     def energy(self, moment: Moment | None = None) -> float:
         """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import copy
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from kratos_lite.arguments import flag, positive_step, whole_number
 from kratos_lite.assembly import Progress
@@ -61,10 +61,6 @@ class March:
 
         scheme = newmark() if self.scheme is None else self.scheme
         return f"{self.steps} steps of {self.dt:g} s by {scheme.name}"
-
-    def with_changes(self, **changes: Any) -> March:
-        """Return the same march but for some attributes."""
-        return replace(self, **changes)
 
 
 @dataclass

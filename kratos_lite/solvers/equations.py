@@ -131,10 +131,7 @@ class Equations:
     @cached_property
     def _sparse(self) -> Any:
         """The reduced matrix as CSR."""
-        A, free, T = self.K.scipy().tocsr(), self.reduced.free, self.reduced.T
-        if T is not None:
-            return (T.T @ A @ T).tocsr()
-        return A if len(free) == A.shape[0] else A[free][:, free]
+        return self.reduced.restrict(self.K.scipy().tocsr())
 
     @cached_property
     def factors(self) -> direct.Factorisation:

@@ -24,7 +24,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     It is ``{"rotation": {"axis", "rate", "acceleration", "centre", "skew", "stiffening", "damping"}}`` or
     ``{"translation": {"direction", "rate", "acceleration", "ends", "damping"}}`` with the arguments of
     `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.  Given a
-    `time` in s, they stay what they are then.
+    `time` in s, such tables stay what they are then.
 
     Raises
     ------
@@ -40,20 +40,15 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     (kind,) = section.values
     inner = section.section(kind)
     try:
-        motion = read_motion(inner, kind)
-        if time is not None:
-            rate = motion.rate(time)
-            acceleration = motion.acceleration(time) if motion.is_accelerated else 0.0
-            motion.rate, motion.acceleration = (lambda _: rate), (lambda _: acceleration)
-        model.add(motion)
+        model.add(read_motion(inner, kind, time))
     except InputError:
         raise
     except KratosLiteError as error:
         raise section.error(kind, f"{inner.path}: {error}") from None
 
 
-def read_motion(section: Settings, kind: str) -> Motion:
-    """Return the motion of an object, of the kind ``rotation`` or ``translation``."""
+def read_motion(section: Settings, kind: str, time: float | None = None) -> Motion:
+    """Return the motion of an object, of the kind ``rotation`` or ``translation``; see `add_motion`."""
     section.check_keys(KEYS[kind])
     section.get("rate")
     given: dict[str, Any] = {}
@@ -67,7 +62,8 @@ def read_motion(section: Settings, kind: str) -> Motion:
         elif key == "ends":
             given[key] = section.text(key)
         else:
-            given[key] = section.number(key) if key == "damping" else number_or_series(section, key)
+            value = section.number(key) if key == "damping" else number_or_series(section, key)
+            given[key] = value(time) if isinstance(value, TimeSeries) and time is not None else value
     try:
         return Rotation(**given) if kind == "rotation" else Translation(**given)
     except InputError as error:
