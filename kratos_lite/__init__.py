@@ -12,6 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from kratos_lite import ale
+    from kratos_lite.analysis import (
+        CentralDifference,
+        Moment,
+        Transient,
+        bossak,
+        critical_rate,
+        generalized_alpha,
+        hht,
+        material_velocity,
+        newmark,
+        reaction_resultant,
+    )
+    from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.result import Result
     from kratos_lite.bodies import (
         BODIES,
         Body,
@@ -36,19 +50,6 @@ if TYPE_CHECKING:
         equilibrium,
         march,
     )
-    from kratos_lite.characteristics import Characteristics
-    from kratos_lite.dynamics import (
-        CentralDifference,
-        Moment,
-        Transient,
-        bossak,
-        critical_rate,
-        generalised_alpha,
-        hht,
-        material_velocity,
-        newmark,
-        reaction_resultant,
-    )
     from kratos_lite.elements import (
         ELEMENTS,
         KinematicLinear,
@@ -70,10 +71,12 @@ if TYPE_CHECKING:
         ModelError,
         SolveError,
     )
-    from kratos_lite.generate import annulus, box
     from kratos_lite.io.files import read, write
-    from kratos_lite.io.trajectory import Series, trajectory_picture
-    from kratos_lite.loads import (
+    from kratos_lite.io.writers.trajectory import Series, trajectory_picture
+    from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
+    from kratos_lite.mesh import Block, Mesh, Part
+    from kratos_lite.mesh.generators import annulus, box
+    from kratos_lite.model.loads import (
         BodyForce,
         Gravity,
         LineLoad,
@@ -84,10 +87,7 @@ if TYPE_CHECKING:
         Traction,
         Varying,
     )
-    from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
-    from kratos_lite.mesh import Block, Mesh, Part
-    from kratos_lite.model import Model
-    from kratos_lite.result import Result
+    from kratos_lite.model.mass_properties import MassProperties
     from kratos_lite.shapes import Shape
     from kratos_lite.view import element_picture, picture
 
@@ -99,9 +99,9 @@ _HOME = {
         "PseudoRigidBody RigidBody RigidLink SetAcceleration SetDisplacement SetVelocity Spring State "
         "TimeSeries Torque convert equilibrium march"
     ),
-    "kratos_lite.characteristics": "Characteristics",
-    "kratos_lite.dynamics": (
-        "CentralDifference Moment Transient bossak critical_rate generalised_alpha hht material_velocity "
+    "kratos_lite.model.mass_properties": "MassProperties",
+    "kratos_lite.analysis": (
+        "CentralDifference Moment Transient bossak critical_rate generalized_alpha hht material_velocity "
         "newmark reaction_resultant"
     ),
     "kratos_lite.elements": (
@@ -110,14 +110,16 @@ _HOME = {
         "KinematicLinear3D20N KinematicLinear3D27N"
     ),
     "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
-    "kratos_lite.generate": "annulus box",
+    "kratos_lite.mesh.generators": "annulus box",
     "kratos_lite.io.files": "read write",
-    "kratos_lite.io.trajectory": "Series trajectory_picture",
-    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Timed Traction Varying",
+    "kratos_lite.io.writers.trajectory": "Series trajectory_picture",
+    "kratos_lite.model.loads": (
+        "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Timed Traction Varying"
+    ),
     "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
     "kratos_lite.mesh": "Block Mesh Part",
-    "kratos_lite.model": "Model",
-    "kratos_lite.result": "Result",
+    "kratos_lite.analysis.model": "Model",
+    "kratos_lite.analysis.result": "Result",
     "kratos_lite.shapes": "Shape",
     "kratos_lite.view": "element_picture picture",
 }
@@ -131,7 +133,6 @@ __all__ = [
     "BodyForce",
     "Callback",
     "CentralDifference",
-    "Characteristics",
     "FiniteElementBody",
     "FixDirection",
     "FixPoint",
@@ -153,6 +154,7 @@ __all__ = [
     "KratosLiteError",
     "LineLoad",
     "LinearMaterial",
+    "MassProperties",
     "MaterialError",
     "Mesh",
     "MeshError",
@@ -192,7 +194,7 @@ __all__ = [
     "critical_rate",
     "element_picture",
     "equilibrium",
-    "generalised_alpha",
+    "generalized_alpha",
     "hht",
     "march",
     "material_velocity",

@@ -9,13 +9,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.project.case import Case, interval_of
 from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, find_file, is_number, read_settings, shown
-from kratos_lite.result import Result
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Check: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
 FIELDS = ("DISPLACEMENT", "REACTION")

@@ -12,14 +12,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.variables import LOADING, Variables
 from kratos_lite.io.project.case import Case
 from kratos_lite.io.project.processes import Action, notes_of, places_of, set_values
-from kratos_lite.loads import Load, Timed, Varying
-from kratos_lite.model import Model
+from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
 SURFACE = frozenset(name for name in LOADING - GRAVITY if not name.startswith("DISPLACEMENT"))
 HELD = ("VELOCITY", "ACCELERATION")

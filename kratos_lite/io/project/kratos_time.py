@@ -11,7 +11,7 @@ from kratos_lite.io.project.settings import Settings
 from kratos_lite.io.scene import March
 
 if TYPE_CHECKING:
-    from kratos_lite.dynamics.schemes import Implicit
+    from kratos_lite.analysis.schemes import Implicit
 
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
@@ -46,7 +46,7 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
 
 def _scheme(solver: Settings) -> Implicit:
     """Return the scheme that Kratos would take."""
-    from kratos_lite.dynamics import bossak, newmark
+    from kratos_lite.analysis import bossak, newmark
 
     method = solver.text("time_integration_method", "implicit")
     if method != "implicit":

@@ -22,8 +22,8 @@ from kratos_lite.io.project.case import Case, Interval, interval_of
 from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Value = float | str
 IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACCELERATION", "REACTION")
 """Vector variables that files set although a static solution of solids does not use them."""
@@ -268,9 +268,9 @@ def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], case: Case) 
 
 
 def places_of(mesh: Mesh) -> tuple[Array, Array]:
-    """Return where values are evaluated: nodes (n, 3) and centres of conditions (c, 3)."""
-    centres = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
-    return mesh.points, np.concatenate([np.zeros((0, 3)), *centres])
+    """Return where values are evaluated: nodes (n, 3) and centers of conditions (c, 3)."""
+    centers = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
+    return mesh.points, np.concatenate([np.zeros((0, 3)), *centers])
 
 
 def set_values(

@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.kratos.to_model import model_from
@@ -16,9 +17,8 @@ from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
-from kratos_lite.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model import Model
+from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
