@@ -114,6 +114,14 @@ def test_public_names_exist_and_are_documented():
         assert name.startswith("__") or thing.__doc__, name
 
 
+def test_dir_shows_the_public_names_and_nothing_else():
+    assert sorted(kratos_lite.__all__) == dir(kratos_lite)
+    lines = map(str.split, (PACKAGE / "__init__.pyi").read_text().splitlines())
+    listed = [(words[3], words[5]) for words in lines if words[:1] == ["from"]]
+    assert sorted(["__version__", *(name for name, _ in listed)]) == dir(kratos_lite)  # each once
+    assert all(name == alias for name, alias in listed)
+
+
 def test_unknown_public_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Modell'"):
         kratos_lite.Modell  # noqa: B018
