@@ -27,7 +27,7 @@ from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import Transient
+    from kratos_lite.analysis.transient import TransientAnalysis
 
 
 class Model:
@@ -310,20 +310,20 @@ class Model:
 
     # ---- in time -----------------------------------------------------------------------------------
 
-    def transient(self, **options: Any) -> Transient:
-        """Return the model ready to move in time; options as of `kratos_lite.Transient`.
+    def transient(self, **options: Any) -> TransientAnalysis:
+        """Return the model ready to move in time; options as of `kratos_lite.TransientAnalysis`.
 
         >>> import kratos_lite as kl
         >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
         >>> bar.fix("z-")
         >>> bar.add(kl.Gravity((0, 0, -9.81)))
-        >>> moments = list(bar.transient().march(dt=1e-3, steps=10, every=5))
-        >>> [round(moment.time, 6) for moment in moments]
+        >>> states = list(kl.integrate(bar.transient(), dt=1e-3, steps=10, every=5))
+        >>> [round(state.time, 6) for state in states]
         [0.005, 0.01]
         """
-        from kratos_lite.analysis import Transient
+        from kratos_lite.analysis.transient import TransientAnalysis
 
-        return Transient(self, **options)
+        return TransientAnalysis(self, **options)
 
     def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
         """Return natural frequencies (count,) in rad/s, ascending, and shapes (count, n, 3).

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -54,15 +54,17 @@ class Body(ABC):
     time, step : s, and number of steps taken.
     mesh, material : the shape and what it is made of, or None for a body given by its mass_properties.
     mass_properties : mass, volume, mass center, Euler and inertia tensor.
-    tolerance : relative size of the last Newton step of an implicit scheme.
+    tolerance : relative size of the last Newton step of an implicit integrator.
     damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
-    marched : u as the last march left it, None before; where it is another one, or constraints are new, a
-        march starts with an impulse that meets the constraints.
+    integrator : word of the time integrator, one of `integrators`.
+    last_velocity : u as the last step left it, None before; where it is another one, or constraints are new,
+        an integration starts with an impulse that meets the constraints.
     external_work : work of loads and reactions since the start, J.
     """
 
     kind: ClassVar[str]
-    schemes: ClassVar[tuple[str, ...]] = ()
+    integrators: ClassVar[Mapping[str, str]] = {}
+    """Words for the time integrators that the kind has, the default first, and their names in Solfec."""
     rows_are_constant: ClassVar[bool] = False
     dofs: int
 
@@ -78,7 +80,7 @@ class Body(ABC):
         mass_properties: MassProperties,
         q: Array,
         u: Array,
-        scheme: str | None,
+        integrator: str | None,
         damping: float = 0.0,
     ) -> None:
         self.mesh, self.material, self.mass_properties = mesh, material, mass_properties
@@ -89,16 +91,12 @@ class Body(ABC):
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
-        self.marched: Array | None = None
+        self.last_velocity: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
-        self.scheme = self.default_scheme() if scheme is None else scheme
+        self.integrator = next(iter(self.integrators), "") if integrator is None else integrator
         self.damping = damping
 
     # ---- what a kind defines ---------------------------------------------------------------------
-
-    @abstractmethod
-    def default_scheme(self) -> str:
-        """Return the scheme that is used if none is named."""
 
     @abstractmethod
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
@@ -234,16 +232,17 @@ class Body(ABC):
         return np.asarray(self.mass_properties.center)
 
     @property
-    def scheme(self) -> str:
-        """Name of the time integration scheme, one of `schemes`."""
-        return self._scheme
+    def integrator(self) -> str:
+        """Word of the time integrator, one of `integrators`; their names in Solfec are taken too."""
+        return self._integrator
 
-    @scheme.setter
-    def scheme(self, name: str) -> None:
-        if name not in self.schemes:
-            known = ", ".join(self.schemes) or "none"
-            raise InputError(f"the schemes of a {self.kind} body are {known}; got {name!r}")
-        self._scheme = name
+    @integrator.setter
+    def integrator(self, name: str) -> None:
+        words = [word for word, alias in self.integrators.items() if name in (word, alias or word)]
+        if not words:
+            known = ", ".join(self.integrators) or "none"
+            raise InputError(f"the integrators of a {self.kind} body are {known}; got {name!r}")
+        self._integrator = words[0]
 
     @property
     def damping(self) -> float:
@@ -259,7 +258,7 @@ class Body(ABC):
 
     @property
     def tolerance(self) -> float:
-        """Relative size of the last Newton step of an implicit scheme, 0 … 1; 0 stands for round-off."""
+        """Relative size of the last Newton step of an implicit integrator, 0 … 1; 0 stands for round-off."""
         return self._tolerance
 
     @tolerance.setter
@@ -307,7 +306,7 @@ class Body(ABC):
             )
         constraint.bind(self)
         self.constraints.append(constraint)
-        self.marched = None
+        self.last_velocity = None
 
     def external_load(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None
@@ -353,4 +352,4 @@ class Body(ABC):
 
     def __repr__(self) -> str:
         many = f"{len(self.q)} bodies, " if self.q.ndim > 1 else ""
-        return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.scheme})"
+        return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.integrator})"

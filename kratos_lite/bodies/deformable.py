@@ -18,17 +18,18 @@ Solve: TypeAlias = Callable[[Array], Array]
 class Deformable(Body):
     """A body whose configurations form a linear space: q + h u is one again.
 
-    ``DEF_EXP``: explicit, momenta exact, energy bounded, steps up to `critical_step`.
-    ``DEF_LIM``: linearly implicit; linear momentum exact, angular momentum to O(h⁴), not safe for a stiff
-    body that spins.  ``ENERGY_MOMENTUM``: implicit; energy and both momenta exact whatever the step.
+    Its integrators are ``"explicit"``: momenta exact, energy bounded, steps up to `critical_step`;
+    ``"linearly_implicit"``: linear momentum exact, angular momentum to O(h⁴), not safe for a stiff body that
+    spins; ``"energy_momentum"``: implicit, energy and both momenta exact whatever the step.  Solfec's
+    DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, name them too.
     """
 
     rows_are_constant = True
-    schemes: ClassVar[tuple[str, ...]] = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
-
-    def default_scheme(self) -> str:
-        """Return ``ENERGY_MOMENTUM``."""
-        return "ENERGY_MOMENTUM"
+    integrators: ClassVar[Mapping[str, str]] = {
+        "energy_momentum": "ENERGY_MOMENTUM",
+        "linearly_implicit": "DEF_LIM",
+        "explicit": "DEF_EXP",
+    }
 
     def doubts(self) -> list[str]:
         """Return materials whose waves are so slow or quick that their units may be wrong."""
@@ -45,7 +46,7 @@ class Deformable(Body):
         """Return an upper bound of the angular frequencies at the configuration, in rad/s."""
 
     def critical_step(self) -> float:
-        """Return the largest step in s with which ``DEF_EXP`` is stable: 2/ω, and less with damping.
+        """Return the longest stable step in s of the explicit integrator: 2/ω, and less with damping.
 
         The damping force is that of the old velocity, so that h²ω²/2 + h η ω² must not exceed 2.
         """

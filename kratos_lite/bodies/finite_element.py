@@ -43,7 +43,8 @@ class FiniteElementBody(Deformable):
         from one rotation of the body), ``BC-MODAL`` the same with the lowest modes only.
     modes : number of modes for ``BC-MODAL``.
     lumped : whether the mass stands in the nodes; the consistent mass is exact for rigid motions.
-    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``TL`` and ``DEF_LIM`` for the others if not given.
+    integrator : one of `Deformable.integrators`; ``"energy_momentum"`` for ``TL`` and ``"linearly_implicit"``
+        for the others if not given.
     damping : η in s.
 
     Raises
@@ -71,7 +72,7 @@ class FiniteElementBody(Deformable):
         form: str = "TL",
         modes: int | None = None,
         lumped: bool = False,
-        scheme: str | None = None,
+        integrator: str | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-16,
     ) -> None:
@@ -87,11 +88,13 @@ class FiniteElementBody(Deformable):
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
         self.form = self._form(form, modes)
-        self.schemes = self.form.schemes  # type: ignore[misc]
+        self.integrators = {  # type: ignore[misc]
+            word: alias for word, alias in self.integrators.items() if word not in self.form.without
+        }
         self._located: dict[bytes, Located] = {}
         self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
         super().__init__(
-            mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
+            mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), integrator, damping
         )
 
     def _form(self, name: str, count: int | None) -> Form:
@@ -101,10 +104,6 @@ class FiniteElementBody(Deformable):
         if kind is Modal:
             return Modal(self.points, self.groups, self._mass, 12 if count is None else count)
         return kind(self.points, self.groups, self._mass)
-
-    def default_scheme(self) -> str:
-        """Return the most robust scheme that the form has."""
-        return self.form.schemes[0]
 
     # ---- motion ----------------------------------------------------------------------------------
 

@@ -10,10 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.bodies import steps
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.linear_algebra import apply, transposed
-from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
 from kratos_lite.bodies.rotations import axial, check_rotation, hat
 from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.errors import InputError
@@ -22,7 +20,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
-from kratos_lite.voigt import tensor
+from kratos_lite.voigt import PAIRS, tensor
 
 
 class PseudoRigidBody(Deformable):
@@ -37,7 +35,7 @@ class PseudoRigidBody(Deformable):
     mesh : the shape; may be left out where mass_properties are given.
     material : one material (a body of several has no single C).
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
-    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
+    integrator : one of `Deformable.integrators`; ``"energy_momentum"`` if not given.
     damping : η in s.
 
     Raises
@@ -62,7 +60,7 @@ class PseudoRigidBody(Deformable):
         material: Material | None = None,
         *,
         mass_properties: MassProperties | None = None,
-        scheme: str | None = None,
+        integrator: str | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-12,
     ) -> None:
@@ -82,7 +80,7 @@ class PseudoRigidBody(Deformable):
         q[..., [0, 4, 8]] = 1.0
         q[..., 9:] = mass_properties.center
         self.C, self.tolerance = material.C, tolerance
-        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 12)), scheme, damping)
+        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 12)), integrator, damping)
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -193,16 +191,8 @@ class PseudoRigidBody(Deformable):
         """Return what solves M x = b; see `Body`."""
         return self.solver(self.q, 0.0)
 
-    def coast(self, h: float, count: int) -> None:
-        """Take steps of h s under constant loads alone, all at once."""
-        acceleration, spatial, _ = self.constant_loads()
-        constant = (*self.step_constants(), acceleration, spatial)
-        steps.pseudo_steps(
-            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
-        )
-
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
-        """Return Euler tensor, mass, volume, C and damping, as `steps` take them."""
+        """Return Euler tensor, mass, volume, C and damping, as integrators take them."""
         c = self.mass_properties
         return c.euler, c.mass, c.volume, self.C, self.damping
 
@@ -241,3 +231,23 @@ class PseudoRigidBody(Deformable):
 def gradient_of(q: Array) -> Array:
     """Return F (..., 3, 3) of pseudo-rigid configurations, or Ḟ of velocities, (..., 12)."""
     return q[..., :9].reshape(*q.shape[:-1], 3, 3)
+
+
+def strain_operator(F: Array) -> Array:
+    """Return B (..., 6, 9) of F (..., 9): B X is the strain sym(F^T X), with engineering shear."""
+    B = np.zeros((*F.shape[:-1], 6, 3, 3))
+    columns = F.reshape(*F.shape[:-1], 3, 3)
+    for a, (i, j) in enumerate(PAIRS):
+        B[..., a, :, j] = columns[..., :, i]
+        B[..., a, :, i] = columns[..., :, j]
+    return B.reshape(*F.shape[:-1], 6, 9)
+
+
+def green_strain(F: Array) -> Array:
+    """Return the strain (F^T F - 1)/2 (..., 6) of F (..., 9)."""
+    return np.asarray((apply(strain_operator(F), F) - np.array([1.0, 1, 1, 0, 0, 0])) / 2)
+
+
+def by_rows(A: Array) -> Array:
+    """Return the matrix (..., 9, 9) that applies A (..., 3, 3) to each row of a matrix (9)."""
+    return np.asarray(np.einsum("ik,...jl->...ijkl", np.eye(3), A).reshape(*A.shape[:-2], 9, 9))

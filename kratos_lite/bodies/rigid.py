@@ -5,17 +5,15 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.rigid_step import rotation
-from kratos_lite.bodies.rotations import axial, check_rotation, hat
+from kratos_lite.bodies.rotations import axial, check_rotation, hat, rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
@@ -37,8 +35,9 @@ class RigidBody(Body):
     material : its density counts.
     mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
         many bodies at once.
-    scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
-        ``RIG_IMP`` (momentum exact, symmetric in time).
+    integrator : ``"momentum_conserving"`` (explicit, spatial angular momentum exact, energy decays; if not
+        given), ``"explicit"`` (energy grows) or ``"implicit"`` (momentum exact, symmetric in time); Solfec's
+        RIG_NEG, RIG_POS and RIG_IMP name them too.
 
     Raises
     ------
@@ -56,7 +55,11 @@ class RigidBody(Body):
 
     kind = "rigid"
     dofs = 6
-    schemes: ClassVar[tuple[str, ...]] = ("RIG_NEG", "RIG_POS", "RIG_IMP")
+    integrators: ClassVar[Mapping[str, str]] = {
+        "momentum_conserving": "RIG_NEG",
+        "explicit": "RIG_POS",
+        "implicit": "RIG_IMP",
+    }
 
     def __init__(
         self,
@@ -64,7 +67,7 @@ class RigidBody(Body):
         material: Material | None = None,
         *,
         mass_properties: MassProperties | None = None,
-        scheme: str | None = None,
+        integrator: str | None = None,
         tolerance: float = 1e-14,
     ) -> None:
         if mass_properties is None:
@@ -76,11 +79,7 @@ class RigidBody(Body):
         q[..., [0, 4, 8]] = 1.0
         q[..., 9:] = mass_properties.center
         self.tolerance = tolerance
-        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 6)), scheme)
-
-    def default_scheme(self) -> str:
-        """Return ``RIG_NEG``."""
-        return "RIG_NEG"
+        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 6)), integrator)
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -158,15 +157,8 @@ class RigidBody(Body):
         spin = (self.mass_properties.inertia @ v[..., :3, None])[..., 0]
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
-    def coast(self, h: float, count: int) -> None:
-        """Take steps of h s under constant loads alone, all at once."""
-        constant = (*self.step_constants(), *self.constant_loads())
-        steps.rigid_steps(
-            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
-        )
-
     def step_constants(self) -> tuple[Array, Array, Array]:
-        """Return inertia, its inverse and mass, as `steps` take them."""
+        """Return inertia, its inverse and mass, as integrators take them."""
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Callable[[Array], Array]:
@@ -211,13 +203,13 @@ class Obstacle(RigidBody):
     >>> import kratos_lite as kl
     >>> floor = Obstacle(kl.box((10.0, 10.0, 0.1)))
     >>> floor.set_velocity(linear=(0.5, 0, 0))
-    >>> for state in kl.march(floor, dt=0.1, steps=20):
-    ...     pass
+    >>> *_, end = kl.integrate(floor, dt=0.1, steps=20)
     >>> floor.mass_center().round(12).tolist()
     [6.0, 5.0, 0.05]
     """
 
     kind = "obstacle"
+    integrators: ClassVar[Mapping[str, str]] = {"uniform": ""}
 
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
         from kratos_lite.materials import Isotropic3D
@@ -231,11 +223,6 @@ class Obstacle(RigidBody):
     def mass(self) -> Array:
         """Return 0: an obstacle carries no mass."""
         return np.zeros_like(self.mass_properties.mass)
-
-    def coast(self, h: float, count: int) -> None:
-        """Move on with the velocity as it is; see `RigidBody.coast`."""
-        for _ in range(count):
-            self.q[...] = steps.rigid_half(self.q, self.u, 2 * h)
 
     def times_mass(self, v: Array) -> Array:
         """Return zeros."""

@@ -45,10 +45,10 @@ def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Sc
 
 
 def write(path: str | Path, thing: Any) -> list[str]:
-    """Write a result, a model or a mesh by the ending of `path`.
+    """Write a result, a state, a model or a mesh by the ending of `path`.
 
-    A result goes to .vtu, .vtk or .json; a model or a mesh to .mdpa, an .elem set,
-    .vtu or a format of meshio.
+    A result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or a mesh
+    to .mdpa, an .elem set, .vtu or a format of meshio.
 
     Returns
     -------
@@ -57,11 +57,18 @@ def write(path: str | Path, thing: Any) -> list[str]:
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.state import State
     from kratos_lite.io.document import Document
+    from kratos_lite.io.writers.state import write_state
     from kratos_lite.mesh import Mesh
 
     if isinstance(thing, Result):
         thing.save(path)
+        return []
+    if isinstance(thing, State):
+        if ending(path) != ".npz":
+            raise InputError(f"{path}: a state is written as .npz")
+        write_state(path, thing)
         return []
     if isinstance(thing, Model):
         from kratos_lite.io.kratos.to_document import document_from
@@ -70,7 +77,7 @@ def write(path: str | Path, thing: Any) -> list[str]:
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
         return write_document(path, Document(_with_named_sides(thing)) if isinstance(thing, Mesh) else thing)
-    raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
+    raise InputError(f"a Result, State, Model or Mesh can be written; got {type(thing).__name__}")
 
 
 def _with_named_sides(mesh: Mesh) -> Mesh:

@@ -50,7 +50,8 @@ class Form(ABC):
     """
 
     name: ClassVar[str]
-    schemes: ClassVar[tuple[str, ...]]
+    without: ClassVar[tuple[str, ...]] = ()
+    """Integrators of deformable bodies that it does not have."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -126,11 +127,11 @@ class Form(ABC):
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+        raise ModelError(f"the form {self.name} has no energy–momentum integrator; use form='TL'")
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+        raise ModelError(f"the form {self.name} has no energy–momentum integrator; use form='TL'")
 
     def highest_frequency(self, q: Array) -> float:
         """Return an upper bound of the angular frequencies in rad/s."""

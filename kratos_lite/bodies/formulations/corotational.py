@@ -25,7 +25,7 @@ class Corotational(Form):
     """
 
     name = "BC"
-    schemes = ("DEF_LIM", "DEF_EXP")
+    without = ("energy_momentum",)
 
     def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:
         super().__init__(points, groups, mass)

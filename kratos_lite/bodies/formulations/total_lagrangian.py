@@ -13,7 +13,6 @@ class TotalLagrangian(Form):
     """Green's strain and Saint Venant–Kirchhoff's law at every Gauss point."""
 
     name = "TL"
-    schemes = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
 
     def load(self, q: Array) -> Array:
         """Return Σ F S grad N dV, (3n,) in N."""

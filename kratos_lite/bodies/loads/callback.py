@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound
 from kratos_lite.bodies.rigid import RigidBody
-from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.bodies.rotations import rotation
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite

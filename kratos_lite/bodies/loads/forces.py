@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, upright
 from kratos_lite.bodies.rigid import RigidBody
-from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.bodies.rotations import rotation
 from kratos_lite.bodies.validation import fitting, one_point, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
@@ -114,7 +114,7 @@ class Spring(BodyLoad):
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
-                raise ModelError("a spring acts on single bodies; march them one by one")
+                raise ModelError("a spring acts on single bodies; integrate them one by one")
             y = body.position(X, q) - anchor
             distance = float(np.linalg.norm(y))
             direction = y / distance if distance > 0 else np.zeros(3)
