@@ -36,18 +36,18 @@ if TYPE_CHECKING:
         FollowerPressure,
         Force,
         Obstacle,
+        PrescribedAcceleration,
+        PrescribedDisplacement,
+        PrescribedVelocity,
         PseudoRigidBody,
         RigidBody,
         RigidLink,
-        SetAcceleration,
-        SetDisplacement,
-        SetVelocity,
         Spring,
         State,
         TimeSeries,
         Torque,
         convert,
-        equilibrium,
+        find_equilibrium,
         march,
     )
     from kratos_lite.elements import (
@@ -96,8 +96,8 @@ __version__ = "0.1.0"
 _HOME = {
     "kratos_lite.bodies": (
         "BODIES Body Callback FiniteElementBody FixDirection FixPoint FollowerPressure Force Obstacle "
-        "PseudoRigidBody RigidBody RigidLink SetAcceleration SetDisplacement SetVelocity Spring State "
-        "TimeSeries Torque convert equilibrium march"
+        "PseudoRigidBody RigidBody RigidLink PrescribedAcceleration PrescribedDisplacement PrescribedVelocity Spring "
+        "State TimeSeries Torque convert find_equilibrium march"
     ),
     "kratos_lite.model.mass_properties": "MassProperties",
     "kratos_lite.analysis": (
@@ -166,15 +166,15 @@ __all__ = [
     "Orthotropic3D",
     "Part",
     "PointLoad",
+    "PrescribedAcceleration",
+    "PrescribedDisplacement",
+    "PrescribedVelocity",
     "Pressure",
     "PseudoRigidBody",
     "Result",
     "RigidBody",
     "RigidLink",
     "Series",
-    "SetAcceleration",
-    "SetDisplacement",
-    "SetVelocity",
     "Shape",
     "SolveError",
     "Spring",
@@ -193,7 +193,7 @@ __all__ = [
     "convert",
     "critical_rate",
     "element_picture",
-    "equilibrium",
+    "find_equilibrium",
     "generalized_alpha",
     "hht",
     "march",
