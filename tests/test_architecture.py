@@ -114,9 +114,31 @@ def test_public_names_exist_and_are_documented():
         assert name.startswith("__") or thing.__doc__, name
 
 
+def test_dir_shows_the_public_names_and_nothing_else():
+    assert sorted(kratos_lite.__all__) == dir(kratos_lite)
+    lines = map(str.split, (PACKAGE / "__init__.pyi").read_text().splitlines())
+    listed = [(words[3], words[5]) for words in lines if words[:1] == ["from"]]
+    assert sorted(["__version__", *(name for name, _ in listed)]) == dir(kratos_lite)  # each once
+    assert all(name == alias for name, alias in listed)
+
+
 def test_unknown_public_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Modell'"):
         kratos_lite.Modell  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["elements", "materials"])
+def test_a_link_at_the_root_shows_its_package_and_tools_read_it_once(name):
+    link = PACKAGE.parent / name
+    if not link.is_symlink():
+        pytest.skip("not a checkout: links are not packed")
+    assert link.readlink() == Path("kratos_lite", name)
+    pytest.importorskip("ruff")
+    words = [sys.executable, "-m", "ruff", "check", "--show-files", PACKAGE.parent]
+    seen = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    assert str(PACKAGE / name / "__init__.py") in seen
+    assert str(link / "__init__.py") not in seen
+    assert f"prune {name}" in (PACKAGE.parent / "MANIFEST.in").read_text().splitlines()
 
 
 @pytest.mark.parametrize(

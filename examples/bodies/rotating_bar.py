@@ -3,7 +3,8 @@
 #
 # A bar of 0.1 × 0.1 × 1 m turns about its middle with 1 rad/s and stretches.  The total Lagrangian
 # formulation finds the strains anew everywhere in every step; the co-rotational one sees small strains
-# from one rotation of the whole body, so its matrix is factored once.  Their largest elongations agree to 0.1 %.
+# from one rotation of the whole body, so its matrix is factorized once.  Their largest
+# elongations agree to 0.1 %.
 
 # %%
 import sys

@@ -7,8 +7,8 @@ from typing import Any
 from kratos_lite.ale import Motion, Rotation, Translation
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.time_series import TimeSeries
 
 COMMON = ("rate", "acceleration", "damping")

@@ -10,12 +10,11 @@ from typing import Any
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
-from kratos_lite.io.project.kratos_time import DYNAMIC
 from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
@@ -52,7 +51,7 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     """
     settings, folder = read_settings(path), Path(path).parent
     if "solver_settings" in settings or "problem_data" in settings:
-        from kratos_lite.io.project.kratos import read_kratos_project
+        from kratos_lite.io.kratos.run_file import read_kratos_project
 
         return read_kratos_project(settings, folder, allow_outside)
     if "properties" in settings and "model" not in settings:
@@ -62,6 +61,8 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
 
 def is_in_time(path: str | Path) -> bool:
     """Return whether a run file asks for a march, without reading what it names."""
+    from kratos_lite.io.kratos.time_integration import DYNAMIC
+
     values = read_settings(path).values
     if "solver_settings" not in values and "problem_data" not in values:
         return "time" in values

@@ -14,11 +14,11 @@ from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.project.run_file import read_material
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scenes.actions import add_constraint, add_load
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
 from kratos_lite.io.scenes.values import Read, matrix, number, placed, vector

@@ -9,8 +9,8 @@ import numpy as np
 
 from kratos_lite.bodies import TimeSeries
 from kratos_lite.errors import KratosLiteError
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings, is_number, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 

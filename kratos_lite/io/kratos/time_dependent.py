@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
+from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
-from kratos_lite.io.project.case import Case
-from kratos_lite.io.project.processes import Action, notes_of, places_of, set_values
 from kratos_lite.model.loads import Load, Timed, Varying
 from kratos_lite.typing import Array
 
@@ -32,19 +32,19 @@ class ProcessesInTime:
     Parameters
     ----------
     actions : what the processes do.
-    case : mesh and times.
+    context : mesh and times.
 
     Attributes
     ----------
     displacement, velocity : (n, 3) at the start, or None at rest; known after `prepare`.
     """
 
-    def __init__(self, actions: Sequence[Action], case: Case) -> None:
-        self.case = case
-        self.steps = [action.active(case.times) for action in actions]
-        self.notes = notes_of(actions, self.steps, case)
+    def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
+        self.context = context
+        self.steps = [action.active(context.times) for action in actions]
+        self.notes = notes_of(actions, self.steps, context)
         self.actions = [a for a, steps in zip(actions, self.steps, strict=True) if steps and len(a.rows)]
-        self.steps = [a.active(case.times) for a in self.actions]
+        self.steps = [a.active(context.times) for a in self.actions]
         self.displacement: Array | None = None
         self.velocity: Array | None = None
         self._later: list[Load] = []
@@ -60,7 +60,7 @@ class ProcessesInTime:
         """
         self._check(values)
         self._begin(values)
-        base, times = values.copy(), self.case.times
+        base, times = values.copy(), self.context.times
         set_values(self.actions, self.steps, times, values)
         for action in self.actions:
             if action.fixed:
@@ -93,7 +93,7 @@ class ProcessesInTime:
 
     def at(self, i: int, time: float) -> float | None:
         """Return the last time, up to the one given, at which an action acts; None if there is none."""
-        action, times = self.actions[i], self.case.times
+        action, times = self.actions[i], self.context.times
         if float(time) in action.interval:
             return float(time)
         step = bisect_right(times, time) - 1
@@ -125,7 +125,7 @@ class ProcessesInTime:
         start, points = values.copy(), values.mesh.points
         for action, steps in zip(self.actions, self.steps, strict=True):
             if steps[0] == 0 and action.factors:
-                value = action.value(points[action.rows], self.case.times[0])
+                value = action.value(points[action.rows], self.context.times[0])
                 start.set_nodes(action.component, action.rows, value)
                 if action.component.startswith("ACCELERATION") and np.any(value):
                     raise action.settings.error(
@@ -171,7 +171,7 @@ class ProcessesInTime:
         return len(self.steps[i]) - (self.steps[i][0] == 0)
 
     def _acts_always(self, i: int) -> bool:
-        return self._acts(i) == len(self.case.times) - 1
+        return self._acts(i) == len(self.context.times) - 1
 
     def _is_steady(self, i: int) -> bool:
         """Whether an action does the same in all steps."""

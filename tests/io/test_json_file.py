@@ -7,7 +7,7 @@ import string
 import pytest
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.project.strict_json import Object, parse_json, read_json
+from kratos_lite.io.json_file import Object, parse_json, read_json
 
 
 @pytest.mark.parametrize(

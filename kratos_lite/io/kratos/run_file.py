@@ -10,15 +10,15 @@ from pathlib import Path
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Document
 from kratos_lite.io.documents import read_document
+from kratos_lite.io.kratos.context import RunContext, module_of, times_of
+from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
+from kratos_lite.io.kratos.materials import materials_of
+from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
+from kratos_lite.io.kratos.time_dependent import ProcessesInTime
+from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
 from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.case import Case, module_of, times_of
-from kratos_lite.io.project.checks import CHECKS, Check
-from kratos_lite.io.project.in_time import ProcessesInTime
-from kratos_lite.io.project.kratos_time import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
-from kratos_lite.io.project.materials import materials_of
-from kratos_lite.io.project.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.project.settings import Settings, find_file, read_settings
 from kratos_lite.io.scene import Scene
 from kratos_lite.materials import LinearMaterial
@@ -67,14 +67,14 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
         )
     document = _read_mesh(solver, folder, allow_outside, notes)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
-    case = Case(document.mesh, root, folder, times, moved, allow_outside)
-    materials = _read_materials(solver, case, document, notes)
-    actions, checks = _read_processes(settings, case, notes)
-    in_time = ProcessesInTime(actions, case) if dynamic else None
+    context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
+    materials = _read_materials(solver, context, document, notes)
+    actions, checks = _read_processes(settings, context, notes)
+    in_time = ProcessesInTime(actions, context) if dynamic else None
 
     def process(values: Variables) -> None:
         if in_time is None:
-            notes.extend(run(actions, case, values))
+            notes.extend(run(actions, context, values))
         else:
             in_time.prepare(values)
 
@@ -152,21 +152,23 @@ def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) 
 
 
 def _read_materials(
-    solver: Settings, case: Case, document: Document, notes: list[str]
+    solver: Settings, context: RunContext, document: Document, notes: list[str]
 ) -> dict[int, LinearMaterial] | None:
     """Return the materials of the materials file, or None if there is none."""
     source = solver.section("material_import_settings")
     if not source.text("materials_filename", ""):
         return None
-    path, note = find_file(source, "materials_filename", case.folder, outside=case.outside)
+    path, note = find_file(source, "materials_filename", context.folder, outside=context.outside)
     notes += [note] if note else []
-    return materials_of(read_settings(path), case, document, notes)
+    return materials_of(read_settings(path), context, document, notes)
 
 
-def _read_processes(settings: Settings, case: Case, notes: list[str]) -> tuple[list[Action], list[Check]]:
+def _read_processes(
+    settings: Settings, context: RunContext, notes: list[str]
+) -> tuple[list[Action], list[Comparison]]:
     """Return what the processes do and check; all that are unknown are reported together."""
     actions: list[Action] = []
-    checks: list[Check] = []
+    checks: list[Comparison] = []
     problems = Problems(settings.source)
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
@@ -174,16 +176,16 @@ def _read_processes(settings: Settings, case: Case, notes: list[str]) -> tuple[l
             for entry in section.sections(key):
                 module = module_of(entry)
                 if module in PROCESSES:
-                    actions += actions_of(entry, module, case)
-                elif module in CHECKS:
-                    checks += CHECKS[module](entry.section("Parameters", required=True), case)
+                    actions += actions_of(entry, module, context)
+                elif module in COMPARISONS:
+                    checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
                 elif module.endswith("_output_process") or module in OUTPUTS:
                     notes.append(
                         f"{entry.path}: {module} is not run; ask kratos_lite for files with --output"
                     )
                 else:
                     place = entry.values.places.get("python_module") or entry.values.places["name"]
-                    known = [*PROCESSES, *CHECKS]
+                    known = [*PROCESSES, *COMPARISONS]
                     problems.add(
                         f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}",
                         *place,

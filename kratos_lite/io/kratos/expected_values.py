@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
-from kratos_lite.io.project.case import Case, interval_of
-from kratos_lite.io.project.expressions import evaluate
+from kratos_lite.io.kratos.context import RunContext, interval_of
+from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.typing import Array
 
-Check: TypeAlias = Callable[[Result], str]
+Comparison: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
 FIELDS = ("DISPLACEMENT", "REACTION")
 NODE_KEYS = (
@@ -31,7 +31,7 @@ FILE_KEYS = (
 
 
 @dataclass(frozen=True, eq=False)
-class NodeCheck:
+class NodeComparison:
     """Compares a component on nodes with the values that `expected` gives.
 
     Attributes
@@ -69,11 +69,11 @@ class NodeCheck:
         )
 
 
-def _idle(line: str) -> Check:
+def _idle(line: str) -> Comparison:
     return lambda result: line
 
 
-def node_checks(settings: Settings, case: Case) -> Iterator[Check]:
+def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Comparison]:
     """Yield the checks of check_scalar_to_nodes_process or of its kin for vectors.
 
     Values agree when their difference, rounded to `tolerance_rank` decimals, is zero.
@@ -82,13 +82,13 @@ def node_checks(settings: Settings, case: Case) -> Iterator[Check]:
     if settings.section("local_axes").values:
         raise settings.error("local_axes", "local_axes are not supported; give the values along x, y, z")
     name, part = settings.text("variable_name"), settings.text("model_part_name")
-    rows, value, time = case.part(settings).nodes, settings.get("value", 0.0), case.times[-1]
+    rows, value, time = context.part(settings).nodes, settings.get("value", 0.0), context.times[-1]
     is_list = isinstance(value, list)
     pairs = zip(("_X", "_Y", "_Z"), value, strict=False) if is_list else [("", value)]
     rank, span = settings.integer("tolerance_rank", 3), interval_of(settings)
     if abs(rank) > 30:
         raise settings.error("tolerance_rank", f"tolerance_rank is a count of decimals; got {rank}")
-    deformed = case.moved and not settings.flag("reference_conf", False)
+    deformed = context.moved and not settings.flag("reference_conf", False)
     for suffix, one in pairs:
         what = f"{name}{suffix} on {part}"
         if one is None:
@@ -98,7 +98,7 @@ def node_checks(settings: Settings, case: Case) -> Iterator[Check]:
         if not span.begin <= time < span.end:
             yield _idle(f"check {what} not evaluated: time {time:g} s is outside its interval")
             continue
-        yield NodeCheck(what, name + suffix, rows, Analytic(one, rows, rank, time, deformed))
+        yield NodeComparison(what, name + suffix, rows, Analytic(one, rows, rank, time, deformed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ class Analytic:
         return np.broadcast_to(value, x.shape), np.full(x.shape, 0.5 * 10.0**-self.rank)
 
 
-def file_checks(settings: Settings, case: Case) -> Iterator[Check]:
+def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Comparison]:
     """Yield the checks of from_json_check_result_process: nodal values of a reference file.
 
     Values agree within the larger of `tolerance` and `relative_tolerance` × the expected value.
@@ -130,19 +130,19 @@ def file_checks(settings: Settings, case: Case) -> Iterator[Check]:
     settings.check_keys(FILE_KEYS)
     what = f"against {settings.text('input_file_name')}"
     try:
-        path, _ = find_file(settings, "input_file_name", case.folder, outside=case.outside)
+        path, _ = find_file(settings, "input_file_name", context.folder, outside=context.outside)
     except InputError as error:
         yield _idle(f"check {what} not evaluated: {error}")
         return
-    part = case.part(settings)
+    part = context.part(settings)
     if settings.text("sub_model_part_name", ""):
-        part = case.part(settings, "sub_model_part_name")
+        part = context.part(settings, "sub_model_part_name")
     data = read_settings(path)
     tolerances = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
     for variable in settings.texts("check_variables"):
         for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in FIELDS else [variable]:
-            tabled = Tabled(data, component, part.nodes, case.times[-1], tolerances)
-            yield NodeCheck(f"{component} {what}", component, part.nodes, tabled)
+            tabled = Tabled(data, component, part.nodes, context.times[-1], tolerances)
+            yield NodeComparison(f"{component} {what}", component, part.nodes, tabled)
     for variable in settings.texts("gauss_points_check_variables"):
         yield _idle(f"check {variable} {what} not evaluated: values at Gauss points are not compared")
 
@@ -170,10 +170,10 @@ class Tabled:
         return expected, np.maximum(self.tolerances[0], self.tolerances[1] * np.abs(expected))
 
 
-CHECKS: dict[str, Callable[[Settings, Case], Iterator[Check]]] = {
-    "check_scalar_to_nodes_process": node_checks,
-    "check_vector_components_to_nodes_process": node_checks,
-    "check_vector_to_nodes_process": node_checks,
-    "from_json_check_result_process": file_checks,
+COMPARISONS: dict[str, Callable[[Settings, RunContext], Iterator[Comparison]]] = {
+    "check_scalar_to_nodes_process": node_comparisons,
+    "check_vector_components_to_nodes_process": node_comparisons,
+    "check_vector_to_nodes_process": node_comparisons,
+    "from_json_check_result_process": file_comparisons,
 }
 """Processes that compare a result with expected values, by Kratos' module name."""

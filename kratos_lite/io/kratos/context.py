@@ -1,4 +1,4 @@
-"""Case: what the entries of a Kratos run file refer to - the mesh, its parts, and time."""
+"""RunContext: what the entries of a Kratos run file refer to - the mesh, its parts, and time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def interval_of(settings: Settings) -> Interval:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class RunContext:
     """The mesh and the time steps that processes and checks refer to.
 
     Attributes

@@ -8,15 +8,15 @@ import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
-from kratos_lite.io.project.case import Case
 from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import with_rows
 
 
 def materials_of(
-    settings: Settings, case: Case, document: Document, notes: list[str]
+    settings: Settings, context: RunContext, document: Document, notes: list[str]
 ) -> dict[int, LinearMaterial]:
     """Return the materials by properties id, and put the properties into the document.
 
@@ -35,24 +35,24 @@ def materials_of(
     for entry in settings.sections("properties"):
         entry.check_keys(("model_part_name", "properties_id", "Material"))
         number = entry.integer("properties_id")
-        _assign(entry, case, document, number)
+        _assign(entry, context, document, number)
         found[number] = _material(entry, document.properties[number], notes)
     return _used(found, document)
 
 
-def _assign(entry: Settings, case: Case, document: Document, number: int) -> None:
+def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
     """Give the elements of the part their properties id."""
-    rows = case.part(entry).elements
+    rows = context.part(entry).elements
     if not len(rows):
-        have = [name for name, part in case.mesh.parts.items() if len(part.elements)]
+        have = [name for name, part in context.mesh.parts.items() if len(part.elements)]
         raise entry.error(
             "model_part_name",
             f"part {entry.text('model_part_name')!r} has no elements to carry a material; "
-            f"parts with elements are {', '.join([case.root + ' (all)', *have])}",
+            f"parts with elements are {', '.join([context.root + ' (all)', *have])}",
         )
-    mask = np.zeros(case.mesh.n_elements, dtype=bool)
+    mask = np.zeros(context.mesh.n_elements, dtype=bool)
     mask[rows] = True
-    for block, at in with_rows(case.mesh.blocks):
+    for block, at in with_rows(context.mesh.blocks):
         block.properties = np.where(mask[at], number, block.properties)
     document.properties.setdefault(number, Properties(number))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.project.case import times_of
-from kratos_lite.io.project.in_time import ProcessesInTime
+from kratos_lite.io.kratos.context import times_of
+from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.project.settings import Settings
 from kratos_lite.io.scene import March
 

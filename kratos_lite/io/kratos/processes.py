@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
+from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
-from kratos_lite.io.project.case import Case, Interval, interval_of
-from kratos_lite.io.project.expressions import evaluate
 from kratos_lite.io.project.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
@@ -88,7 +88,7 @@ class Action:
         except ValueError as error:
             key = "value" if "value" in self.settings else "modulus"
             raise self.settings.error(key, f"{self.component}: {error}") from None
-        return product  # type: ignore[no-any-return]
+        return product
 
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""
@@ -132,16 +132,16 @@ def _constrained(settings: Settings) -> list[bool]:
     return flags
 
 
-def _rows(settings: Settings, case: Case, on_conditions: bool) -> NDArray[np.int64]:
-    part = case.part(settings)
+def _rows(settings: Settings, context: RunContext, on_conditions: bool) -> NDArray[np.int64]:
+    part = context.part(settings)
     return part.conditions if on_conditions else part.nodes
 
 
-def vector_variable(settings: Settings, case: Case, on_conditions: bool) -> list[Action]:
+def vector_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
     """Return the actions of assign_vector_variable_process (to nodes or conditions)."""
     settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
     name = _variable(settings, KNOWN_VECTORS, "vector")
-    rows, interval = _rows(settings, case, on_conditions), interval_of(settings)
+    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
     fixed = [False] * 3 if on_conditions else _constrained(settings)
     return [
         Action(
@@ -158,17 +158,17 @@ def vector_variable(settings: Settings, case: Case, on_conditions: bool) -> list
     ]
 
 
-def scalar_variable(settings: Settings, case: Case, on_conditions: bool) -> list[Action]:
+def scalar_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
     """Return the action of assign_scalar_variable_process (to nodes or conditions)."""
     settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
     name = _variable(settings, KNOWN_SCALARS, "scalar")
-    rows = _rows(settings, case, on_conditions)
+    rows = _rows(settings, context, on_conditions)
     value = _value(settings, settings.get("value", 0.0), "value")
     fix = not on_conditions and settings.flag("constrained", True)
     return [Action(settings, rows, name, (value,), interval_of(settings), on_conditions, fix)]
 
 
-def vector_by_direction(settings: Settings, case: Case, on_conditions: bool) -> list[Action]:
+def vector_by_direction(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
     """Return the actions of assign_vector_by_direction_process: modulus × direction.
 
     A direction of numbers is brought to length 1; one with expressions is taken as it is.
@@ -186,7 +186,7 @@ def vector_by_direction(settings: Settings, case: Case, on_conditions: bool) -> 
             raise settings.error("direction", "direction is zero; give a vector of any other length")
         direction = [float(d) / length for d in direction]
     modulus = _value(settings, settings.get("modulus"), "modulus")
-    rows, interval = _rows(settings, case, on_conditions), interval_of(settings)
+    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
     fix = not on_conditions and settings.flag("constrained", True)
     return [
         Action(settings, rows, f"{name}_{axis}", (d, modulus), interval, on_conditions, fix)
@@ -194,11 +194,11 @@ def vector_by_direction(settings: Settings, case: Case, on_conditions: bool) -> 
     ]
 
 
-def fix_vector(settings: Settings, case: Case, on_conditions: bool) -> list[Action]:
+def fix_vector(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
     """Return the actions of fix_vector_variable_process: hold the values that are there."""
     settings.check_keys([*COMMON, "constrained"])
     name = _variable(settings, KNOWN_VECTORS, "vector")
-    rows, interval = _rows(settings, case, False), interval_of(settings)
+    rows, interval = _rows(settings, context, False), interval_of(settings)
     return [
         Action(settings, rows, f"{name}_{axis}", (), interval, fixed=True)
         for axis, fix in zip("XYZ", _constrained(settings), strict=True)
@@ -206,17 +206,17 @@ def fix_vector(settings: Settings, case: Case, on_conditions: bool) -> list[Acti
     ]
 
 
-def fix_scalar(settings: Settings, case: Case, on_conditions: bool) -> list[Action]:
+def fix_scalar(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
     """Return the action of fix_scalar_variable_process: hold the value that is there."""
     settings.check_keys([*COMMON, "constrained"])
     name = _variable(settings, KNOWN_SCALARS, "scalar")
-    rows, interval = _rows(settings, case, False), interval_of(settings)
+    rows, interval = _rows(settings, context, False), interval_of(settings)
     return (
         [Action(settings, rows, name, (), interval, fixed=True)] if settings.flag("constrained", True) else []
     )
 
 
-PROCESSES: dict[str, tuple[Callable[[Settings, Case, bool], list[Action]], bool]] = {
+PROCESSES: dict[str, tuple[Callable[[Settings, RunContext, bool], list[Action]], bool]] = {
     "assign_vector_variable_process": (vector_variable, False),
     "assign_scalar_variable_process": (scalar_variable, False),
     "assign_vector_by_direction_process": (vector_by_direction, False),
@@ -229,33 +229,33 @@ PROCESSES: dict[str, tuple[Callable[[Settings, Case, bool], list[Action]], bool]
 """Processes that set or fix values, by Kratos' module name; True: they act on conditions."""
 
 
-def actions_of(entry: Settings, module: str, case: Case) -> list[Action]:
+def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action]:
     """Return what a process of the table `PROCESSES` does."""
     make, on_conditions = PROCESSES[module]
     settings = entry.section("Parameters", required=True)
     if settings.section("local_axes").values:
         raise settings.error("local_axes", "local_axes are not supported; give the values along x, y, z")
-    return make(settings, case, on_conditions)
+    return make(settings, context, on_conditions)
 
 
-def run(actions: Sequence[Action], case: Case, values: Variables) -> list[str]:
+def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
     """Bring the values and supports to what they are at the last step; return notes."""
-    times = case.times
+    times = context.times
     steps = [action.active(times) for action in actions]
     set_values(actions, steps, times, values)
     _hold(actions, steps, len(times) - 1, values)
-    return notes_of(actions, steps, case)
+    return notes_of(actions, steps, context)
 
 
-def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], case: Case) -> list[str]:
+def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], context: RunContext) -> list[str]:
     """Return notes on actions that never act, and on those that Kratos evaluates on a moved mesh."""
-    times, notes = case.times, []
+    times, notes = context.times, []
     for action, active in zip(actions, steps, strict=True):
         where = action.settings.path.removesuffix(".Parameters")
         if not active or not len(action.rows):
             why = "its interval holds no step" if not active else "its part has none to act on"
             notes.append(f"{where}: {action.component} is never set: {why}")
-        elif case.moved and active[-1] > 1 and action.depends_on_place():
+        elif context.moved and active[-1] > 1 and action.depends_on_place():
             # Before the first step nothing has moved yet.
             cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
             notes.append(
