@@ -127,6 +127,20 @@ def test_unknown_public_name_is_an_attribute_error():
         kratos_lite.Modell  # noqa: B018
 
 
+@pytest.mark.parametrize("name", ["elements", "materials"])
+def test_a_link_at_the_root_shows_its_package_and_tools_read_it_once(name):
+    link = PACKAGE.parent / name
+    if not link.is_symlink():
+        pytest.skip("not a checkout: links are not packed")
+    assert link.readlink() == Path("kratos_lite", name)
+    pytest.importorskip("ruff")
+    words = [sys.executable, "-m", "ruff", "check", "--show-files", PACKAGE.parent]
+    seen = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    assert str(PACKAGE / name / "__init__.py") in seen
+    assert str(link / "__init__.py") not in seen
+    assert f"prune {name}" in (PACKAGE.parent / "MANIFEST.in").read_text().splitlines()
+
+
 @pytest.mark.parametrize(
     "command",
     [["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"]],
