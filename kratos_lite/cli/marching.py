@@ -32,7 +32,9 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
         # even after Ctrl-C: the series as far as they came, and the state from which to go on
         stack.callback(_save_state, last, scene.output.get("state"))
         series = [
-            stack.enter_context(SeriesWriter(scene.output[key], body)) for key in SERIES if key in scene.output
+            stack.enter_context(SeriesWriter(scene.output[key], body))
+            for key in SERIES
+            if key in scene.output
         ]
         stack.enter_context(np.errstate(over="ignore", invalid="ignore"))
         states = scene.march(progress)
@@ -46,9 +48,7 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
                 kept.append(last[0])
     seconds = perf_counter() - clock
     if "picture" in scene.output:
-        draw_trajectory(
-            scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " ")
-        )
+        draw_trajectory(scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " "))
     if not options.quiet:
         print(
             "\n".join(

@@ -154,7 +154,9 @@ def fineness(count: int) -> tuple[int, bool]:
     return int(np.clip(np.sqrt(MANY / max(count, 1)), 1, 16)), count < MANY
 
 
-def draw_facets(axes: Any, P: Array, colors: Array, E: Array, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)) -> None:
+def draw_facets(
+    axes: Any, P: Array, colors: Array, E: Array, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)
+) -> None:
     """Draw facets (m, 4, 3) in colors (m, 4) and edges (k, 2, 3) in ink from back to front."""
     E = E[:, [0, 1, 1, 0]]
     near = P @ ISOMETRIC[2]

@@ -46,7 +46,10 @@ def test_frames_hold_the_motion_of_the_nodes(tmp_path, kind):
 @kinds
 def test_table_and_arrays_hold_each_state(tmp_path, kind):
     body = thrown(kind)
-    with kl.SeriesWriter(tmp_path / "a.csv", body) as table, kl.SeriesWriter(tmp_path / "a.npz", body) as arrays:
+    with (
+        kl.SeriesWriter(tmp_path / "a.csv", body) as table,
+        kl.SeriesWriter(tmp_path / "a.npz", body) as arrays,
+    ):
         states = list(kl.march(body, 0.01, 20, every=10))
         for state in states:  # the body is at the end already: each state is looked at as itself
             table.add(state)
