@@ -145,7 +145,12 @@ class SeriesWriter:
         self._writer = kinds[Path(path).suffix.lower()](Path(path), owner, mode)
 
     def add(self, state: State | Moment | None = None) -> None:
-        """Take a state or moment, or body or transient as it is if none is given."""
+        """Take one more state.
+
+        Parameters
+        ----------
+        state : of the owner; as it is now if none is given.
+        """
         if not self.count:
             make_folder(self._writer.path)
         if state is None:
