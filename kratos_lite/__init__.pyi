@@ -54,8 +54,10 @@ from kratos_lite.errors import ModelError as ModelError
 from kratos_lite.errors import SolveError as SolveError
 from kratos_lite.io.files import read as read
 from kratos_lite.io.files import write as write
-from kratos_lite.io.writers.trajectory import Series as Series
-from kratos_lite.io.writers.trajectory import trajectory_picture as trajectory_picture
+from kratos_lite.io.writers.pictures import draw as draw
+from kratos_lite.io.writers.pictures import draw_element as draw_element
+from kratos_lite.io.writers.pictures import draw_trajectory as draw_trajectory
+from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import Isotropic3D as Isotropic3D
 from kratos_lite.materials import LinearMaterial as LinearMaterial
@@ -76,7 +78,5 @@ from kratos_lite.model.loads import Traction as Traction
 from kratos_lite.model.loads import Varying as Varying
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
-from kratos_lite.view import element_picture as element_picture
-from kratos_lite.view import picture as picture
 
 __version__: str

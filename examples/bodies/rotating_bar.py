@@ -30,4 +30,4 @@ for form in ("TL", "BC"):
 
 # %%
 if len(sys.argv) > 1:
-    kl.trajectory_picture(sys.argv[1], bar, states, title="spinning bar", size=(6, 6))
+    kl.draw_trajectory(sys.argv[1], bar, states, title="spinning bar", size=(6, 6))

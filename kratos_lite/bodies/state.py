@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
-from kratos_lite.io.output import read_arrays, write_arrays
+from kratos_lite.io.atomic import read_arrays, write_arrays
 from kratos_lite.typing import Array
 
 FIELDS = ("kind", "q", "u", "time", "step", "external_work")

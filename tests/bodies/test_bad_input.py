@@ -375,8 +375,8 @@ def test_constraints_that_contradict_each_other(kind, refused):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"dt": 0.0}, "a step must be one number of seconds > 0; got 0"),
-        ({"dt": -1e-3}, "a step must be one number of seconds > 0"),
+        ({"dt": 0.0}, "a step must be one number > 0, in s; got 0"),
+        ({"dt": -1e-3}, "a step must be one number > 0, in s"),
         ({"dt": NAN}, "a step must be finite"),
         ({"dt": "short"}, "a step"),
         ({"dt": [1e-3, 1e-3]}, "a step must be one number"),
