@@ -168,7 +168,7 @@ def _problem(match: re.Match[str]) -> str:
     if word[0] == '"':
         return _string_problem(match.group("string"))
     if word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-        return f"{word[:20]!r} is not a number in JSON; write a finite number, or leave the key out"
+        return f"{word[:20]} is not a number in JSON; write a finite number, or leave the key out"
     return _number_problem(word) if word[0] == "-" or word[0].isdigit() else ""
 
 
