@@ -46,7 +46,7 @@ def test_keys_know_their_places():
         ('{"a": 1,}', 1, 9, "trailing comma before '}'"),
         ("[1,\n2,\n]", 3, 1, "trailing comma before ']'"),
         ('{"a": NaN}', 1, 7, "NaN is not a number in JSON"),
-        ("[-Infinity]", 1, 2, "'-Infinity' is not a number in JSON"),
+        ("[-Infinity]", 1, 2, "-Infinity is not a number in JSON"),
         ("[1e999]", 1, 2, "1e999 is too large"),
         ('{"E": 1.0,\n "E": 2.0}', 2, 2, "duplicate key 'E', first given in line 1"),
         ("12345678901234567890", 1, 1, "integer of 20 digits is too long"),
