@@ -24,7 +24,7 @@ body.add(kl.Gravity((0.0, 0.0, -9.81)))  # m/s²
 
 # %%
 energy, start = body.energy(), kl.State.of(body)
-states = [start, *kl.march(body, dt=0.002, steps=500, every=10)]
+states = [start, *kl.integrate(body, dt=0.002, steps=500, every=10)]
 print(body)
 print("mass center moved by", (body.mass_center() - mesh.points.mean(axis=0)).round(9), "m")
 print("angular momentum", body.angular_momentum().round(9), "kg m²/s")
@@ -33,4 +33,4 @@ print(f"strain energy {body.internal_energy():.3f} J at the end")
 
 # %%
 if len(sys.argv) > 2:
-    kl.trajectory_picture(sys.argv[2], body, states, title=f"{kind} box", size=(6, 6))
+    kl.draw_trajectory(sys.argv[2], body, states, title=f"{kind} box", size=(6, 6))

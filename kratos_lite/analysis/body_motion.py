@@ -11,7 +11,7 @@ from kratos_lite.analysis.integrators import body_integrator
 from kratos_lite.analysis.state import State, state_of_body
 from kratos_lite.bodies.batched import together
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraint_projection import start
+from kratos_lite.bodies.constraint_projection import project_velocity
 from kratos_lite.typing import Array
 
 CHECKED = 100
@@ -42,9 +42,9 @@ class BodyMotion:
         body, self.parts = self.body, parts
         self.integrator.check_stable(body, h / parts)
         self.integrator.check(body, h / parts)
-        moved = body.last_velocity is None or not np.array_equal(body.u, body.last_velocity)
+        moved = body.integrated_velocity is None or not np.array_equal(body.u, body.last_velocity)
         if body.constraints and moved:
-            start(body, h / parts)
+            project_velocity(body, h / parts)
 
     def advance(self, h: float, count: int) -> None:
         """Take steps of h s."""
@@ -57,7 +57,7 @@ class BodyMotion:
                     self._step(part)
                 body.clock.time += h  # one after the other, so that a restart comes to the same times
                 body.clock.step += 1
-        body.last_velocity = body.u.copy() if body.constraints else None
+        body.integrated_velocity = body.u.copy() if body.constraints else None
         if body.step // CHECKED > (body.step - count) // CHECKED:
             self.integrator.check_stable(body, part)
 

@@ -81,11 +81,12 @@ class State:
         if subject.kind != self.kind or subject.q.shape != q.shape or subject.u.shape != u.shape:
             whose = "model" if self.kind == "model" else f"{self.kind} body with q {q.shape}"
             raise InputError(
-                f"this is the state of a {whose}; it does not fit a {subject.kind} body with q {subject.q.shape}"
+                f"this is the state of a {whose}; "
+                f"it does not fit a {subject.kind} body with q {subject.q.shape}"
             )
         subject.q[...], subject.u[...] = q, u  # bodies that advance together share these arrays
         subject.time, subject.step = self.time, self.step
-        subject.last_velocity = u.copy() if self.step else None
+        subject.integrated_velocity = u.copy() if self.step else None
         subject.external_work[...] = self.values["external_work"]
 
     def __getattr__(self, name: str) -> Array:

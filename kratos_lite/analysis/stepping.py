@@ -134,6 +134,6 @@ def _divergence(motion: Motion, h: float) -> SolveError:
         state = motion.state()
     return SolveError(
         f"the motion grows without bound: at t = {state.time:g} s it is no longer finite, or far beyond the "
-        f"size of the model; is {state.integrator} stable with steps of {h / state.substeps:g} s (take shorter "
-        "ones), and are all units SI?"
+        f"size of the model; is {state.integrator} stable with steps of {h / state.substeps:g} s "
+        "(take shorter ones), and are all units SI?"
     )

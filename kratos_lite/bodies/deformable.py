@@ -24,14 +24,14 @@ class Deformable(Body):
     DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, name them too.
     """
 
-    rows_are_constant = True
+    jacobian_is_constant = True
     integrators: ClassVar[Mapping[str, str]] = {
         "energy_momentum": "ENERGY_MOMENTUM",
         "linearly_implicit": "DEF_LIM",
         "explicit": "DEF_EXP",
     }
 
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return materials whose waves are so slow or quick that their units may be wrong."""
         given = self.material
         materials = given.values() if isinstance(given, Mapping) else [] if given is None else [given]

@@ -15,15 +15,15 @@ from kratos_lite.analysis.result import vector
 from kratos_lite.cli.options import apply, material, number
 from kratos_lite.cli.targets import check_json, check_targets
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.io.files import load
+from kratos_lite.io.files import load, write
 from kratos_lite.io.project.march import NO_RESULT, SERIES, scheme_of
 from kratos_lite.io.scene import March, Scene
-from kratos_lite.io.writers.results import check_picture
-from kratos_lite.io.writers.trajectory import Series, make_folder
+from kratos_lite.io.writers.pictures import check_picture
+from kratos_lite.io.writers.series import SeriesWriter, make_folder
 from kratos_lite.typing import Progress
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import Moment, Transient
+    from kratos_lite.analysis import State, TransientAnalysis
 
 WIDTH = 22
 
@@ -113,7 +113,7 @@ def needs_of_march(scene: Scene) -> tuple[list[str], list[str]]:
     warnings = scene.model.check_geometry()
     try:
         transient = scene.transient()
-        scene.moments(transient)
+        scene.states(transient)
     except ModelError as error:
         return [str(error)], warnings
     return [], transient.equations.warnings
@@ -125,14 +125,14 @@ def run_march(scene: Scene, targets: dict[str, str], options: Namespace, progres
     for path in targets.values():
         make_folder(Path(path))
     with np.errstate(over="ignore", invalid="ignore"):
-        moments = scene.moments(transient)
-        start, clock = transient.moment(), perf_counter()
+        moments = scene.states(transient, progress)
+        start, clock = transient.state(), perf_counter()
         course = _Course(transient, start)
         with ExitStack() as stack:  # even after Ctrl-C: the series as far as they came, and the last state
             stack.callback(course.save, targets.get("state"))
             series = None
             if "output" in targets:
-                writer = Series(targets["output"], transient, mode=options.vtu or "binary")
+                writer = SeriesWriter(targets["output"], transient, mode=options.vtu or "binary")
                 series = stack.enter_context(writer)
                 series.add(start)
             for moment in moments:
@@ -153,28 +153,28 @@ def _written(targets: dict[str, str]) -> list[str]:
     return [f"{'written':<{WIDTH}}{path}" for path in targets.values()]
 
 
-def _draw(path: str, scene: Scene, moment: Moment) -> None:
-    from kratos_lite.view import picture
+def _draw(path: str, scene: Scene, moment: State) -> None:
+    from kratos_lite.io.writers.pictures import draw
 
     length = np.linalg.norm(moment.u, axis=1)
     title = f"displacement at t = {moment.time:g} s"
-    picture(path, scene.model.mesh, moment.u, length, title=title, unit="m")
+    draw(path, scene.model.mesh, moment.u, length, title=title, unit="m")
 
 
 class _Course:
     """What a summary tells of a march: its start, its last moment and the one that moved farthest."""
 
-    def __init__(self, transient: Transient, start: Moment) -> None:
+    def __init__(self, transient: TransientAnalysis, start: State) -> None:
         self.transient, self.start, self.last = transient, start, start
         self.energy, self.farthest, self.count = transient.energy(), (0.0, start, 0), 0
         self._compare(start)
 
-    def add(self, moment: Moment) -> None:
+    def add(self, moment: State) -> None:
         """Take a moment."""
         self.last = moment
         self._compare(moment)
 
-    def _compare(self, moment: Moment) -> None:
+    def _compare(self, moment: State) -> None:
         self.count += 1
         length = np.linalg.norm(moment.u, axis=1)
         row = int(length.argmax())
@@ -184,7 +184,7 @@ class _Course:
     def save(self, path: str | None) -> None:
         """Write the last moment, from which a restart goes on."""
         if path is not None:
-            self.last.save(path)
+            write(path, self.last)
 
     def summary(self, scene: Scene, seconds: float) -> list[str]:
         """Return the lines of the table."""
@@ -199,7 +199,7 @@ class _Course:
             ("nodes", str(mesh.n_nodes)),
             ("elements", kinds),
             ("unknowns", str(len(e.system.reduced.free))),
-            ("scheme", self.transient.scheme.name + (", lumped mass" if e.mass.lumped else "")),
+            ("scheme", str(self.transient.integrator) + (", lumped mass" if e.mass.lumped else "")),
             ("time", span),
             (
                 "largest displacement",

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from kratos_lite.analysis import CentralDifference, Moment, Transient
-    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.analysis import State, TransientAnalysis
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,19 +30,19 @@ class March:
     ----------
     dt : step in s.
     steps : number of steps.
-    every : a moment is kept after so many steps, and after the last.
-    scheme : `newmark()` if not given.
+    every : a state is kept after so many steps, and after the last.
+    scheme : `Newmark()` if not given.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
     lumped : whether the mass stands in the nodes.
     displacement, velocity : (n, 3) at the start; at rest if not given.
     balanced : False lets it start with the acceleration 0 from any displacement and velocity, as Kratos does.
-    restart : file of a moment from which to go on, or None.
+    restart : file of a state from which to go on, or None.
     """
 
     dt: float
     steps: int
     every: int = 1
-    scheme: Implicit | CentralDifference | None = None
+    scheme: ModelIntegrator | None = None
     rayleigh: tuple[float, float] = (0.0, 0.0)
     lumped: bool = False
     displacement: NDArray[np.float64] | None = None
@@ -57,10 +57,10 @@ class March:
         flag(self.lumped, "lumped")
 
     def __str__(self) -> str:
-        from kratos_lite.analysis import newmark
+        from kratos_lite.analysis import Newmark
 
-        scheme = newmark() if self.scheme is None else self.scheme
-        return f"{self.steps} steps of {self.dt:g} s by {scheme.name}"
+        scheme = Newmark() if self.scheme is None else self.scheme
+        return f"{self.steps} steps of {self.dt:g} s by {scheme}"
 
 
 @dataclass
@@ -88,27 +88,32 @@ class Scene:
         """Return one line for each check, "check passed/failed/not evaluated: …", with the numbers."""
         return [check(result) for check in self.checks]
 
-    def transient(self, progress: Progress | None = None) -> Transient:
-        """Return the model ready to march, put to the moment from which it goes on if there is one.
+    def transient(self, progress: Progress | None = None) -> TransientAnalysis:
+        """Return the model ready to march, put to the state from which it goes on if there is one.
 
-        Raises ModelError where the input says nothing of a march, and the errors of `kratos_lite.Transient`.
+        Raises ModelError where the input says nothing of a march, and the errors of `TransientAnalysis`.
         """
-        from kratos_lite.analysis import Moment
+        from kratos_lite.io.writers.state import read_state
 
         march = self._march()
-        names = ("scheme", "rayleigh", "lumped", "displacement", "velocity")
-        given = {name: getattr(march, name) for name in names} | {"progress": progress}
+        names = ("rayleigh", "lumped", "displacement", "velocity")
+        given = {name: getattr(march, name) for name in names} | {
+            "integrator": march.scheme,
+            "progress": progress,
+        }
         transient = self.model.transient(**given)
         if not march.balanced and not (march.displacement is None and march.velocity is None):
             transient = _held_at_first(transient).transient(**given)
         if march.restart is not None:
-            transient.put(Moment.load(march.restart))
+            read_state(march.restart).restore(transient)
         return transient
 
-    def moments(self, transient: Transient) -> Iterator[Moment]:
-        """Return the moments of the march of a transient that `transient` made."""
+    def states(self, transient: TransientAnalysis, progress: Progress | None = None) -> Iterator[State]:
+        """Return the states of a transient that `transient` made."""
+        from kratos_lite.analysis import integrate
+
         march = self._march()
-        return transient.march(march.dt, march.steps, every=march.every)
+        return integrate(transient, march.dt, march.steps, every=march.every, progress=progress)
 
     def _march(self) -> March:
         if self.march is None:
@@ -116,7 +121,7 @@ class Scene:
         return self.march
 
 
-def _held_at_first(transient: Transient) -> Model:
+def _held_at_first(transient: TransientAnalysis) -> Model:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
     inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)

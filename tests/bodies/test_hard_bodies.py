@@ -11,8 +11,8 @@ SOFT = (
     (kl.PseudoRigidBody, {}),
     (kl.FiniteElementBody, {}),
     (kl.FiniteElementBody, {"lumped": True}),
-    (kl.FiniteElementBody, {"form": "BC"}),
-    (kl.FiniteElementBody, {"form": "BC-MODAL"}),
+    (kl.FiniteElementBody, {"formulation": "corotational"}),
+    (kl.FiniteElementBody, {"formulation": "modal"}),
 )
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 each_kind = pytest.mark.parametrize("kind", KINDS)
@@ -20,7 +20,7 @@ each_kind = pytest.mark.parametrize("kind", KINDS)
 
 def march(body, dt, steps, **options):
     """Return the last state."""
-    *_, last = kl.march(body, dt, steps, every=steps, **options)
+    *_, last = kl.integrate(body, dt, steps, every=steps, **options)
     return last
 
 
@@ -30,7 +30,7 @@ def march(body, dt, steps, **options):
 @pytest.mark.parametrize("damping", [1e-3, 2e-2])
 @pytest.mark.parametrize(("kind", "options"), SOFT)
 def test_automatic_steps_are_stable_with_damping(kind, options, damping):
-    body = kind(kl.box(), RUBBER, scheme="DEF_EXP", damping=damping, **options)
+    body = kind(kl.box(), RUBBER, integrator="DEF_EXP", damping=damping, **options)
     body.u += 1e-3 * np.random.default_rng(0).normal(size=body.u.shape)
     start = body.energy()
     march(body, 0.1, 10, substeps="auto")
@@ -41,7 +41,7 @@ def test_the_critical_step_with_damping_is_sharp():
     """The highest mode of a pseudo-rigid cube, shorter and longer than h²ω²/2 + h η ω² = 2."""
     ends = {}
     for share in (0.99, 1.02):
-        body = kl.PseudoRigidBody(kl.box(), RUBBER, scheme="DEF_EXP", damping=0.01)
+        body = kl.PseudoRigidBody(kl.box(), RUBBER, integrator="DEF_EXP", damping=0.01)
         h, omega = body.critical_step(), body.highest_frequency()
         assert h**2 * omega**2 / 2 + h * 0.01 * omega**2 == pytest.approx(2, rel=1e-12)
         body.u[[0, 4, 8]] = 1e-9  # breathing
@@ -67,7 +67,7 @@ def test_bodies_that_advanced_together_have_clocks_of_their_own(kind):
     march(one, 0.1, 2)
     assert (one.step, two.step) == (5, 3)
     assert two.time == pytest.approx(0.3)
-    kl.State.of(one).put_into(two)
+    kl.State.of(one).restore(two)
     one.time = 7.0
     assert two.time == pytest.approx(0.5)
 
@@ -83,22 +83,22 @@ def test_part_of_a_group_may_go_on():
 @pytest.mark.parametrize("substeps", [1.5, 0, None, float("nan"), float("inf"), [1], "some", True])
 def test_substeps_are_whole_numbers(kind, substeps):
     with pytest.raises(InputError, match="substeps must be a whole number"):
-        kl.march(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
+        kl.integrate(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
 
 
 # ---- loads that depend on the velocity -------------------------------------------------------------
 
-SCHEMES = [(kl.RigidBody, s) for s in kl.RigidBody.schemes] + [
-    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.schemes
+INTEGRATORS = [(kl.RigidBody, s) for s in kl.RigidBody.integrators] + [
+    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.integrators
 ]
 
 
-@pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
-def test_a_damper_is_of_second_order(kind, scheme):
+@pytest.mark.parametrize(("kind", "integrator"), INTEGRATORS)
+def test_a_damper_is_of_second_order(kind, integrator):
     """m v̇ = -d v of a body that only slides: v = exp(-d t / m), x = (m/d)(1 - v)."""
     errors = []
     for steps in (500, 1000):
-        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, scheme=scheme)
+        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, integrator=integrator)
         d = float(body.mass)
         body.set_velocity((1, 0, 0))
         body.add(kl.Spring(body.center, (-9, 0.1, 0.1), stiffness=0, damping=d))
@@ -114,7 +114,7 @@ X = (0.5, 0.5, 0.5)
 WRONG = [
     (lambda b: b.set_velocity(linear=np.ones((8, 3))), r"a velocity of shape .* does not fit a single body"),
     (lambda b: b.set_velocity(angular=np.ones((8, 3))), "an angular velocity of shape"),
-    (lambda b: b.turn(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
+    (lambda b: b.rotate(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
     (lambda b: b.add(kl.Force(X, np.ones((2, 3)))), "a force of shape"),
     (lambda b: b.add(kl.Spring(X, (1, 0, 0), [1, 2])), "the stiffness of a spring must be one number"),
     (lambda b: b.add(kl.Spring(X, (1, 0, 0), 1, damping=[1, 2])), "the damping of a spring must be one"),
@@ -129,7 +129,7 @@ WRONG = [
     (lambda b: setattr(b, "damping", -1.0), "a damping must be one number"),
     (lambda b: setattr(b, "tolerance", float("nan")), "a tolerance must be finite"),
     (lambda b: setattr(b, "tolerance", -1.0), "a tolerance must be one number"),
-    (lambda b: type(b)(b.mesh, b.material, scheme=""), "the schemes of a"),
+    (lambda b: type(b)(b.mesh, b.material, integrator=""), "the integrators of a"),
     (lambda b: type(b)("box.msh", b.material), "a Mesh is needed"),
     (lambda b: b.angular_momentum((1, 2)), r"three components|shape"),
 ]
@@ -154,12 +154,12 @@ def test_a_callback_that_returns_no_numbers_is_told(value):
 @pytest.mark.parametrize("modes", [6.5, "many", True])
 def test_modes_are_counted(modes):
     with pytest.raises(InputError, match="modes must be a whole number"):
-        kl.FiniteElementBody(kl.box(), RUBBER, form="BC-MODAL", modes=modes)
+        kl.FiniteElementBody(kl.box(), RUBBER, formulation="modal", modes=modes)
 
 
 def test_a_form_is_named():
-    with pytest.raises(InputError, match="unknown form of a finite-element body 3"):
-        kl.FiniteElementBody(kl.box(), RUBBER, form=3)
+    with pytest.raises(InputError, match="unknown formulation of a finite-element body 3"):
+        kl.FiniteElementBody(kl.box(), RUBBER, formulation=3)
 
 
 def test_an_obstacle_has_a_mesh_and_stays_one():

@@ -90,7 +90,7 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
     assert done.out.count("written") == 5
     assert (folder / "inner" / "o.png").read_bytes()[:4] == b"\x89PNG"
     assert np.load(folder / "inner" / "o.npz")["step"].tolist() == [0, 5, 10, 15, 20]
-    assert kl.State.load(folder / "inner" / "end.npz").step == 20
+    assert kl.read_state(folder / "inner" / "end.npz").step == 20
 
 
 def test_options_win_over_the_scene(run, folder):
@@ -108,12 +108,12 @@ def test_a_restart_comes_to_the_same_end(run, folder):
     run("march", "box.json", "-q", "--steps", "10", "--state", "half.npz")
     done = run("march", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
     assert done.rows["time"] == "0.05 … 0.1 s, 10 steps"
-    whole, end = kl.State.load("whole.npz"), kl.State.load("end.npz")
+    whole, end = kl.read_state("whole.npz"), kl.read_state("end.npz")
     assert (whole.time, whole.step) == (end.time, end.step)
     np.testing.assert_array_equal(whole.q, end.q)
     write(restart="half.npz")
     assert run("march", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
-    np.testing.assert_array_equal(kl.State.load("again.npz").u, end.u)
+    np.testing.assert_array_equal(kl.read_state("again.npz").u, end.u)
 
 
 def test_a_restart_of_another_kind_is_refused(run, folder):
@@ -144,7 +144,7 @@ def test_what_exists_is_kept_when_a_march_fails(run, folder):
     assert done.code == 2
     assert "error: what a callback returns at t = 0.25 s must be finite" in done.err
     assert len((folder / "a.csv").read_text().splitlines()) == 4
-    assert kl.State.load("s.npz").step == 2
+    assert kl.read_state("s.npz").step == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
@@ -162,7 +162,7 @@ def test_ctrl_c_keeps_what_is_there(folder):
     index = re.findall(r'file="(\S+)"', (folder / "o.pvd").read_text())
     assert len(index) >= 4
     assert all((folder / name).exists() for name in index)
-    step = kl.State.load("end.npz").step
+    step = kl.read_state("end.npz").step
     again = subprocess.run(
         [*words[:5], "--restart", "end.npz", "--steps", "1"], capture_output=True, text=True, check=True
     )

@@ -51,7 +51,7 @@ def tower(load=None):
 
 def marched(model, **options):
     transient = model.transient(**options)
-    return [transient.moment(), *transient.march(dt=1e-3, steps=20, every=5)]
+    return [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
 
 
 def assert_same(path, moments):
@@ -67,13 +67,13 @@ def assert_same(path, moments):
 @pytest.mark.parametrize(
     ("word", "value", "scheme"),
     [
-        ("newmark", "newmark", kl.newmark()),
-        ("newmark:0.3,0.6", {"newmark": [0.3, 0.6]}, kl.newmark(0.3, 0.6)),
-        ("hht", "hht", kl.hht()),
-        ("hht:-0.1", {"hht": -0.1}, kl.hht(-0.1)),
-        ("bossak", "bossak", kl.bossak()),
-        ("bossak:-0.2", {"bossak": [-0.2]}, kl.bossak(-0.2)),
-        ("generalized_alpha:0.5", {"generalized_alpha": 0.5}, kl.generalized_alpha(0.5)),
+        ("newmark", "newmark", kl.Newmark()),
+        ("newmark:0.3,0.6", {"newmark": [0.3, 0.6]}, kl.Newmark(0.3, 0.6)),
+        ("hht", "hht", kl.HHT()),
+        ("hht:-0.1", {"hht": -0.1}, kl.HHT(-0.1)),
+        ("bossak", "bossak", kl.Bossak()),
+        ("bossak:-0.2", {"bossak": [-0.2]}, kl.Bossak(-0.2)),
+        ("generalized_alpha:0.5", {"generalized_alpha": 0.5}, kl.GeneralizedAlpha(0.5)),
     ],
 )
 def test_words_file_and_python_march_alike(run, folder, word, value, scheme):
@@ -98,7 +98,7 @@ def test_central_differences(run, folder):
     done = run("solve", "run.json")
     assert done.rows["scheme"] == "central_difference, lumped mass"
     transient = tower().transient(scheme=kl.CentralDifference())
-    assert_same("end.npz", [transient.moment(), *transient.march(1e-5, 30, every=30)])
+    assert_same("end.npz", [transient.state(), *kl.integrate(transient, 1e-5, 30, every=30)])
     write(time={**TIME, "scheme": "central_difference"})
     assert run("solve", "run.json").refuses("central differences are not stable", "the critical step is")
 
@@ -109,8 +109,8 @@ def test_options_win_over_the_file(run, folder):
     done = run("solve", "run.json", *words)
     assert done.rows["scheme"] == "bossak(-0.3)"
     assert done.rows["damping"] == "0 1/s × M + 1e-06 s × K"
-    transient = tower().transient(scheme=kl.bossak(), rayleigh=(0.0, 1e-6))
-    assert_same("words.npz", [transient.moment(), *transient.march(2e-3, 4, every=2)])
+    transient = tower().transient(scheme=kl.Bossak(), rayleigh=(0.0, 1e-6))
+    assert_same("words.npz", [transient.state(), *kl.integrate(transient, 2e-3, 4, every=2)])
     assert not (folder / "file.npz").exists()
 
 
@@ -131,8 +131,8 @@ def test_loads_and_supports_that_change(run, folder):
     model.add(kl.Varying(kl.Pressure("x-", 10.0), kl.TimeSeries([0, 1], [1, 2])))
     model.add(kl.Varying(kl.Gravity((0, 0, -9.81)), kl.TimeSeries([0.0], [0.5])))
     transient = model.transient()
-    moments = transient.march(dt=1e-3, steps=20, every=5)
-    assert_same("file.npz", [transient.moment(), *moments])
+    moments = kl.integrate(transient, dt=1e-3, steps=20, every=5)
+    assert_same("file.npz", [transient.state(), *moments])
 
 
 def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
@@ -165,8 +165,8 @@ def test_the_scene_gives_the_transient(folder):
     scene = load("run.json")
     assert str(scene.march) == "20 steps of 0.001 s by hht(-0.05)"
     transient = scene.transient()
-    end = list(scene.moments(transient))[-1]
-    assert np.array_equal(end.u, marched(tower(), scheme=kl.hht())[-1].u)
+    end = list(scene.states(transient))[-1]
+    assert np.array_equal(end.u, marched(tower(), scheme=kl.HHT())[-1].u)
     write(time=None)
     with pytest.raises(kl.ModelError, match="says nothing of a march"):
         load("run.json").transient()
@@ -182,7 +182,7 @@ def test_a_summary_with_the_numbers(run, folder):
     model = tower()
     model.add(kl.Gravity((0, 0, -9.81)))
     transient = model.transient()
-    moments = [transient.moment(), *transient.march(dt=1e-3, steps=20, every=5)]
+    moments = [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
     largest = max(moments, key=lambda moment: np.linalg.norm(moment.u, axis=1).max())
     size = np.linalg.norm(largest.u, axis=1)
     rows = done.rows
@@ -249,7 +249,7 @@ def test_ctrl_c_keeps_the_series_and_the_state(folder):
     assert process.returncode == 130
     assert "interrupted" in err
     frames = len(re.findall("<DataSet", (folder / "out" / "t.pvd").read_text()))
-    assert kl.Moment.load("s.npz").step in (frames - 1, frames)
+    assert kl.read_state("s.npz").step in (frames - 1, frames)
 
 
 # ---- what goes wrong -------------------------------------------------------------------------------

@@ -171,7 +171,7 @@ def folders(tmp_path_factory):
 @pytest.mark.parametrize("name", CASES)
 def test_a_dynamic_run_file_moves_as_in_kratos(folders, name):
     scene = read_project(folders[name] / "ProjectParameters.json")
-    *_, moment = scene.moments(scene.transient())
+    *_, moment = scene.states(scene.transient())
     expected = json.loads((folders[name] / "kratos.json").read_text())
     assert moment.step >= 50
     fields = {"DISPLACEMENT": moment.u, "VELOCITY": moment.v, "ACCELERATION": moment.a}

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
-from kratos_lite.bodies.constraint_projection import Solve, Step, close
+from kratos_lite.bodies.constraint_projection import Solve, Step, constrained_step
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.errors import SolveError
@@ -42,7 +42,7 @@ class _FiniteElement(BodyIntegrator[FiniteElementBody]):
 
     def finish(self, body: FiniteElementBody) -> None:
         """Bring displacement and velocity to what the formulation can represent."""
-        body.q, body.u = body.form.project(body.q, body.u)
+        body.q, body.u = body.formulation.project(body.q, body.u)
 
 
 class _Kick(_FiniteElement):
@@ -63,7 +63,7 @@ class _Kick(_FiniteElement):
             u = body.u + h * solve(force + extra)
             return Step(qh + h / 2 * u, u, load)
 
-        return close(body, h, qh, advance, lambda: solve)
+        return constrained_step(body, h, qh, advance, lambda: solve)
 
 
 class Explicit(_Kick):
@@ -114,7 +114,7 @@ class EnergyMomentum(_FiniteElement):
             u, load = _balanced(body, h, v, extra, solve)
             return Step(body.q + h / 2 * (body.u + u), u, load)
 
-        return close(body, h, middle, advance, lambda: solve)
+        return constrained_step(body, h, middle, advance, lambda: solve)
 
 
 def _balanced(

@@ -18,7 +18,7 @@ import numpy as np
 from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.analysis.integrators.finite_element import warn_of_stiffness
 from kratos_lite.analysis.integrators.kernels import NO_NEWTON, TOO_FAST, compiled, failure
-from kratos_lite.bodies.constraint_projection import Step, close
+from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody, by_rows, green_strain, strain_operator
 from kratos_lite.errors import SolveError
@@ -56,7 +56,7 @@ class _PseudoRigid(BodyIntegrator[PseudoRigidBody]):
             finish_step(q, u, load + extra, *body.step_constants(), h, self.name, body.tolerance)
             return Step(q, u, load)
 
-        return close(body, h, qh, advance, lambda: body.solver(qh, self.stiffness_share(body, h)))
+        return constrained_step(body, h, qh, advance, lambda: body.solver(qh, self.stiffness_share(body, h)))
 
 
 class PseudoRigidExplicit(_PseudoRigid):

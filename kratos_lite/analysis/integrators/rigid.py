@@ -17,7 +17,7 @@ import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.analysis.integrators.kernels import NO_NEWTON, TOO_FAST, compiled, failure
-from kratos_lite.bodies.constraint_projection import Step, close
+from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation, set_rotation
@@ -52,7 +52,7 @@ class _Rigid(BodyIntegrator[RigidBody]):
             finish_step(q, u, qh, load + extra, *body.step_constants(), h, self.name, body.tolerance)
             return Step(q, u, load)
 
-        return close(body, h, qh, advance, body.mass_solver)
+        return constrained_step(body, h, qh, advance, body.mass_solver)
 
 
 class RigidExplicit(_Rigid):

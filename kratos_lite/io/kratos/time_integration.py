@@ -11,7 +11,7 @@ from kratos_lite.io.project.settings import Settings
 from kratos_lite.io.scene import March
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
@@ -44,9 +44,9 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
     )
 
 
-def _scheme(solver: Settings) -> Implicit:
+def _scheme(solver: Settings) -> ModelIntegrator:
     """Return the scheme that Kratos would take."""
-    from kratos_lite.analysis import bossak, newmark
+    from kratos_lite.analysis.integrators import Bossak, Newmark
 
     method = solver.text("time_integration_method", "implicit")
     if method != "implicit":
@@ -60,9 +60,9 @@ def _scheme(solver: Settings) -> Implicit:
         raise solver.error("newmark_beta", f"newmark_beta must be 0.25, which is stable; got {beta:g}")
     try:
         if kind == "newmark":
-            return newmark()
+            return Newmark()
         if kind == "bossak":
-            return bossak(solver.number("damp_factor_m", -0.3))
+            return Bossak(solver.number("damp_factor_m", -0.3))
     except InputError as error:
         raise solver.error("damp_factor_m", f"{solver.name('damp_factor_m')}: {error}") from None
     raise solver.error(

@@ -15,8 +15,7 @@ from kratos_lite.time_series import TimeSeries
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import CentralDifference
-    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 KEYS = ("step", "steps", "every", "scheme", "rayleigh", "lumped", "restart")
 SERIES = (".pvd", ".csv", ".npz")
@@ -32,10 +31,10 @@ SCHEMES = {
 """How many numbers each scheme takes."""
 
 
-def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
+def scheme_of(name: str, numbers: list[float]) -> ModelIntegrator:
     """Return a scheme by its name and numbers; InputError for those that are none.
 
-    >>> scheme_of("hht", [-0.1]).name
+    >>> str(scheme_of("hht", [-0.1]))
     'hht(-0.1)'
     """
     if name not in SCHEMES:
@@ -43,10 +42,9 @@ def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
     counts = SCHEMES[name]
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
-    from kratos_lite import analysis as dynamics
+    from kratos_lite.analysis.integrators import INTEGRATORS
 
-    make: Callable[..., Implicit | CentralDifference]
-    make = getattr(dynamics, "CentralDifference" if name == "central_difference" else name)
+    make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
     return make(*numbers)
 
 
@@ -54,7 +52,7 @@ def march_of(settings: Settings, folder: Path, outside: bool = False) -> March |
     """Return what the section ``time`` of a run file says, or None without one.
 
     It is ``{"step": s, "steps": n, "every": k, "scheme": …, "rayleigh": [α, β], "lumped": false, "restart":
-    "moment.npz"}``.  A scheme is a name such as ``"newmark"``, or a name with its numbers such as
+    "state.npz"}``.  A scheme is a name such as ``"newmark"``, or a name with its numbers such as
     ``{"hht": -0.05}`` or ``{"newmark": [0.25, 0.5]}``.
 
     Raises
@@ -85,7 +83,7 @@ def _checked(section: Settings, key: str, check: Callable[..., Any], *values: An
         raise section.error(key, f"{section.name(key)}: {error}") from None
 
 
-def _scheme(section: Settings) -> Implicit | CentralDifference:
+def _scheme(section: Settings) -> ModelIntegrator:
     value = section.values["scheme"]
     name, numbers = value, []
     if isinstance(value, Object) and len(value) == 1:
@@ -97,7 +95,7 @@ def _scheme(section: Settings) -> Implicit | CentralDifference:
             f'{section.name("scheme")} must be a name such as "newmark", or a name with its numbers such as '
             f'{{"hht": -0.05}}; got {shown(value)}',
         )
-    scheme: Implicit | CentralDifference = _checked(section, "scheme", scheme_of, name, numbers)
+    scheme: ModelIntegrator = _checked(section, "scheme", scheme_of, name, numbers)
     return scheme
 
 

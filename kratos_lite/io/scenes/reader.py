@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody, State
+from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import InputError, Problems
@@ -22,6 +22,7 @@ from kratos_lite.io.project.settings import Settings, find_file, inside, read_se
 from kratos_lite.io.scenes.actions import add_constraint, add_load
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
 from kratos_lite.io.scenes.values import Read, matrix, number, placed, vector
+from kratos_lite.io.writers.state import read_state
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import annulus, box
 from kratos_lite.model.mass_properties import MassProperties
@@ -48,10 +49,10 @@ MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str],
 }
 """Meshes that are made, by name: function, and how its arguments are read."""
 OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
-    "form": Settings.text,
+    "formulation": Settings.text,
     "modes": Settings.integer,
     "lumped": Settings.flag,
-    "scheme": Settings.text,
+    "integrator": Settings.text,
     "damping": Settings.number,
     "tolerance": Settings.number,
 }
@@ -229,7 +230,7 @@ def _start(settings: Settings, body: Body) -> None:
     start = settings.section("start")
     start.check_keys(("rotation", "velocity", "angular_velocity"))
     if "rotation" in start:
-        placed(start, "rotation", body.turn, exp(np.array(start.vector("rotation"))))
+        placed(start, "rotation", body.rotate, exp(np.array(start.vector("rotation"))))
     keys = {"linear": "velocity", "angular": "angular_velocity"}
     given = {name: start.vector(key) for name, key in keys.items() if key in start}
     if given:
@@ -239,4 +240,4 @@ def _start(settings: Settings, body: Body) -> None:
 def _restart(settings: Settings, folder: Path, files: list[Path], body: Body) -> None:
     path, _ = find_file(settings, "restart", folder)
     files.append(path)
-    placed(settings, "restart", lambda: State.load(path).put_into(body))
+    placed(settings, "restart", lambda: read_state(path).restore(body))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from kratos_lite.bodies import Body, State, march
+from kratos_lite.analysis import State, integrate
+from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Progress
 
@@ -23,7 +24,7 @@ class BodyScene:
     ----------
     body : where it starts, or goes on from.
     dt : step in s.
-    steps, every, substeps : as for `march`.
+    steps, every, substeps : as for `integrate`.
     output : files to write by the keys `OUTPUTS`.
     files : files that were read.
     place : of the step, for messages: file, line and column.
@@ -42,7 +43,7 @@ class BodyScene:
         """March the body; what can be checked is checked before the first step."""
         options: dict[str, Any] = {"every": self.every, "substeps": self.substeps, "progress": progress}
         try:
-            return march(self.body, self.dt, self.steps, **options)
+            return integrate(self.body, self.dt, self.steps, **options)
         except InputError as error:
             raise InputError(f"{self.place}: {error}" if self.place else str(error)) from None
 

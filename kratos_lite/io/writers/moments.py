@@ -1,4 +1,4 @@
-"""Moments of transients as frames for ParaView, tables and arrays; and what all writers of series share."""
+"""States of transients as frames for ParaView, tables and arrays; and what all writers of series share."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.io.atomic import write_arrays, write_whole
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
-from kratos_lite.io.output import write_arrays, write_whole
 from kratos_lite.io.writers.results import fields
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import Moment, Transient
+    from kratos_lite.analysis import State, TransientAnalysis
     from kratos_lite.mesh import Mesh
 
 MOMENT_COLUMNS = (
@@ -23,7 +23,7 @@ MOMENT_COLUMNS = (
     "largest displacement [m]",
     *(f"total reaction {axis} [N]" for axis in "xyz"),
 )
-"""Columns of a table of moments."""
+"""Columns of a table of states of a transient."""
 
 
 class Writer(ABC):
@@ -112,10 +112,10 @@ class Arrays(Writer):
 class MomentFrames(Frames):
     """DISPLACEMENT, VELOCITY, ACCELERATION, REACTION and stresses."""
 
-    owner: Transient
+    owner: TransientAnalysis
 
-    def add(self, state: Moment) -> None:
-        """Write the frame of a moment."""
+    def add(self, state: State) -> None:
+        """Write the frame of a state."""
         points, cells = fields(self.owner.result(state))
         data = {**points, "VELOCITY": state.v, "ACCELERATION": state.a}
         self.frame(state.time, self.owner.equations.model.mesh, data, cells)
@@ -124,20 +124,20 @@ class MomentFrames(Frames):
 class MomentTable(Table):
     """Time, energy, largest displacement and total reaction."""
 
-    owner: Transient
+    owner: TransientAnalysis
     columns = MOMENT_COLUMNS
 
-    def add(self, state: Moment) -> None:
-        """Take the row of a moment."""
+    def add(self, state: State) -> None:
+        """Take the row of a state."""
         largest = np.linalg.norm(state.u, axis=1).max()
         reaction = state.reactions.sum(axis=0)
         self.rows.append(np.array([state.time, self.owner.energy(state), largest, *reaction]))
 
 
 class MomentArrays(Arrays):
-    """All that a moment holds."""
+    """All that a state holds."""
 
-    owner: Transient
+    owner: TransientAnalysis
     names = ("time", "step", "u", "v", "a", "reactions")
 
 
