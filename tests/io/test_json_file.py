@@ -123,7 +123,7 @@ def test_damaged_text_is_read_as_the_standard_reader_does_or_refused():
 
 
 @pytest.mark.parametrize("name", ["61", "62", "63", "67", "70"])
-def test_malformed_real_files_are_refused_at_their_place(shared, name):
-    (path,) = (shared / "bad").glob(f"{name}_*.json")
+def test_malformed_real_files_are_refused_at_their_place(malformed, name):
+    (path,) = malformed.glob(f"{name}_*.json")
     with pytest.raises(InputError, match=rf"{path.name}:1:\d+: "):
         read_json(path)
