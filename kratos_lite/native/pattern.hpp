@@ -10,6 +10,13 @@
 
 namespace kl {
 
+// The pattern of a matrix over nodes: sorted columns of each row (CSR).
+struct Graph {
+    int64_t rows;
+    const int32_t* indptr;
+    const int32_t* indices;
+};
+
 // Elements with the same number of nodes: (count, k) rows of nodes.
 struct Connectivity {
     const int32_t* nodes;
@@ -80,7 +87,7 @@ private:
     int32_t low = INT32_MAX, high = -1;
 };
 
-// Rows of a pattern: made in pieces by several threads, then copied to their places.
+// Rows of a pattern: made in pieces by several threads, then copied to where they belong.
 class Pattern {
 public:
     Pattern(int64_t n, const std::vector<Connectivity>& groups)
