@@ -39,29 +39,15 @@ inline const double* optional(MaybeNumbers array, int64_t rows, int64_t columns,
     return array->data();
 }
 
-// Whether all are rows of something with n of them.
-inline bool are_rows(Indices numbers, int64_t n) {
-    int32_t low = 0, high = -1;
-    for (int64_t i = 0; i < numbers.size(); ++i) {
-        low = std::min(low, numbers.data()[i]);
-        high = std::max(high, numbers.data()[i]);
-    }
-    return low >= 0 && high < n;
-}
+inline bool are_rows(Indices numbers, int64_t n) { return in_range(numbers.data(), numbers.size(), n); }
 
-// A pattern with which no kernel leaves its arrays.
-inline Graph pattern(Indices indptr, Indices indices, int64_t columns) {
-    const int32_t* start = indptr.data();
-    const int64_t rows = indptr.size() - 1;
-    require(rows >= 0 && start[0] == 0 && std::is_sorted(start, start + rows + 1), "indptr must start with 0 and grow");
-    require(start[rows] == indices.size(), "indptr must end with the number of indices");
-    require(are_rows(indices, columns), "indices must be columns of the matrix");
-    return {rows, start, indices.data()};
-}
-
-inline Graph square_pattern(Indices indptr, Indices indices, int64_t rows) {
+// A pattern whose rows lie within its indices; an AssemblyMap checks the indices of the rows that it uses.
+inline Graph pattern(Indices indptr, Indices indices, int64_t rows) {
     require(indptr.size() == rows + 1, "the pattern must have a row for each point");
-    return pattern(indptr, indices, rows);
+    const int32_t* start = indptr.data();
+    require(start[0] == 0 && std::is_sorted(start, start + rows + 1), "indptr must start with 0 and grow");
+    require(start[rows] == indices.size(), "indptr must end with the number of indices");
+    return {rows, start, indices.data()};
 }
 
 // A function of a module whose arguments are arrays of exactly the right type, or as given.

@@ -95,6 +95,8 @@ private:
 
     void fill(int32_t node, const int64_t* elements) {
         const int32_t begin = graph.indptr[node], end = graph.indptr[node + 1];
+        if (!in_range(graph.indices + begin, end - begin, graph.rows))
+            throw std::invalid_argument("the sparsity pattern has a column that is not there");
         for (int32_t p = begin; p < end; ++p) column[graph.indices[p]] = p;
         bool missing = false;
         for (int32_t at = first[node]; at >= 0; at = next[at]) {

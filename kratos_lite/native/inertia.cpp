@@ -23,7 +23,7 @@ void add(Numbers points, Indices nodes, Numbers N, Numbers dN, Numbers weights, 
     Inertia w{elements(points, nodes, N, dN, weights), velocity.data(), optional(M, indices),
               optional(G, indices), optional(H, indices), {}};
     require(has_shape(velocity, 3, 4), "velocity must be (3, 4)");
-    const Graph graph = square_pattern(indptr, indices, w.n);
+    const Graph graph = pattern(indptr, indices, w.n);
     w.wide.assign(static_cast<int64_t>(w.g) * w.wide_k(), 0.0);
     for (int q = 0; q < w.g; ++q) std::copy_n(w.N + q * w.k, w.k, w.wide.data() + q * w.wide_k());
     py::gil_scoped_release release;

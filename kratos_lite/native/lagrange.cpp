@@ -36,7 +36,7 @@ void add_stiffness(Numbers points, Indices nodes, Numbers dN, Numbers weights, N
                    double damping, Numbers C, MaybeNumbers prestress, Indices indptr, Indices indices,
                    Array<double> data) {
     const Elements w = displaced(points, nodes, dN, weights, q, dq, damping, C, prestress);
-    const Graph graph = square_pattern(indptr, indices, w.n);
+    const Graph graph = pattern(indptr, indices, w.n);
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     double* to = data.mutable_data();
     py::gil_scoped_release release;

@@ -17,6 +17,14 @@ struct Graph {
     const int32_t* indices;
 };
 
+// Whether all indices are from 0 to n - 1: none is negative, nor is n - 1 less any of them.
+inline bool in_range(const int32_t* indices, int64_t count, int64_t n) {
+    const int32_t last = static_cast<int32_t>(n - 1);
+    int32_t signs = 0;
+    for (int64_t i = 0; i < count; ++i) signs |= indices[i] | (last - indices[i]);
+    return signs >= 0;
+}
+
 // Elements with the same number of nodes: (count, k) rows of nodes.
 struct Connectivity {
     const int32_t* nodes;

@@ -70,7 +70,7 @@ Moduli moduli(Numbers C) {
 int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers C, Indices indptr,
             Indices indices, Array<double> data, bool affine) {
     Stiffness w{elements(points, nodes, dN, weights), moduli(C), {}, data.mutable_data()};
-    const Graph graph = square_pattern(indptr, indices, w.n);
+    const Graph graph = pattern(indptr, indices, w.n);
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     if (affine && w.affine_pays()) w.products = products(w);
     py::gil_scoped_release release;
@@ -79,7 +79,7 @@ int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers 
 
 void add_given(Indices nodes, Numbers matrices, Indices indptr, Indices indices, Array<double> data) {
     const Connectivity mesh = connectivity(nodes);
-    const Graph graph = square_pattern(indptr, indices, indptr.size() - 1);
+    const Graph graph = pattern(indptr, indices, indptr.size() - 1);
     const int64_t each = data.ndim() == 3 ? 9 : 1;
     require(data.size() == each * indices.size(), "data must be (nnz, 3, 3) or (nnz,)");
     require(matrices.size() == each * mesh.count * mesh.k * mesh.k,

@@ -73,7 +73,7 @@ KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double,
 
 // All pairs from the gradients at the Gauss points.
 template <int V>
-KL_INLINE void by_points(const Stiffness& w, const Chunk& chunk, int k, int g, vec<double, V> (*J)[3][3]) {
+KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<double, V> (*J)[3][3]) {
     typedef vec<double, V> Vec;
     Vec *D = reinterpret_cast<Vec*>(J + g), *weight = D + 3 * g * k, *row = weight + g;
     for (int q = 0; q < g; ++q) {
@@ -103,7 +103,7 @@ KL_INLINE void by_points(const Stiffness& w, const Chunk& chunk, int k, int g, v
 
 // All pairs from the products of the reference cell.
 template <int V>
-KL_INLINE void by_products(const Stiffness& w, const Chunk& chunk, int k, const vec<double, V> (&J)[3][3]) {
+KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<double, V> (&J)[3][3]) {
     vec<double, V> c[3][3], scaled[3][3], det;
     invert<V>(J, c, det);
     for (int i = 0; i < 3; ++i)
@@ -126,7 +126,7 @@ KL_INLINE void by_products(const Stiffness& w, const Chunk& chunk, int k, const 
 
 // Add V elements; return whether J was constant in each.
 template <int V>
-KL_INLINE bool add_stiffness(const Stiffness& w, const Chunk& chunk, int k, int g) {
+KL_INLINE bool add_stiffness(const Stiffness& w, Chunk chunk, int k, int g) {
     vec<double, V>* X = reinterpret_cast<vec<double, V>*>(chunk.work);
     auto* J = reinterpret_cast<vec<double, V>(*)[3][3]>(X + 3 * k);
     gather<V>(w, w.points, chunk.first, X);
