@@ -49,20 +49,20 @@ def work(job: Job, kl: Any) -> Array:
     """Time the matrices in kratos_lite; return their entries."""
     from kratos_lite.ale import Rotation
     from kratos_lite.ale.matrices import exact_rule
-    from kratos_lite.assembly import Pattern, assemble_stiffness
-    from kratos_lite.inertia import inertia_matrices
+    from kratos_lite.assembly.inertia import inertia_matrices
+    from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
 
     with job.phase("read"):
         model = wheel(kl, job.kind, job.given["n"])
-        points, batches = model.mesh.points, model.batches()
-    pattern = job.fastest("pattern", lambda: Pattern(len(points), [batch.nodes for batch in batches]))
+        points, groups = model.mesh.points, model.element_groups()
+    pattern = job.fastest("pattern", lambda: Pattern(len(points), [group.nodes for group in groups]))
     velocity = np.column_stack([Rotation("z").A, np.zeros(3)])
 
     def made(names: str) -> dict[str, Array]:
-        return inertia_matrices(points, batches, pattern, names, lambda e: exact_rule(e.shape), velocity)
+        return inertia_matrices(points, groups, pattern, names, lambda e: exact_rule(e.shape), velocity)
 
-    fine = [replace(batch, rule=exact_rule(batch.element.shape)) for batch in batches]
-    assert all(len(batch.rule) == GAUSS[job.kind] ** 3 for batch in fine)
+    fine = [replace(group, rule=exact_rule(group.element.shape)) for group in groups]
+    assert all(len(group.rule) == GAUSS[job.kind] ** 3 for group in fine)
     return timed(job, made, lambda: assemble_stiffness(points, fine, pattern).data)
 
 

@@ -33,26 +33,26 @@ def errors(scene: Scene, u: Array) -> dict[str, float]:
         return {"displacement": off, "energy": off**0.5}
     exact = scene.exact(scene.model.mesh.points)
     found = np.zeros(4)
-    for batch in scene.model.batches():
-        for start in range(0, len(batch), 1000):
-            found += _integrals(scene, batch, batch.nodes[start : start + 1000], u)
+    for group in scene.model.element_groups():
+        for start in range(0, len(group), 1000):
+            found += _integrals(scene, group, group.nodes[start : start + 1000], u)
     l2, energy = np.sqrt(found[0] / found[1]), np.sqrt(found[2] / found[3])
     nodal = np.abs(u - exact).max() / np.abs(exact).max()
     return {"displacement": float(l2), "energy": float(energy), "nodal": float(nodal)}
 
 
-def _integrals(scene: Scene, batch: kl.batches.Batch, nodes: NDArray[np.int32], u: Array) -> Array:
+def _integrals(scene: Scene, group: kl.groups.ElementGroup, nodes: NDArray[np.int32], u: Array) -> Array:
     """Return ∫ |u_h - u|², ∫ |u|², ∫ e:C:e of the error and of the exact strain, over some elements."""
-    shape = batch.element.shape
-    fine = len(batch) >= FINE and len(shape.nodes) == shape.corners
+    shape = group.element.shape
+    fine = len(group) >= FINE and len(shape.nodes) == shape.corners
     rule = rule_for(shape.cell, FINE_DEGREE if fine else DEGREE)
     N, _ = tabulate(shape, rule)
-    placed = batch.element(scene.model.mesh.points[nodes], rule)
+    placed = group.element(scene.model.mesh.points[nodes], rule)
     X, dV = N @ scene.model.mesh.points[nodes], placed.dV
     exact = scene.exact(X)
     strain = _strain(fields.gradient(scene.exact, X))
     off = placed.strain(u[nodes]) - strain
-    C = batch.material.C
+    C = group.material.C
     return np.array(
         [
             (((N @ u[nodes] - exact) ** 2).sum(axis=-1) * dV).sum(),

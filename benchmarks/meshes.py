@@ -11,7 +11,7 @@ import kratos_lite as kl
 from benchmarks import fields
 from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.elements.surface import area_vectors, face_rule
-from kratos_lite.generate import SPLITS, raise_order
+from kratos_lite.mesh.generators import SPLITS, raise_order
 from kratos_lite.quadrature import rule_for
 
 Array = NDArray[np.float64]
@@ -56,11 +56,11 @@ def octant(n: int, kind: str, outer: Callable[[Array], Array], linear: bool) -> 
     grid = kl.box(cells=(n, n, n), element=element("8N" if linear else "27N"))
     s, t, r = grid.points.T
     pieces = []
-    centre, edges = np.ones(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
+    center, edges = np.ones(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
     for k in range(3):
         pole, a, b = np.roll([1.0, 0, 0], k), edges[k], edges[(k + 2) % 3]
         flat = np.outer((1 - s) * (1 - t), pole) + np.outer(s * (1 - t), a)
-        flat += np.outer((1 - s) * t, b) + np.outer(s * t, centre)
+        flat += np.outer((1 - s) * t, b) + np.outer(s * t, center)
         inner = flat / np.linalg.norm(flat, axis=1, keepdims=True)
         pieces.append((inner + r[:, None] * (outer(flat) - inner), grid.blocks[0].nodes))
     if linear:

@@ -40,7 +40,7 @@ class Motion:
 
 def top(kl: Any) -> Any:
     """Return the free asymmetric top."""
-    body = kl.RigidBody(characteristics=kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0])))
+    body = kl.RigidBody(mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0])))
     body.u[:3] = 8.0, 0.02, 0.0
     return body
 
@@ -49,8 +49,8 @@ def heavy_top(scheme: str) -> Callable[[Any], Any]:
     """Return the heavy top, its torque a Python function."""
 
     def make(kl: Any) -> Any:
-        top = kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0]))
-        body = kl.RigidBody(characteristics=top, scheme=scheme)
+        top = kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0]))
+        body = kl.RigidBody(mass_properties=top, scheme=scheme)
         body.u[:3] = 0.0, 0.0, 50.0
         body.turn([[1, 0, 0], [0, np.cos(0.05), -np.sin(0.05)], [0, np.sin(0.05), np.cos(0.05)]])
         torque = kl.Callback(
@@ -66,9 +66,9 @@ def soft_box(scheme: str) -> Callable[[Any], Any]:
     """Return the spinning pseudo-rigid box."""
 
     def make(kl: Any) -> Any:
-        box = kl.Characteristics.box((0.4, 0.6, 1.0), 1000.0)
+        box = kl.MassProperties.box((0.4, 0.6, 1.0), 1000.0)
         soft = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
-        body = kl.PseudoRigidBody(characteristics=box, material=soft, scheme=scheme)
+        body = kl.PseudoRigidBody(mass_properties=box, material=soft, scheme=scheme)
         body.set_velocity(angular=(0.05, 10.0, 0.05))
         return body
 

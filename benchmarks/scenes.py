@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import kratos_lite as kl
 from benchmarks import fields
 from benchmarks.meshes import body_forces, element, face_forces, merged, octant, on_plane, split
-from kratos_lite.statics import external_loads
+from kratos_lite.analysis.static import external_loads
 
 Array = NDArray[np.float64]
 KINDS = ("4N", "8N", "10N", "20N", "27N")
@@ -45,13 +45,13 @@ class Scene:
 
     def forces(self) -> Array:
         """Return the nodal forces (n, 3) in N of all loads."""
-        return external_loads(self.model.mesh, self.model.batches(), self.model.loads)
+        return external_loads(self.model.mesh, self.model.element_groups(), self.model.loads)
 
     def write(self, folder: Path) -> Path:
         """Write the problem as `.mdpa` and as `.npz`; return the path without ending."""
         stem = folder / f"{self.name}_{self.kind}_{self.n}"
         (block,) = self.model.mesh.blocks
-        supports, material = self.model.supports, self.model.batches()[0].material
+        supports, material = self.model.supports, self.model.element_groups()[0].material
         np.savez(
             f"{stem}.npz",
             points=self.model.mesh.points,

@@ -1,219 +1,34 @@
 """kratos_lite: a small, fast and exact finite-element library for solids.
 
-Names are imported when they are first used, so that ``import kratos_lite`` costs little more
-than numpy.  See https://en.wikipedia.org/wiki/Finite_element_method for the method and the
-``docs`` folder for the library.
+The public names are listed in ``__init__.pyi`` and imported when they are first used, so that
+``import kratos_lite`` loads not even numpy. The ``docs`` folder explains the library,
+https://en.wikipedia.org/wiki/Finite_element_method the method.
 """
-
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from kratos_lite import ale
-    from kratos_lite.bodies import (
-        BODIES,
-        Body,
-        Callback,
-        FiniteElementBody,
-        FixDirection,
-        FixPoint,
-        FollowerPressure,
-        Force,
-        Obstacle,
-        PseudoRigidBody,
-        RigidBody,
-        RigidLink,
-        SetAcceleration,
-        SetDisplacement,
-        SetVelocity,
-        Spring,
-        State,
-        TimeSeries,
-        Torque,
-        convert,
-        equilibrium,
-        march,
-    )
-    from kratos_lite.characteristics import Characteristics
-    from kratos_lite.dynamics import (
-        CentralDifference,
-        Moment,
-        Transient,
-        bossak,
-        critical_rate,
-        generalised_alpha,
-        hht,
-        material_velocity,
-        newmark,
-        reaction_resultant,
-    )
-    from kratos_lite.elements import (
-        ELEMENTS,
-        KinematicLinear,
-        KinematicLinear3D4N,
-        KinematicLinear3D5N,
-        KinematicLinear3D6N,
-        KinematicLinear3D8N,
-        KinematicLinear3D10N,
-        KinematicLinear3D13N,
-        KinematicLinear3D15N,
-        KinematicLinear3D20N,
-        KinematicLinear3D27N,
-    )
-    from kratos_lite.errors import (
-        InputError,
-        KratosLiteError,
-        MaterialError,
-        MeshError,
-        ModelError,
-        SolveError,
-    )
-    from kratos_lite.generate import annulus, box
-    from kratos_lite.io.files import read, write
-    from kratos_lite.io.trajectory import Series, trajectory_picture
-    from kratos_lite.loads import (
-        BodyForce,
-        Gravity,
-        LineLoad,
-        NodalForces,
-        PointLoad,
-        Pressure,
-        Timed,
-        Traction,
-        Varying,
-    )
-    from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial, Orthotropic3D
-    from kratos_lite.mesh import Block, Mesh, Part
-    from kratos_lite.model import Model
-    from kratos_lite.result import Result
-    from kratos_lite.shapes import Shape
-    from kratos_lite.view import element_picture, picture
 
 __version__ = "0.1.0"
 
-_HOME = {
-    "kratos_lite.bodies": (
-        "BODIES Body Callback FiniteElementBody FixDirection FixPoint FollowerPressure Force Obstacle "
-        "PseudoRigidBody RigidBody RigidLink SetAcceleration SetDisplacement SetVelocity Spring State "
-        "TimeSeries Torque convert equilibrium march"
-    ),
-    "kratos_lite.characteristics": "Characteristics",
-    "kratos_lite.dynamics": (
-        "CentralDifference Moment Transient bossak critical_rate generalised_alpha hht material_velocity "
-        "newmark reaction_resultant"
-    ),
-    "kratos_lite.elements": (
-        "ELEMENTS KinematicLinear KinematicLinear3D4N KinematicLinear3D5N KinematicLinear3D6N "
-        "KinematicLinear3D8N KinematicLinear3D10N KinematicLinear3D13N KinematicLinear3D15N "
-        "KinematicLinear3D20N KinematicLinear3D27N"
-    ),
-    "kratos_lite.errors": "InputError KratosLiteError MaterialError MeshError ModelError SolveError",
-    "kratos_lite.generate": "annulus box",
-    "kratos_lite.io.files": "read write",
-    "kratos_lite.io.trajectory": "Series trajectory_picture",
-    "kratos_lite.loads": "BodyForce Gravity LineLoad NodalForces PointLoad Pressure Timed Traction Varying",
-    "kratos_lite.materials": "MATERIALS Isotropic3D LinearMaterial Orthotropic3D",
-    "kratos_lite.mesh": "Block Mesh Part",
-    "kratos_lite.model": "Model",
-    "kratos_lite.result": "Result",
-    "kratos_lite.shapes": "Shape",
-    "kratos_lite.view": "element_picture picture",
-}
-_MODULE_OF = {name: module for module, names in _HOME.items() for name in names.split()}
-__all__ = [
-    "BODIES",
-    "ELEMENTS",
-    "MATERIALS",
-    "Block",
-    "Body",
-    "BodyForce",
-    "Callback",
-    "CentralDifference",
-    "Characteristics",
-    "FiniteElementBody",
-    "FixDirection",
-    "FixPoint",
-    "FollowerPressure",
-    "Force",
-    "Gravity",
-    "InputError",
-    "Isotropic3D",
-    "KinematicLinear",
-    "KinematicLinear3D4N",
-    "KinematicLinear3D5N",
-    "KinematicLinear3D6N",
-    "KinematicLinear3D8N",
-    "KinematicLinear3D10N",
-    "KinematicLinear3D13N",
-    "KinematicLinear3D15N",
-    "KinematicLinear3D20N",
-    "KinematicLinear3D27N",
-    "KratosLiteError",
-    "LineLoad",
-    "LinearMaterial",
-    "MaterialError",
-    "Mesh",
-    "MeshError",
-    "Model",
-    "ModelError",
-    "Moment",
-    "NodalForces",
-    "Obstacle",
-    "Orthotropic3D",
-    "Part",
-    "PointLoad",
-    "Pressure",
-    "PseudoRigidBody",
-    "Result",
-    "RigidBody",
-    "RigidLink",
-    "Series",
-    "SetAcceleration",
-    "SetDisplacement",
-    "SetVelocity",
-    "Shape",
-    "SolveError",
-    "Spring",
-    "State",
-    "TimeSeries",
-    "Timed",
-    "Torque",
-    "Traction",
-    "Transient",
-    "Varying",
-    "__version__",
-    "ale",
-    "annulus",
-    "bossak",
-    "box",
-    "convert",
-    "critical_rate",
-    "element_picture",
-    "equilibrium",
-    "generalised_alpha",
-    "hht",
-    "march",
-    "material_velocity",
-    "newmark",
-    "picture",
-    "reaction_resultant",
-    "read",
-    "trajectory_picture",
-    "write",
-]
+
+def _homes() -> dict[str, str]:
+    """Return the module of each public name; the list has lines ``from module import name as name``."""
+    with open(__file__ + "i", encoding="utf-8") as stub:
+        words = [line.split() for line in stub if line.startswith("from ")]
+    return {name: module for _, module, _, name, *_ in words}
 
 
-def __getattr__(name: str) -> Any:
-    if name == "ale":
-        return import_module("kratos_lite.ale")
-    if name not in _MODULE_OF:
+_HOMES = _homes()
+__all__ = ["__version__", *sorted(_HOMES)]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
         raise AttributeError(f"module 'kratos_lite' has no attribute {name!r}")
-    value = getattr(import_module(_MODULE_OF[name]), name)
-    globals()[name] = value
+    from importlib import import_module
+
+    if _HOMES[name] == __name__:
+        return import_module(f"{__name__}.{name}")
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_MODULE_OF, "ale"})
+    return __all__

@@ -26,9 +26,9 @@ class Registry(Generic[T]):
 
     Examples
     --------
-    >>> colours = Registry[int]("colour")
-    >>> colours.add("red", 1, aliases=["rouge"])
-    >>> colours["rouge"], sorted(colours)
+    >>> colors = Registry[int]("color")
+    >>> colors.add("red", 1, aliases=["rouge"])
+    >>> colors["rouge"], sorted(colors)
     (1, ['red'])
     """
 
@@ -71,10 +71,10 @@ class Registry(Generic[T]):
     def temporary(self) -> Iterator[None]:
         """Forget, on leaving, whatever was registered or replaced inside the ``with`` block.
 
-        >>> colours = Registry[int]("colour")
-        >>> with colours.temporary():
-        ...     colours.add("red", 1)
-        >>> "red" in colours
+        >>> colors = Registry[int]("color")
+        >>> with colors.temporary():
+        ...     colors.add("red", 1)
+        >>> "red" in colors
         False
         """
         items, aliases = dict(self._items), dict(self._aliases)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from kratos_lite.typing import Array
 
 NAMES = ("XX", "YY", "ZZ", "XY", "YZ", "ZX")
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Tensor indices of the six components."""
-
-Array = NDArray[np.float64]
 
 
 def tensor(stress: ArrayLike) -> Array:

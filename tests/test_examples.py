@@ -164,7 +164,7 @@ def test_a_scene_in_python_is_marched(tmp_path):
         list(map(float, row.split(","))) for row in (tmp_path / "out/box.csv").read_text().splitlines()[1:]
     ]
     assert len(rows) == 51
-    # with the drag 2 |w| w, w = wind - v, of the mass centre alone, by a Runge-Kutta method of high order
+    # with the drag 2 |w| w, w = wind - v, of the mass center alone, by a Runge-Kutta method of high order
     from scipy.integrate import solve_ivp
 
     def rate(t, y):

@@ -142,7 +142,7 @@ def solve(job: Job, K: Any, dofs: NDArray[np.int64]) -> Array:
 
 
 def _direct(unknowns: int) -> Callable[[Any, Array], Array] | None:
-    """Return the fastest factorisation for so many unknowns, or None."""
+    """Return the fastest factorization for so many unknowns, or None."""
     if unknowns <= PARDISO_LIMIT:
         try:
             import pypardiso
@@ -154,12 +154,12 @@ def _direct(unknowns: int) -> Callable[[Any, Array], Array] | None:
         return None
     from scipy.sparse.linalg import splu
 
-    def factorised(A: Any, b: Array) -> Array:
+    def factorized(A: Any, b: Array) -> Array:
         options = {"SymmetricMode": True}
         factors = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         return np.asarray(factors.solve(b))
 
-    return factorised
+    return factorized
 
 
 def need_pyamg() -> None:

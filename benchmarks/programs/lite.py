@@ -63,18 +63,18 @@ def work(job: Job) -> Array | None:
 
 def assembly(job: Job, model: Any) -> None:
     """Time the pattern and the matrix alone."""
-    from kratos_lite.assembly import assemble_stiffness
+    from kratos_lite.assembly.stiffness import assemble_stiffness
 
-    batches = model.batches()
-    points, connectivity = model.mesh.points, [batch.nodes for batch in batches]
+    groups = model.element_groups()
+    points, connectivity = model.mesh.points, [group.nodes for group in groups]
 
     def pattern() -> Any:
-        from kratos_lite.assembly import PatternCache
+        from kratos_lite.assembly.stiffness import PatternCache
 
         return PatternCache().get(len(points), connectivity)
 
     made = job.fastest("pattern", pattern)
-    job.fastest("matrix", lambda: assemble_stiffness(points, batches, made))
+    job.fastest("matrix", lambda: assemble_stiffness(points, groups, made))
 
 
 if __name__ == "__main__":

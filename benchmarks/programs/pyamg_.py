@@ -14,14 +14,14 @@ def work(job: Job) -> Array | None:
         import scipy.sparse as sp
 
         import kratos_lite as kl
-        from kratos_lite.assembly import PatternCache, assemble_stiffness
+        from kratos_lite.assembly.stiffness import PatternCache, assemble_stiffness
     job.answer["version"] = pyamg.__version__
     job.read()
     with job.phase("matrix"):
         model = kl.read(f"{job.stem}.mdpa")
-        batches = model.batches()
-        pattern = PatternCache().get(model.mesh.n_nodes, [batch.nodes for batch in batches])
-        K = sp.csr_matrix(assemble_stiffness(model.mesh.points, batches, pattern).scipy())
+        groups = model.element_groups()
+        pattern = PatternCache().get(model.mesh.n_nodes, [group.nodes for group in groups])
+        K = sp.csr_matrix(assemble_stiffness(model.mesh.points, groups, pattern).scipy())
     with job.phase("constrain"):
         fixed = job.fixed.ravel()
         u = np.where(fixed, job.values.ravel(), 0.0)

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 import kratos_lite as kl
-from kratos_lite.rotations import exp
+from kratos_lite.bodies.rotations import exp
 
 
 def weight(q, u, t):
@@ -22,7 +22,7 @@ def weight(q, u, t):
 
 mesh = kl.box((0.5, 0.5, 2.0), origin=(-0.25, -0.25, -1.0))  # only to be drawn
 top = kl.RigidBody(
-    mesh, characteristics=kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])), scheme="RIG_IMP"
+    mesh, mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])), scheme="RIG_IMP"
 )
 top.turn(exp(np.array([0.5, 0.0, 0.0])))
 top.u[:3] = 0.0, 0.0, 25.0  # referential angular velocity, rad/s

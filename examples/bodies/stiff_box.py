@@ -13,11 +13,11 @@ import numpy as np
 import kratos_lite as kl
 
 logging.getLogger("kratos_lite").setLevel(logging.ERROR)  # DEF_LIM would warn
-shape = kl.Characteristics.box((0.4, 0.6, 1.0), density=1000.0)
+shape = kl.MassProperties.box((0.4, 0.6, 1.0), density=1000.0)
 steel = kl.Isotropic3D(E=2e11, nu=0.3, density=1000.0)
 
 for scheme in ("DEF_LIM", "ENERGY_MOMENTUM"):
-    box = kl.PseudoRigidBody(material=steel, characteristics=shape, scheme=scheme)
+    box = kl.PseudoRigidBody(material=steel, mass_properties=shape, scheme=scheme)
     box.set_velocity(angular=(0.05, 10.0, 0.05))
     energy, momentum = box.energy(), box.angular_momentum()
     drift = [abs(box.energy() / energy - 1) for _ in kl.march(box, dt=1e-3, steps=500)]

@@ -12,7 +12,7 @@ wind = np.array([-6.0, 0.0, 0.0])  # m/s
 
 
 def drag(q, u, t):
-    """Return the drag on a rigid body: a force in N on its mass centre, against the flow around it."""
+    """Return the drag on a rigid body: a force in N on its mass center, against the flow around it."""
     flow = wind - u[3:]
     return np.concatenate([np.zeros(3), 2.0 * np.linalg.norm(flow) * flow])  # 2 N s²/m²
 

@@ -19,14 +19,14 @@ body.set_velocity(linear=(1.5, 1.5, 4.905), angular=(0.05, 10.0, 0.05))  # m/s, 
 body.add(kl.Gravity((0.0, 0.0, -9.81)))  # m/s²
 
 # %% [markdown]
-# After one second of free flight the mass centre has moved by v t + g t²/2 = (1.5, 1.5, 0) m, and the angular
+# After one second of free flight the mass center has moved by v t + g t²/2 = (1.5, 1.5, 0) m, and the angular
 # momentum is still J ω = (1.36, 232, 0.52) kg m²/s, whatever the body is made of.
 
 # %%
 energy, start = body.energy(), kl.State.of(body)
 states = [start, *kl.march(body, dt=0.002, steps=500, every=10)]
 print(body)
-print("mass centre moved by", (body.mass_center() - mesh.points.mean(axis=0)).round(9), "m")
+print("mass center moved by", (body.mass_center() - mesh.points.mean(axis=0)).round(9), "m")
 print("angular momentum", body.angular_momentum().round(9), "kg m²/s")
 print(f"energy drift {body.energy() / energy - 1:+.1e}")
 print(f"strain energy {body.internal_energy():.3f} J at the end")

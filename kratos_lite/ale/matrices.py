@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite import fields
 from kratos_lite.ale.motion import Motion, Rotation
-from kratos_lite.assembly import Pattern
-from kratos_lite.batches import Batch
-from kratos_lite.inertia import inertia_matrices
-from kratos_lite.mass import Mass
+from kratos_lite.assembly import fields
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.stiffness import Pattern
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
+from kratos_lite.solvers.mass import Mass
+from kratos_lite.typing import Array
 from kratos_lite.voigt import tensor
-
-Array = NDArray[np.float64]
 
 
 @remembered
@@ -47,9 +45,9 @@ class MotionMatrices:
     """
 
     def __init__(
-        self, motion: Motion, points: Array, batches: Sequence[Batch], pattern: Pattern, mass: Mass
+        self, motion: Motion, points: Array, groups: Sequence[ElementGroup], pattern: Pattern, mass: Mass
     ) -> None:
-        self.motion, self.points, self.batches = motion, points, batches
+        self.motion, self.points, self.groups = motion, points, groups
         self.pattern, self.mass = pattern, mass
         self._made: dict[str, Array] = {}
 
@@ -60,7 +58,7 @@ class MotionMatrices:
             points, velocity = self._flow()
             self._made |= inertia_matrices(
                 points,
-                self.batches,
+                self.groups,
                 self.pattern,
                 missing,
                 lambda element: exact_rule(element.shape),
@@ -70,7 +68,7 @@ class MotionMatrices:
     def _flow(self) -> tuple[Array, Array]:
         """Return the points and (3, 4): A and b of the velocity c = A X + b at them."""
         if isinstance(self.motion, Rotation):  # from the axis on, where no digits are lost
-            return self.points - self.motion.centre, np.column_stack([self.motion.A, np.zeros(3)])
+            return self.points - self.motion.center, np.column_stack([self.motion.A, np.zeros(3)])
         return self.points, np.column_stack([np.zeros((3, 3)), self.motion.field(np.zeros(3))])
 
     @property
@@ -123,7 +121,7 @@ class MotionMatrices:
 
     def _inertia(self, A: Array) -> Array:
         assert isinstance(self.motion, Rotation)
-        arms = (self.points - self.motion.centre) @ A.T
+        arms = (self.points - self.motion.center) @ A.T
         return np.asarray(self.mass.scalar @ arms)
 
     # ---- centrifugal stiffening ---------------------------------------------------------------------
@@ -131,10 +129,10 @@ class MotionMatrices:
     def stiffening(self, u0: Array) -> Array:
         """Return ∫ σ(u0) : (grad N_i ⊗ grad N_j) as data (nnz,) in N/m, of displacements u0 (n, 3)."""
         data = np.zeros(len(self.pattern.indices))
-        for group, batch in enumerate(self.batches):
-            stress = tensor(fields.at_gauss(self.points, batch, u0))
-            for chunk in batch.chunks():
-                dV, D = batch.at(self.points, chunk)._gauss
+        for number, group in enumerate(self.groups):
+            stress = tensor(fields.at_gauss(self.points, group, u0))
+            for chunk in group.chunks():
+                dV, D = group.at(self.points, chunk)._gauss
                 weighted = stress[chunk] * dV[..., None, None]
-                self.pattern.add(data, group, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
+                self.pattern.add(data, number, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
         return data

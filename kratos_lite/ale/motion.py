@@ -17,14 +17,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kratos_lite.arguments import finite, flag, number
 from kratos_lite.errors import InputError
-from kratos_lite.rotations import hat
-from kratos_lite.series import Factor, TimeSeries, function_of, slope_of
-
-Array = NDArray[np.float64]
+from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite, flag, number
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 ENDS = ("absorbing", "periodic", "fixed", "natural")
@@ -80,7 +78,7 @@ class Rotation(Motion):
     rate : rad/s; number, `TimeSeries` or function of the time.
     acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A
         number or `TimeSeries` changes a rate that is a number as the time goes on.
-    centre : (3,) m, a point of the axis.
+    center : (3,) m, a point of the axis.
     skew : take the skew part of G, which keeps the energy on every mesh.
     stiffening : add the stiffness that the centrifugal stress gives; a rotor that may turn freely needs it.
     damping : α in 1/s.
@@ -97,21 +95,21 @@ class Rotation(Motion):
         rate: Factor = 0.0,
         acceleration: Factor | None = None,
         *,
-        centre: ArrayLike = (0.0, 0.0, 0.0),
+        center: ArrayLike = (0.0, 0.0, 0.0),
         skew: bool = True,
         stiffening: bool = False,
         damping: float = 0.0,
     ) -> None:
         super().__init__(axis, rate, acceleration, damping)
-        self.centre = finite(centre, "the centre of a rotation")
-        if self.centre.shape != (3,):
-            raise InputError(f"the centre of a rotation must have shape (3,); got {self.centre.shape}")
+        self.center = finite(center, "the center of a rotation")
+        if self.center.shape != (3,):
+            raise InputError(f"the center of a rotation must have shape (3,); got {self.center.shape}")
         self.skew, self.stiffening = flag(skew, "skew"), flag(stiffening, "stiffening")
-        self.A = -hat(self.direction)
+        self.A = np.cross(np.eye(3), self.direction).T
 
     def field(self, X: Array) -> Array:
         """Return A (X - X0) = (X - X0) × e."""
-        return np.asarray((X - self.centre) @ self.A.T)
+        return np.asarray((X - self.center) @ self.A.T)
 
 
 class Translation(Motion):

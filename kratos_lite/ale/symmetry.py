@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.ale.ends import end_nodes
+from kratos_lite.ale.boundaries import end_nodes
 from kratos_lite.ale.matrices import MotionMatrices
 from kratos_lite.ale.motion import Motion, Rotation, Translation
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 HARMONICS = 12
 """Waves around the axis, or along the window, that are looked for."""
@@ -50,7 +49,7 @@ def check_materials(terms: MotionMatrices) -> None:
     quadrature of the mesh, and so those of measures of C.  Along a window φ goes once around, and r = 1.  One
     material alone is even where the boundary is.
     """
-    materials = {id(batch.material): batch.material for batch in terms.batches}
+    materials = {id(group.material): group.material for group in terms.groups}
     if len(materials) < 2:
         return
     turns = isinstance(terms.motion, Rotation)
@@ -73,13 +72,13 @@ def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
     C is measured by two invariants, and in a window, whose axes do not turn, by all of its components.
     """
     found = np.zeros((5, HARMONICS + 1), dtype=complex)
-    for batch in terms.batches:
-        C = batch.material.C
+    for group in terms.groups:
+        C = group.material.C
         bulk, trace = C[:3, :3].sum(), np.trace(C)
         every = trace if isinstance(terms.motion, Rotation) else (C * np.arange(36, 72).reshape(6, 6)).sum()
-        values = np.array([1.0, batch.material.density, bulk, trace, every])
-        for chunk in batch.chunks():
-            element = batch.at(terms.points, chunk)
+        values = np.array([1.0, group.material.density, bulk, trace, every])
+        for chunk in group.chunks():
+            element = group.at(terms.points, chunk)
             r, wave = _polar(terms, element.gauss_points())
             power = (element.dV * r * r).astype(complex)
             for n in range(HARMONICS + 1):

@@ -21,7 +21,7 @@ from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.bodies.state import State
 from kratos_lite.bodies.statics import equilibrium
-from kratos_lite.series import TimeSeries
+from kratos_lite.time_series import TimeSeries
 
 __all__ = [
     "BODIES",

@@ -16,20 +16,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
-from kratos_lite.characteristics import Characteristics
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.registry import Registry
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from kratos_lite.bodies.constraints import Constraint
-    from kratos_lite.bodies.given import Material
     from kratos_lite.bodies.loads import BodyLoad, Bound
-    from kratos_lite.loads import Load
-    from kratos_lite.series import Factor
+    from kratos_lite.bodies.validation import Material
+    from kratos_lite.model.loads import Load
+    from kratos_lite.time_series import Factor
 
-Array = NDArray[np.float64]
 
 _log = logging.getLogger("kratos_lite")
 BODIES: Registry[type[Body]] = Registry("kind of body")
@@ -52,8 +52,8 @@ class Body(ABC):
     kind : name of the kind, as in input files.
     q, u : configuration and velocity; their layout is that of the kind.
     time, step : s, and number of steps taken.
-    mesh, material : the shape and what it is made of, or None for a body given by its characteristics.
-    characteristics : mass, volume, mass centre, Euler and inertia tensor.
+    mesh, material : the shape and what it is made of, or None for a body given by its mass_properties.
+    mass_properties : mass, volume, mass center, Euler and inertia tensor.
     tolerance : relative size of the last Newton step of an implicit scheme.
     damping : η in s, viscous stress η C Ė (stiffness-proportional damping).
     marched : u as the last march left it, None before; where it is another one, or constraints are new, a
@@ -75,13 +75,13 @@ class Body(ABC):
         self,
         mesh: Mesh | None,
         material: Material | None,
-        characteristics: Characteristics,
+        mass_properties: MassProperties,
         q: Array,
         u: Array,
         scheme: str | None,
         damping: float = 0.0,
     ) -> None:
-        self.mesh, self.material, self.characteristics = mesh, material, characteristics
+        self.mesh, self.material, self.mass_properties = mesh, material, mass_properties
         for doubt in self.doubts():
             _log.warning("%s", doubt)
         self.q, self.u = q, u
@@ -120,16 +120,16 @@ class Body(ABC):
 
     @abstractmethod
     def turn(self, rotation: ArrayLike) -> None:
-        """Turn the undeformed body about its mass centre, which stays where it is.
+        """Turn the undeformed body about its mass center, which stays where it is.
 
         Parameters
         ----------
-        rotation : Λ (3, 3) or (..., 3, 3); `kratos_lite.rotations.exp` makes one of a rotation vector.
+        rotation : Λ (3, 3) or (..., 3, 3); `kratos_lite.bodies.rotations.exp` makes one of a rotation vector.
         """
 
     @abstractmethod
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
-        """Let the body move as a rigid one: linear velocity of its mass centre, and spatial angular velocity.
+        """Let the body move as a rigid one: linear velocity of its mass center, and spatial angular velocity.
 
         Parameters
         ----------
@@ -146,11 +146,11 @@ class Body(ABC):
 
     @abstractmethod
     def push(self, X: Array, force: Array, q: Array) -> Array:
-        """Return the generalised force (..., dofs) of a spatial force (..., 3) in N on the point X (3,)."""
+        """Return the generalized force (..., dofs) of a spatial force (..., 3) in N on the point X (3,)."""
 
     @abstractmethod
     def push_nodes(self, forces: Array, q: Array) -> Array:
-        """Return the generalised force (..., dofs) of spatial forces (n, 3) in N on the nodes of the mesh."""
+        """Return the generalized force (..., dofs) of spatial forces (n, 3) in N on the nodes of the mesh."""
 
     @abstractmethod
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
@@ -171,7 +171,7 @@ class Body(ABC):
 
     @abstractmethod
     def mass_center(self) -> Array:
-        """Return where the mass centre is, (..., 3) in m."""
+        """Return where the mass center is, (..., 3) in m."""
 
     @abstractmethod
     def linear_momentum(self) -> Array:
@@ -179,10 +179,10 @@ class Body(ABC):
 
     @abstractmethod
     def angular_momentum(self, about: ArrayLike | None = None) -> Array:
-        """Return ∫ρ (x - about) × v dV, (..., 3) in kg m²/s, about the mass centre if not given."""
+        """Return ∫ρ (x - about) × v dV, (..., 3) in kg m²/s, about the mass center if not given."""
 
     def internal_load(self, q: Array | None = None) -> Array:
-        """Return the generalised internal load (..., dofs): what deformation resists with."""
+        """Return the generalized internal load (..., dofs): what deformation resists with."""
         return np.zeros_like(self.u)
 
     def internal_energy(self) -> Array | float:
@@ -221,17 +221,17 @@ class Body(ABC):
         """Return what is allowed, but may be a mistake; it is also logged when the body is made."""
         return []
 
-    # ---- characteristics -------------------------------------------------------------------------
+    # ---- mass_properties -------------------------------------------------------------------------
 
     @property
     def mass(self) -> Array:
         """Mass (...) in kg."""
-        return np.asarray(self.characteristics.mass)
+        return np.asarray(self.mass_properties.mass)
 
     @property
     def center(self) -> Array:
-        """Mass centre X̄ (..., 3) of the undeformed body in m."""
-        return np.asarray(self.characteristics.center)
+        """Mass center X̄ (..., 3) of the undeformed body in m."""
+        return np.asarray(self.mass_properties.center)
 
     @property
     def scheme(self) -> str:
@@ -312,7 +312,7 @@ class Body(ABC):
     def external_load(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None
     ) -> Array:
-        """Return the generalised external load (..., dofs) at a configuration, a time in s and a velocity."""
+        """Return the generalized external load (..., dofs) at a configuration, a time in s and a velocity."""
         q, t = self.q if q is None else q, self.time if time is None else time
         u = self.u if u is None else u
         total = np.zeros_like(self.u)

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import one_point, points_of, vector_of
+from kratos_lite.bodies.validation import one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.series import Factor, function_of, integral_of
+from kratos_lite.time_series import Factor, function_of, integral_of
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Points: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Points (3,) or (m, 3) in m of the undeformed body; or nodes by a part of the mesh or a predicate."""
 SHORT = 1e-3

@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Any, TypeVar, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import BODIES, Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.rotations import hat, polar
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.rotations import hat, polar
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Kind = TypeVar("Kind", RigidBody, PseudoRigidBody, FiniteElementBody)
 
 
@@ -71,7 +70,7 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     else:
         other.place(np.concatenate([polar(F).T.ravel(), center]))
         spin = other.rotation.T @ body.angular_momentum()
-        other.u = np.concatenate([np.linalg.solve(other.characteristics.inertia, spin), velocity])
+        other.u = np.concatenate([np.linalg.solve(other.mass_properties.inertia, spin), velocity])
     other.time, other.step = body.time, body.step
     return other
 
@@ -92,7 +91,7 @@ def affine(body: Body) -> tuple[Array, Array]:
 
 
 def _own_center(body: Body) -> Array:
-    """Return the mass centre of the undeformed body as its mass has it: lumped mass may shift it."""
+    """Return the mass center of the undeformed body as its mass has it: lumped mass may shift it."""
     if isinstance(body, FiniteElementBody):
         return body.reference_center()
     return body.center

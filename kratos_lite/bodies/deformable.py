@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
-from kratos_lite.checks import check_wave_speeds
+from kratos_lite.model.checks import check_wave_speeds
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Solve: TypeAlias = Callable[[Array], Array]
 
 

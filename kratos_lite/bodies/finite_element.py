@@ -10,21 +10,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
-from kratos_lite.assembly import Pattern
-from kratos_lite.blockmatrix import BlockMatrix
-from kratos_lite.bodies.closing import allowed
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.bodies.constraint_projection import allowed
 from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.forms import FORMS, Form, Modal
-from kratos_lite.bodies.given import Material, elements_of, fitting, one_point, points_of, vector_of
-from kratos_lite.characteristics import Characteristics
+from kratos_lite.bodies.formulations import FORMS, Form, Modal
+from kratos_lite.bodies.rotations import check_rotation
+from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mass import Mass
 from kratos_lite.mesh import Located, Mesh
-from kratos_lite.modes import modes
-from kratos_lite.rotations import check_rotation
+from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.solvers.eigen import modes
+from kratos_lite.solvers.mass import Mass
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
-Array = NDArray[np.float64]
 LOCATED_MAX = 64
 """Sets of points whose places in the mesh a body keeps."""
 
@@ -75,23 +75,23 @@ class FiniteElementBody(Deformable):
         damping: float = 0.0,
         tolerance: float = 1e-16,
     ) -> None:
-        self.batches = elements_of(mesh, material)
+        self.groups = elements_of(mesh, material)
         lost = mesh.node_ids[~mesh.used_nodes()]
         if len(lost):
             raise ModelError(
                 f"node {lost[0]} belongs to no element, so it has no mass; leave it out of the mesh"
             )
         self.points, self.tolerance, self.dofs = mesh.points, tolerance, 3 * mesh.n_nodes
-        characteristics = Characteristics.of(mesh.points, self.batches)
-        pattern = Pattern(mesh.n_nodes, [batch.nodes for batch in self.batches])
+        mass_properties = MassProperties.of(mesh.points, self.groups)
+        pattern = Pattern(mesh.n_nodes, [group.nodes for group in self.groups])
         self.lumped = lumped
-        self._mass = Mass(mesh.points, self.batches, pattern, lumped)
+        self._mass = Mass(mesh.points, self.groups, pattern, lumped)
         self.form = self._form(form, modes)
         self.schemes = self.form.schemes  # type: ignore[misc]
         self._located: dict[bytes, Located] = {}
         self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
         super().__init__(
-            mesh, material, characteristics, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
+            mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
         )
 
     def _form(self, name: str, count: int | None) -> Form:
@@ -99,8 +99,8 @@ class FiniteElementBody(Deformable):
         if kind is not Modal and count is not None:
             raise InputError(f"modes are for form='BC-MODAL'; got form={name!r}")
         if kind is Modal:
-            return Modal(self.points, self.batches, self._mass, 12 if count is None else count)
-        return kind(self.points, self.batches, self._mass)
+            return Modal(self.points, self.groups, self._mass, 12 if count is None else count)
+        return kind(self.points, self.groups, self._mass)
 
     def default_scheme(self) -> str:
         """Return the most robust scheme that the form has."""
@@ -140,16 +140,16 @@ class FiniteElementBody(Deformable):
         if q.shape not in ((self.dofs,), self.points.shape):
             raise InputError(f"a configuration of this body has shape ({self.dofs},); got {q.shape}")
         moved = self.points + q.reshape(-1, 3)
-        for batch in self.batches:
-            for chunk in batch.chunks():
-                lowest = batch.at(moved, chunk).dV.min(axis=1)
+        for group in self.groups:
+            for chunk in group.chunks():
+                lowest = group.at(moved, chunk).dV.min(axis=1)
                 if (lowest <= 0).any():
-                    element = self.mesh.element_ids[batch.rows[chunk][int(np.argmin(lowest))]]
+                    element = self.mesh.element_ids[group.rows[chunk][int(np.argmin(lowest))]]
                     raise InputError(f"these displacements turn element {element} inside out: det J ≤ 0")
         self.q = q.ravel().copy()
 
     def turn(self, rotation: ArrayLike) -> None:
-        """Set q = (Λ - 1)(X - X̄) and leave the mass centre where it is; see `Body.turn`."""
+        """Set q = (Λ - 1)(X - X̄) and leave the mass center where it is; see `Body.turn`."""
         R = fitting(check_rotation(rotation), (), 2, "a rotation")
         arms = self.points - self._shares @ self.points
         self.q = (arms @ R.T - arms + self._shares @ self.displacement).ravel()
@@ -282,7 +282,7 @@ class FiniteElementBody(Deformable):
         return np.asarray(self._shares @ (self.points + self.displacement))
 
     def reference_center(self) -> Array:
-        """Return the mass centre (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
+        """Return the mass center (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
         return np.asarray(self._shares @ self.points)
 
     def linear_momentum(self) -> Array:

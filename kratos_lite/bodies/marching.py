@@ -9,23 +9,20 @@ from dataclasses import replace
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.arguments import positive_step, whole_number
-from kratos_lite.assembly import Progress
+from kratos_lite.bodies.batched import together
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.closing import start
+from kratos_lite.bodies.constraint_projection import start
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.many import together
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.bodies.schemes import take_step
 from kratos_lite.bodies.state import State
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers.blas import one_thread
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Progress
+from kratos_lite.validation import positive_step, whole_number
 
 _log = logging.getLogger("kratos_lite")
 STIFF = 15.0

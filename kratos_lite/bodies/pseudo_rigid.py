@@ -10,34 +10,33 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.given import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.bodies.linear_algebra import apply, transposed
 from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
-from kratos_lite.characteristics import Characteristics
+from kratos_lite.bodies.rotations import axial, check_rotation, hat
+from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.rotations import axial, check_rotation, hat
+from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 from kratos_lite.voigt import tensor
-
-Array = NDArray[np.float64]
 
 
 class PseudoRigidBody(Deformable):
     """A body that deforms homogeneously, or many independent ones.
 
-    q (..., 12): deformation gradient F row by row (F11 F12 F13 F21 …), then the mass centre x̄ in m.
-    u (..., 12): Ḟ row by row in 1/s, then the velocity of the mass centre in m/s.
+    q (..., 12): deformation gradient F row by row (F11 F12 F13 F21 …), then the mass center x̄ in m.
+    u (..., 12): Ḟ row by row in 1/s, then the velocity of the mass center in m/s.
     x = F (X - X̄) + x̄; the material is Saint Venant–Kirchhoff, S = C : E.
 
     Parameters
     ----------
-    mesh : the shape; may be left out where characteristics are given.
+    mesh : the shape; may be left out where mass_properties are given.
     material : one material (a body of several has no single C).
-    characteristics : mass, volume, centre and Euler tensor in place of those of mesh and material.
+    mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
     damping : η in s.
 
@@ -62,7 +61,7 @@ class PseudoRigidBody(Deformable):
         mesh: Mesh | None = None,
         material: Material | None = None,
         *,
-        characteristics: Characteristics | None = None,
+        mass_properties: MassProperties | None = None,
         scheme: str | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-12,
@@ -73,17 +72,17 @@ class PseudoRigidBody(Deformable):
             (material,) = material.values()
         if not isinstance(material, LinearMaterial):
             raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
-        if characteristics is None:
+        if mass_properties is None:
             if mesh is None:
-                raise InputError("a pseudo-rigid body needs a mesh, or its characteristics")
-            characteristics = Characteristics.of(mesh_of(mesh).points, elements_of(mesh, material))
-        characteristics.check_deformable()
-        lead = np.shape(characteristics.mass)
+                raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
+            mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
+        mass_properties.check_deformable()
+        lead = np.shape(mass_properties.mass)
         q = np.zeros((*lead, 12))
         q[..., [0, 4, 8]] = 1.0
-        q[..., 9:] = characteristics.center
+        q[..., 9:] = mass_properties.center
         self.C, self.tolerance = material.C, tolerance
-        super().__init__(mesh, material, characteristics, q, np.zeros((*lead, 12)), scheme, damping)
+        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 12)), scheme, damping)
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -124,7 +123,7 @@ class PseudoRigidBody(Deformable):
         self.q[..., :9] = R.reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
-        """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
+        """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
         lead = self.q.shape[:-1]
         w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
         self.u[..., 9:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
@@ -156,34 +155,34 @@ class PseudoRigidBody(Deformable):
 
     def times_mass(self, v: Array) -> Array:
         """Return V̇ E0 row by row and m v̄; see `Body.times_mass`."""
-        rows = (gradient_of(v) @ self.characteristics.euler).reshape(*v.shape[:-1], 9)
+        rows = (gradient_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
         return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
 
     # ---- deformation ----------------------------------------------------------------------------
 
     def internal_load(self, q: Array | None = None) -> Array:
-        """Return V P(F) row by row, and no force on the mass centre, (..., 12)."""
+        """Return V P(F) row by row, and no force on the mass center, (..., 12)."""
         F = (self.q if q is None else q)[..., :9]
         out = np.zeros((*F.shape[:-1], 12))
-        V = np.asarray(self.characteristics.volume)[..., None]
+        V = np.asarray(self.mass_properties.volume)[..., None]
         out[..., :9] = V * transposed(strain_operator(F), apply(self.C, green_strain(F)))
         return out
 
     def internal_energy(self) -> Array | float:
         """Return V ½ E : C : E, (...) in J."""
         E = green_strain(self.q[..., :9])
-        return np.asarray(self.characteristics.volume * (E * apply(self.C, E)).sum(axis=-1) / 2)
+        return np.asarray(self.mass_properties.volume * (E * apply(self.C, E)).sum(axis=-1) / 2)
 
     def stiffness(self, q: Array | None = None) -> Array:
         """Return V dP/dF (..., 9, 9), rows and columns as F in q."""
         F = (self.q if q is None else q)[..., :9]
-        B, V = strain_operator(F), np.asarray(self.characteristics.volume)[..., None, None]
+        B, V = strain_operator(F), np.asarray(self.mass_properties.volume)[..., None, None]
         stress = by_rows(tensor(apply(self.C, green_strain(F))))
         return np.asarray(V * (stress + np.swapaxes(B, -1, -2) @ self.C @ B))
 
     def mass_matrix(self) -> Array:
         """Return the mass of Ḟ, diag(E0, E0, E0) (..., 9, 9) in kg m²."""
-        return by_rows(self.characteristics.euler)
+        return by_rows(self.mass_properties.euler)
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b of one body, for columns b (12, k)."""
@@ -204,7 +203,7 @@ class PseudoRigidBody(Deformable):
 
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
         """Return Euler tensor, mass, volume, C and damping, as `steps` take them."""
-        c = self.characteristics
+        c = self.mass_properties
         return c.euler, c.mass, c.volume, self.C, self.damping
 
     def frequencies(self) -> Array:
@@ -230,7 +229,7 @@ class PseudoRigidBody(Deformable):
 
     def angular_momentum(self, about: ArrayLike | None = None) -> Array:
         """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s; see `Body`."""
-        H = gradient_of(self.u) @ self.characteristics.euler @ np.swapaxes(self.deformation, -1, -2)
+        H = gradient_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
         spin = 2 * axial(H)
         if about is None:
             return np.asarray(spin)

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
+from kratos_lite.typing import Array
 from kratos_lite.voigt import PAIRS, tensor
-
-Array = NDArray[np.float64]
 
 NEWTON_STEPS = 50
 

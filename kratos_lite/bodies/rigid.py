@@ -1,4 +1,4 @@
-"""RigidBody: a rotation and the place of the mass centre; Obstacle: one that nothing moves.
+"""RigidBody: a rotation and the place of the mass center; Obstacle: one that nothing moves.
 
 Source: Solfec-1.0 theory, rigid bodies.
 """
@@ -12,31 +12,30 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.bodies.rigid_step import rotation
-from kratos_lite.characteristics import Characteristics
+from kratos_lite.bodies.rotations import axial, check_rotation, hat
+from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.rotations import axial, check_rotation, hat
-
-Array = NDArray[np.float64]
+from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 
 class RigidBody(Body):
     """A body that keeps its shape, or many independent ones.
 
-    q (..., 12): rotation Λ column by column (Λ11 Λ21 Λ31 Λ12 …), then the mass centre x̄ in m.
-    u (..., 6): referential angular velocity W in rad/s, then the velocity of the mass centre in m/s.
+    q (..., 12): rotation Λ column by column (Λ11 Λ21 Λ31 Λ12 …), then the mass center x̄ in m.
+    u (..., 6): referential angular velocity W in rad/s, then the velocity of the mass center in m/s.
     x = Λ (X - X̄) + x̄.
 
     Parameters
     ----------
-    mesh : the shape; may be left out where characteristics are given.
+    mesh : the shape; may be left out where mass_properties are given.
     material : its density counts.
-    characteristics : mass, centre and inertia in place of those of mesh and material; with leading axes for
+    mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
         many bodies at once.
     scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
         ``RIG_IMP`` (momentum exact, symmetric in time).
@@ -64,20 +63,20 @@ class RigidBody(Body):
         mesh: Mesh | None = None,
         material: Material | None = None,
         *,
-        characteristics: Characteristics | None = None,
+        mass_properties: MassProperties | None = None,
         scheme: str | None = None,
         tolerance: float = 1e-14,
     ) -> None:
-        if characteristics is None:
+        if mass_properties is None:
             if mesh is None or material is None:
-                raise InputError(f"a {self.kind} body needs a mesh and a material, or its characteristics")
-            characteristics = Characteristics.of(mesh_of(mesh).points, elements_of(mesh, material))
-        lead = np.shape(characteristics.mass)
+                raise InputError(f"a {self.kind} body needs a mesh and a material, or its mass_properties")
+            mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
+        lead = np.shape(mass_properties.mass)
         q = np.zeros((*lead, 12))
         q[..., [0, 4, 8]] = 1.0
-        q[..., 9:] = characteristics.center
+        q[..., 9:] = mass_properties.center
         self.tolerance = tolerance
-        super().__init__(mesh, material, characteristics, q, np.zeros((*lead, 6)), scheme)
+        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 6)), scheme)
 
     def default_scheme(self) -> str:
         """Return ``RIG_NEG``."""
@@ -124,7 +123,7 @@ class RigidBody(Body):
         self.q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
-        """Set the velocity of the mass centre in m/s and the spatial angular velocity in rad/s."""
+        """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
         lead = self.q.shape[:-1]
         w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
         self.u[..., 3:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
@@ -156,7 +155,7 @@ class RigidBody(Body):
 
     def times_mass(self, v: Array) -> Array:
         """Return J W and m v̄; see `Body.times_mass`."""
-        spin = (self.characteristics.inertia @ v[..., :3, None])[..., 0]
+        spin = (self.mass_properties.inertia @ v[..., :3, None])[..., 0]
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
     def coast(self, h: float, count: int) -> None:
@@ -168,7 +167,7 @@ class RigidBody(Body):
 
     def step_constants(self) -> tuple[Array, Array, Array]:
         """Return inertia, its inverse and mass, as `steps` take them."""
-        return self.characteristics.inertia, self._inverse, self.characteristics.mass
+        return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Callable[[Array], Array]:
         """Return what solves M x = b; see `Body`."""
@@ -180,7 +179,7 @@ class RigidBody(Body):
 
     @cached_property
     def _inverse(self) -> Array:
-        return np.asarray(np.linalg.inv(self.characteristics.inertia), dtype=float)
+        return np.asarray(np.linalg.inv(self.mass_properties.inertia), dtype=float)
 
     # ---- momenta ---------------------------------------------------------------------------------
 
@@ -223,15 +222,15 @@ class Obstacle(RigidBody):
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
         from kratos_lite.materials import Isotropic3D
 
-        shape = Characteristics.of(
+        shape = MassProperties.of(
             mesh_of(mesh).points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))
         )
-        super().__init__(mesh, material, characteristics=shape)
+        super().__init__(mesh, material, mass_properties=shape)
 
     @property
     def mass(self) -> Array:
         """Return 0: an obstacle carries no mass."""
-        return np.zeros_like(self.characteristics.mass)
+        return np.zeros_like(self.mass_properties.mass)
 
     def coast(self, h: float, count: int) -> None:
         """Move on with the velocity as it is; see `RigidBody.coast`."""

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
-from kratos_lite.rotations import exp, hat, right_jacobian
-
-Array = NDArray[np.float64]
+from kratos_lite.bodies.rotations import exp, hat, right_jacobian
+from kratos_lite.typing import Array
 
 NEWTON_STEPS = 50
 ROUND_OFF = 4e-16

@@ -13,17 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.closing import Solve, Step, close
+from kratos_lite.bodies.constraint_projection import Solve, Step, close
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.errors import SolveError
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 NEWTON_MAX = 50
 """Iterations of one step; a step that needs more is too long."""
 SLOW = 0.2
@@ -31,7 +30,7 @@ SLOW = 0.2
 
 
 def rigid_step(body: RigidBody, h: float, v: Array) -> Array:
-    """Advance a rigid body by h s, loaded as by the velocity v; return the generalised load at the middle."""
+    """Advance a rigid body by h s, loaded as by the velocity v; return the generalized load at the middle."""
     qh = steps.rigid_half(body.q, body.u, h)
     load = body.external_load(qh, body.time + h / 2, v)
 

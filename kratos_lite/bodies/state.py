@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
 from kratos_lite.io.output import read_arrays, write_arrays
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 FIELDS = ("kind", "q", "u", "time", "step", "external_work")
 
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import solvers
-from kratos_lite.assembly import Progress
-from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.supports import Reduction
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from kratos_lite.solvers.supports import ConstraintMap
+from kratos_lite.typing import Array, Ints, Progress
 
 INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
@@ -168,10 +164,10 @@ def _newton_eliminated(
     prescribed[dof] = -gap / value
     free = np.ones(body.dofs, dtype=bool)
     free[dof] = False
-    reduced = Reduction(np.flatnonzero(free), prescribed)
+    reduced = ConstraintMap(np.flatnonzero(free), prescribed)
     method, reason = solvers.choose("auto", len(reduced.free), body.dofs)
     matrix: Any = K if method != "dense" else K.scipy().toarray()
-    step = solvers.Equations(matrix, reduced, body.points, method, reason).solve(residual, 1e-12).x
+    step = solvers.LinearSolver(matrix, reduced, body.points, method, reason).solve(residual, 1e-12).x
     reaction = (K @ step - residual)[dof] / value
     twice = np.bincount(dof, minlength=body.dofs)[dof]
     return step, np.asarray(reaction / twice)
@@ -187,7 +183,7 @@ def _newton_sparse(
     H = csr_array((value, (row, dof)), shape=(c, n)) * size
     soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
     A = block_array([[K.scipy(), H.T], [H, soft]], format="csr") if c else K.scipy().tocsr()
-    x = solvers.direct.factorise(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
+    x = solvers.direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
     return x[:n], -x[n:] * size
 
 

@@ -4,8 +4,8 @@ All functions take one body or many through leading axes, advance q and u in pla
 (`native/motion.cpp`) where the kernel was built and the arrays are C-contiguous float64; then results do
 not depend on the number of threads.  What is written here in NumPy is the reference.
 
-Rigid:        q (..., 12) = rotation R column-wise, centre x;  u (..., 6) = referential angular velocity W, v.
-Pseudo-rigid: q (..., 12) = deformation gradient F row-wise, centre x;  u (..., 12) = their rates.
+Rigid:        q (..., 12) = rotation R column-wise, center x;  u (..., 6) = referential angular velocity W, v.
+Pseudo-rigid: q (..., 12) = deformation gradient F row-wise, center x;  u (..., 12) = their rates.
 
 A load is conjugate to u: referential torque and force, or f_i A_j of a force f at A row-wise and the force.
 What a body is made of (inertia, mass, …) and constant loads are given for each body, or once for all.
@@ -19,16 +19,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies import pseudo_step, rigid_step
 from kratos_lite.bodies.linear_algebra import apply, transposed
 from kratos_lite.bodies.rigid_step import rotation, set_rotation
+from kratos_lite.bodies.rotations import exp
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
-from kratos_lite.rotations import exp
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 RIGID_SCHEMES = ("RIG_POS", "RIG_NEG", "RIG_IMP")
 PSEUDO_SCHEMES = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")

@@ -83,7 +83,7 @@ SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
 
 
 SCHEMES = (
-    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalised_alpha[:RHO] or "
+    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or "
     "central_difference (newmark, the trapezoidal rule)"
 )
 RESTART = (
@@ -168,7 +168,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
     ale.add_argument(
         "--rotation", metavar="AXIS:RATE[:ACCELERATION]", help="about x, y, z or X,Y,Z, in rad/s and rad/s²"
     )
-    ale.add_argument("--centre", "--center", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
+    ale.add_argument("--center", "--center", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
     ale.add_argument(
         "--stiffening", action="store_true", help="add the stiffness that the centrifugal stress gives"
     )
@@ -204,7 +204,7 @@ def _add_march(commands: object) -> None:
     out = march.add_argument_group("output (instead of the files that the scene names)")
     for key, text in (
         ("pvd", "states for ParaView: an index, and OUT_00000.vtu … beside it"),
-        ("csv", "a table of energies, momenta and the mass centre"),
+        ("csv", "a table of energies, momenta and the mass center"),
         ("npz", "configurations and velocities of all states as arrays"),
         ("picture", "the body along its path, and its energies"),
         ("state", "the last state, for --restart; written after Ctrl-C too"),
@@ -295,7 +295,7 @@ def _discard_output() -> None:
 
 def _join_negative(arguments: Sequence[str]) -> list[str]:
     """Join ``--gravity -9.81,0,0`` and the like to one word, which argparse would take for another option."""
-    numeric = ("--gravity", "--centre", "--center", "--rotation", "--translation", "--rayleigh", "--march")
+    numeric = ("--gravity", "--center", "--center", "--rotation", "--translation", "--rayleigh", "--march")
     joined: list[str] = []
     for word in arguments:
         if joined and joined[-1] in numeric and word[:1] == "-":

@@ -19,10 +19,10 @@ ROOT = Path(__file__).resolve().parents[2]
 """The source checkout, if the package is used from one."""
 
 if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.result import Result
     from kratos_lite.io.document import Document
     from kratos_lite.mesh import Mesh
-    from kratos_lite.model import Model
-    from kratos_lite.result import Result
 
 
 class TerminalProgress:
@@ -162,7 +162,7 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
 
     All are checked, before any work is done.
     """
-    from kratos_lite.io.results import check_picture, check_result_ending
+    from kratos_lite.io.writers.results import check_picture, check_result_ending
 
     if Path(options.output or given.get("output", "")).suffix.lower() in (".pvd", ".csv", ".npz"):
         path = options.output or given["output"]

@@ -13,10 +13,10 @@ import numpy as np
 from kratos_lite.bodies import Body, State
 from kratos_lite.cli.targets import check_targets
 from kratos_lite.errors import InputError
-from kratos_lite.io.results import check_picture
 from kratos_lite.io.scenes.describe import body_lines, line, vector
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene, read_scene
-from kratos_lite.io.trajectory import Series, make_folder, trajectory_picture
+from kratos_lite.io.writers.results import check_picture
+from kratos_lite.io.writers.trajectory import Series, make_folder, trajectory_picture
 
 SERIES = ("pvd", "csv", "npz")
 
@@ -147,9 +147,9 @@ def _summary(start: _Totals, end: _Totals, largest: float, seconds: float, dampe
         ("external work", f"{end.work - start.work:.7g} J, of all loads, gravity too, and of reactions"),
         balance,
         ("linear momentum", f"{vector(end.linear)} kg m/s"),
-        ("angular momentum", f"{vector(end.angular)} kg m²/s about the mass centre"),
+        ("angular momentum", f"{vector(end.angular)} kg m²/s about the mass center"),
     ]
     if end.center is not None:
-        rows.append(("mass centre", f"{vector(end.center)} m"))
+        rows.append(("mass center", f"{vector(end.center)} m"))
     rows.append(("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"))
     return [line(name, text) for name, text in rows]

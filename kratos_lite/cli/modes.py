@@ -6,7 +6,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from kratos_lite.model import Model
+    from kratos_lite.analysis.model import Model
 
 
 def modes_table(model: Model, count: int) -> str:

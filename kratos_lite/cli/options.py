@@ -9,8 +9,8 @@ from kratos_lite.errors import InputError
 
 if TYPE_CHECKING:
     from kratos_lite.ale import Motion
+    from kratos_lite.analysis.model import Model
     from kratos_lite.materials import LinearMaterial
-    from kratos_lite.model import Model
 
 MARCHING = ("scheme", "rayleigh", "lumped", "restart", "state")
 """Options that say how a model marches."""
@@ -109,7 +109,7 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
     if turns and passes:
         raise InputError("--rotation and --translation: a model has one motion; give one of them")
-    for option, owner in (("centre", "rotation"), ("stiffening", "rotation"), ("ends", "translation")):
+    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("ends", "translation")):
         if getattr(options, option) and not getattr(options, owner):
             raise InputError(f"--{option} belongs to --{owner}; give that too")
     text, option = turns or passes, "--rotation" if turns else "--translation"
@@ -121,8 +121,8 @@ def motion(model: Model, options: Namespace) -> Motion | None:
     try:
         if passes:
             return Translation(*rates, ends=options.ends or "absorbing", damping=damping)
-        centre = vector(options.centre, "--centre") if options.centre else (0.0, 0.0, 0.0)
-        return Rotation(*rates, centre=centre, stiffening=options.stiffening, damping=damping)
+        center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
+        return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
     except InputError as error:
         raise InputError(f"{option} {text}: {error}") from None
 
@@ -142,7 +142,7 @@ def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
 
 def apply(model: Model, options: Namespace) -> None:
     """Add the materials, supports and loads of the command line to a model."""
-    from kratos_lite.loads import Gravity, PointLoad, Pressure, Traction
+    from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
 
     given = [material(text) for text in options.material]
     for part, law in sorted(given, key=lambda pair: pair[0] is not None):  # the special wins over the general

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.assembly import Progress
+from kratos_lite.analysis.result import vector
 from kratos_lite.cli.options import apply, material, number
 from kratos_lite.cli.targets import check_json, check_targets
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.files import load
 from kratos_lite.io.project.march import NO_RESULT, SERIES, scheme_of
-from kratos_lite.io.results import check_picture
 from kratos_lite.io.scene import March, Scene
-from kratos_lite.io.trajectory import Series, make_folder
-from kratos_lite.result import vector
+from kratos_lite.io.writers.results import check_picture
+from kratos_lite.io.writers.trajectory import Series, make_folder
+from kratos_lite.typing import Progress
 
 if TYPE_CHECKING:
-    from kratos_lite.dynamics import Moment, Transient
+    from kratos_lite.analysis import Moment, Transient
 
 WIDTH = 22
 

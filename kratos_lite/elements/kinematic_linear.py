@@ -14,15 +14,14 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
 from kratos_lite.errors import MeshError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry, remembered
 from kratos_lite.shapes import Shape
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""

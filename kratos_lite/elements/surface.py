@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.shapes import Shape
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 
 def face_rule(shape: type[Shape]) -> Rule:

@@ -15,12 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.elements.kinematic_linear import KinematicLinear
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 
 class Motion(NamedTuple):

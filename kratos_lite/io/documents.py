@@ -32,19 +32,19 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
     if kind == ".mdpa":
-        from kratos_lite.io.mdpa.reader import read_mdpa
+        from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
         return read_mdpa(path, strict=strict)
     stem = "" if path.is_file() else path.name  # "." has no name to put an ending to
     is_stem = stem and any(path.with_name(stem + s).is_file() for s in (".elem", ".node"))
     if kind in ELEM_SET or is_stem:
-        from kratos_lite.io.elem import read_elem
+        from kratos_lite.io.formats.elem import read_elem
 
         return read_elem(path)
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file in it")
-    from kratos_lite.io.bridge import read_meshio
+    from kratos_lite.io.formats.meshio import read_meshio
 
     return read_meshio(path)

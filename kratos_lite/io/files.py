@@ -12,9 +12,9 @@ from kratos_lite.io.kratos import model_from
 from kratos_lite.io.scene import Scene
 
 if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
     from kratos_lite.io.document import Document
     from kratos_lite.mesh import Mesh
-    from kratos_lite.model import Model
 
 
 def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Model:
@@ -55,10 +55,10 @@ def write(path: str | Path, thing: Any) -> list[str]:
     list of str
         What the format cannot hold and was left out.
     """
+    from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.result import Result
     from kratos_lite.io.document import Document
     from kratos_lite.mesh import Mesh
-    from kratos_lite.model import Model
-    from kratos_lite.result import Result
 
     if isinstance(thing, Result):
         thing.save(path)
@@ -87,24 +87,24 @@ def write_document(path: str | Path, document: Document) -> list[str]:
     """Write a document by the ending of `path`; return notes on what the format cannot hold."""
     kind = ending(path)
     if kind == ".mdpa":
-        from kratos_lite.io.mdpa.writer import write_mdpa
+        from kratos_lite.io.formats.mdpa.writer import write_mdpa
 
         return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
     if kind in ELEM_SET:
-        from kratos_lite.io.elem import write_elem
+        from kratos_lite.io.formats.elem import write_elem
 
         return [str(note) for note in write_elem(path, document)]
     if kind in ("", ".json"):
         raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
-    from kratos_lite.io.results import mesh_fields
+    from kratos_lite.io.writers.results import mesh_fields
 
     points, cells = mesh_fields(document.mesh)
     if kind == ".vtu":
-        from kratos_lite.io.vtu import write_vtu
+        from kratos_lite.io.formats.vtu import write_vtu
 
         write_vtu(path, document.mesh, points, cells)
     else:
-        from kratos_lite.io.bridge import write_meshio
+        from kratos_lite.io.formats.meshio import write_meshio
 
         write_meshio(path, document.mesh, points, cells)
     return _left_out(kind, document)

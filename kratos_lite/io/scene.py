@@ -7,19 +7,19 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from kratos_lite.arguments import flag, positive_step, whole_number
-from kratos_lite.assembly import Progress
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
 from kratos_lite.errors import ModelError
-from kratos_lite.loads import NodalForces, Timed
-from kratos_lite.model import Model
-from kratos_lite.result import Result
+from kratos_lite.model.loads import NodalForces, Timed
+from kratos_lite.typing import Progress
+from kratos_lite.validation import flag, positive_step, whole_number
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from kratos_lite.dynamics import CentralDifference, Moment, Transient
-    from kratos_lite.dynamics.schemes import Implicit
+    from kratos_lite.analysis import CentralDifference, Moment, Transient
+    from kratos_lite.analysis.schemes import Implicit
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class March:
         flag(self.lumped, "lumped")
 
     def __str__(self) -> str:
-        from kratos_lite.dynamics import newmark
+        from kratos_lite.analysis import newmark
 
         scheme = newmark() if self.scheme is None else self.scheme
         return f"{self.steps} steps of {self.dt:g} s by {scheme.name}"
@@ -93,7 +93,7 @@ class Scene:
 
         Raises ModelError where the input says nothing of a march, and the errors of `kratos_lite.Transient`.
         """
-        from kratos_lite.dynamics import Moment
+        from kratos_lite.analysis import Moment
 
         march = self._march()
         names = ("scheme", "rayleigh", "lumped", "displacement", "velocity")

@@ -8,12 +8,12 @@ from sys import float_info
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MaterialError
 from kratos_lite.registry import Registry
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 MAX_FLOAT = float_info.max
 
 MATERIALS: Registry[type[LinearMaterial]] = Registry("material")

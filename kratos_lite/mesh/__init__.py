@@ -3,8 +3,6 @@
 from kratos_lite.mesh.blocks import (
     NO_ROWS,
     Block,
-    Floats,
-    Ints,
     Part,
     distinct,
     rows_of_ids,
@@ -12,16 +10,17 @@ from kratos_lite.mesh.blocks import (
     with_rows,
     without_repeats,
 )
-from kratos_lite.mesh.connections import Faces, components, equal_sets
+from kratos_lite.mesh.faces import Faces, components, equal_sets
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
-from kratos_lite.mesh.topology import outward_signs
+from kratos_lite.mesh.orientation import outward_signs
+from kratos_lite.typing import Array, Ints
 
 __all__ = [
     "NO_ROWS",
+    "Array",
     "Block",
     "Faces",
-    "Floats",
     "Ints",
     "Located",
     "Mesh",

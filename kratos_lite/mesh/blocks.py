@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.shapes import Shape
+from kratos_lite.typing import Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
 
 

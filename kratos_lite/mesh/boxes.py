@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import Block, Floats, Ints
+from kratos_lite.mesh.blocks import Block
 from kratos_lite.shapes import Hexahedron8, Pyramid5, Shape, Tetrahedron4, Wedge6
+from kratos_lite.typing import Array, Ints
 
 BRANCHES = 8
 """Boxes that one box of the next level encloses."""
@@ -22,7 +23,7 @@ def is_solid(block: Block) -> bool:
     return block.shape is not None and block.shape.nodes.shape[1] == 3
 
 
-def cell_boxes(points: Floats, block: Block) -> tuple[Floats, Floats]:
+def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
     """Return lowest and highest coordinates (m, 3) that enclose the cells of a block of solids.
 
     A cell with straight edges lies among its corners.  A curved one deviates from it by at most
@@ -41,13 +42,13 @@ def cell_boxes(points: Floats, block: Block) -> tuple[Floats, Floats]:
     return low - margin, high + margin
 
 
-def _deviations(shape: type[Shape], X: Floats) -> Floats:
+def _deviations(shape: type[Shape], X: Array) -> Array:
     """Return how far the nodes beyond the corners of X (m, n, 3) lie off the straight cell, (m, n - c, 3)."""
     straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ X[:, : shape.corners]
     return np.asarray(X[:, shape.corners :] - straight)
 
 
-def curvature(shape: type[Shape], X: Floats) -> Floats:
+def curvature(shape: type[Shape], X: Array) -> Array:
     """Return how far the nodes of cells X (m, n, 3) lie from the straight cell, (m,), as share of an edge.
 
     It is measured in reference coordinates, so stretching a cell does not change it; 0 for linear shapes.
@@ -68,7 +69,7 @@ class BoxTree:
     low, high : (n, 3) float, m; corners of the boxes; one with low > high contains nothing.
     """
 
-    def __init__(self, low: Floats, high: Floats) -> None:
+    def __init__(self, low: Array, high: Array) -> None:
         kept = np.flatnonzero((low <= high).all(axis=1))
         self.order = kept[np.argsort(_along_a_curve((low[kept] + high[kept]) / 2), kind="stable")]
         self.levels = [(_filled(low[self.order].T, np.inf), _filled(high[self.order].T, -np.inf))]
@@ -76,7 +77,7 @@ class BoxTree:
             low, high = (end.reshape(3, -1, BRANCHES) for end in self.levels[-1])
             self.levels.append((_filled(low.min(axis=2), np.inf), _filled(high.max(axis=2), -np.inf)))
 
-    def around(self, points: Floats) -> tuple[Ints, Ints]:
+    def around(self, points: Array) -> tuple[Ints, Ints]:
         """Return pairs of points and boxes that contain them, as rows of both, points in order."""
         at = np.arange(len(points))
         box = np.zeros(len(at), dtype=np.int64)
@@ -92,14 +93,14 @@ class BoxTree:
         return at, self.order[box]
 
 
-def _filled(ends: Floats, nowhere: float) -> Floats:
+def _filled(ends: Array, nowhere: float) -> Array:
     """Return ends of boxes (3, n) with as many empty boxes more as the next level needs, if there is one."""
     n = ends.shape[1]
     more = -n % BRANCHES if n > 1 else 1 - n
     return np.pad(ends, ((0, 0), (0, more)), constant_values=nowhere)
 
 
-def _along_a_curve(points: Floats) -> Ints:
+def _along_a_curve(points: Array) -> Ints:
     """Return numbers (n,) that sort points so that those near each other stand together.
 
     Source: Morton, A computer oriented geodetic data base (1966): the bits of the three coordinates in turn.

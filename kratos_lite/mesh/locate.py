@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.arguments import finite
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Floats, Ints, with_rows
+from kratos_lite.mesh.blocks import NO_ROWS, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.nearest import nearest_element
 from kratos_lite.shapes import Shape, inverse_map
 from kratos_lite.shapes.inverse import outside_by
+from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from kratos_lite.mesh.mesh import Mesh
 
-Mask = NDArray[np.bool_]
 
 POINTS_AT_ONCE = 2**14
 """Points that are searched for together, so that candidates take little memory."""
@@ -51,11 +51,11 @@ class Located:
     """
 
     mesh: Mesh
-    points: Floats
+    points: Array
     rows: Ints
     block: Ints
     cell: Ints
-    xi: Floats
+    xi: Array
 
     @property
     def inside(self) -> Mask:
@@ -89,7 +89,7 @@ class Located:
 
     # ---- values ------------------------------------------------------------------------------
 
-    def interpolate(self, nodal: ArrayLike) -> Floats:
+    def interpolate(self, nodal: ArrayLike) -> Array:
         """Return Σ N_a v_a at the points, (..., *), of nodal values v (n, *); nan outside the mesh."""
         values = np.asarray(nodal, dtype=float)
         if values.shape[:1] != (self.mesh.n_nodes,):
@@ -99,7 +99,7 @@ class Located:
             out[at] = np.einsum("ma,ma...->m...", N, values[nodes])
         return out.reshape((*self.rows.shape, *values.shape[1:]))
 
-    def spread(self, values: ArrayLike) -> Floats:
+    def spread(self, values: ArrayLike) -> Array:
         """Return nodal sums (n, *) of N_a times values (..., *) at the points: forces to nodes.
 
         It is the transpose of `interpolate`.
@@ -137,7 +137,7 @@ class Located:
         entries = np.concatenate([np.zeros(0), *(N.ravel() for _, _, N in shares)])
         return csr_array((entries, (rows, columns)), shape=(self.rows.size, self.mesh.n_nodes))
 
-    def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Floats]:
+    def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
         """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
 
         >>> from kratos_lite import box
@@ -149,7 +149,7 @@ class Located:
         ((_, nodes, N),) = one.require()._shares()
         return nodes[0].astype(np.int64), N[0]
 
-    def _shares(self) -> Iterator[tuple[Ints, NDArray[np.int32], Floats]]:
+    def _shares(self) -> Iterator[tuple[Ints, NDArray[np.int32], Array]]:
         """Yield, for each block, points (m,) in it, counted through, nodes (m, k) and N (m, k)."""
         numbers, cells, xi = np.ravel(self.block), np.ravel(self.cell), self.xi.reshape(-1, 3)
         for number, block in enumerate(self.mesh.blocks):
@@ -206,7 +206,7 @@ class _Search:
         """Return the number of the block of each element row."""
         return np.asarray(np.searchsorted(self.starts, rows, side="right") - 1)
 
-    def find(self, x: Floats) -> tuple[Ints, Floats]:
+    def find(self, x: Array) -> tuple[Ints, Array]:
         """Return element rows (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
         at, row = self.tree.around(x)
         distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
@@ -227,7 +227,7 @@ class _Search:
         self._try(x, at[lower][order], row[lower][order], found, xi)
         return found, xi
 
-    def _try(self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats) -> None:
+    def _try(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
         """Write row and xi of those points x[at] that lie in the elements in `rows`."""
         numbers = self.block_of(rows)
         hits, where = np.zeros(len(at), dtype=bool), np.zeros((len(at), 3))
@@ -238,11 +238,11 @@ class _Search:
                 hits[mine], where[mine] = inverse.inside, inverse.xi
         found[at[hits]], xi[at[hits]] = rows[hits], where[hits]
 
-    def _nodes(self, number: int, rows: Ints) -> Floats:
+    def _nodes(self, number: int, rows: Ints) -> Array:
         """Return the nodes (m, k, 3) of elements of a block."""
         return np.asarray(self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]])
 
-    def _retry(self, x: Floats, at: Ints, rows: Ints, found: Ints, xi: Floats) -> None:
+    def _retry(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
         numbers = self.block_of(rows)
         for number, block in enumerate(self.mesh.blocks):
@@ -265,7 +265,7 @@ class _Search:
                 hits = pairs[inverse.inside]
                 found[at[hits]], xi[at[hits]] = rows[hits], inverse.xi[inverse.inside]
 
-    def _near_edge(self, found: Ints, xi: Floats) -> Mask:
+    def _near_edge(self, found: Ints, xi: Array) -> Mask:
         """Return which points lie so near the boundary of their cell that others may contain them too."""
         near = np.zeros(len(found), dtype=bool)
         numbers = np.where(found >= 0, self.block_of(found), -1)
@@ -276,7 +276,7 @@ class _Search:
         return near
 
 
-def _starts(shape: type[Shape]) -> Floats:
+def _starts(shape: type[Shape]) -> Array:
     """Return points (k, 3) on the way from the centroid to each node."""
     middle = shape.nodes[: shape.corners].mean(axis=0)
     return np.asarray(middle + 0.8 * (shape.nodes - middle))

@@ -11,22 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh import topology
-from kratos_lite.mesh.blocks import (
-    NO_ROWS,
-    Block,
-    Floats,
-    Ints,
-    Part,
-    distinct,
-    rows_of_ids,
-    select,
-    without_repeats,
-)
-from kratos_lite.mesh.connections import Faces
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, distinct, rows_of_ids, select, without_repeats
+from kratos_lite.mesh.faces import Faces
 from kratos_lite.mesh.locate import Located, locate
+from kratos_lite.mesh.orientation import inside_out, mirror
+from kratos_lite.typing import Array, Ints
 
-Where: TypeAlias = "str | Callable[[Floats], ArrayLike] | ArrayLike"
+Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
 WhereElements: TypeAlias = "str | int | ArrayLike | None"
 """Elements by part name, by property id, by element rows, or all."""
@@ -59,7 +50,7 @@ class Mesh:
         source: str = "",
     ) -> None:
         try:
-            self.points: Floats = np.ascontiguousarray(points, dtype=float)
+            self.points: Array = np.ascontiguousarray(points, dtype=float)
         except (TypeError, ValueError):
             raise MeshError(f"points must be real numbers of shape (n, 3); got {points!r:.80}") from None
         if self.points.ndim != 2 or self.points.shape[1] != 3:
@@ -291,10 +282,10 @@ class Mesh:
         """Return the mesh with the node order of elements that are inside out turned around."""
         blocks = []
         for block in self.blocks:
-            turn = topology.inside_out(block, self.points)
+            turn = inside_out(block, self.points)
             nodes = block.nodes.copy()
             if turn.any() and block.shape is not None:
-                nodes[turn] = nodes[turn][:, topology.mirror(block.shape)]
+                nodes[turn] = nodes[turn][:, mirror(block.shape)]
             blocks.append(replace(block, nodes=nodes))
         return Mesh(
             self.points,

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import Floats, with_rows
+from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
 from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.mesh import Mesh
@@ -17,7 +18,7 @@ CANDIDATES = 32
 """Elements whose boxes are nearest and whose faces are looked at."""
 
 
-def nearest_element(mesh: Mesh, point: Floats) -> str:
+def nearest_element(mesh: Mesh, point: Array) -> str:
     """Return how far from a point (3,) the nearest element is: ``0.5 m from element 1 (…3D8N)``."""
     found = []
     for block, _ in with_rows(mesh.blocks):
@@ -34,7 +35,7 @@ def nearest_element(mesh: Mesh, point: Floats) -> str:
     return f"{distance:.3g} m from {place}"
 
 
-def distance_to_cell(shape: type[Shape], X: Floats, point: Floats) -> float:
+def distance_to_cell(shape: type[Shape], X: Array, point: Array) -> float:
     """Return the distance of a point (3,) from the boundary of a cell X (n, 3), to about six digits.
 
     A grid of points on the face is refined around the nearest of them.
@@ -42,7 +43,7 @@ def distance_to_cell(shape: type[Shape], X: Floats, point: Floats) -> float:
     return min(_distance_to_face(FACE_SHAPES[len(face)], X[list(face)], point) for face in shape.faces)
 
 
-def _distance_to_face(face: type[Shape], X: Floats, point: Floats) -> float:
+def _distance_to_face(face: type[Shape], X: Array, point: Array) -> float:
     middle, half, nearest = np.full(2, 0.5), 0.5, np.inf
     steps = np.stack(np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9)), axis=-1).reshape(-1, 2)
     while half > 1e-7:

@@ -8,13 +8,11 @@ from itertools import permutations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import gauss
 from kratos_lite.quadrature.base import Rule
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 __all__ = [
     "CELLS",

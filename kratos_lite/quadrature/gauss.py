@@ -5,9 +5,8 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 
 def legendre(n: int) -> tuple[Array, Array]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.registry import Registry
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 SHAPES: Registry[type[Shape]] = Registry("shape")
 """Every shape by its class name."""
@@ -20,7 +19,7 @@ class Shape:
 
     A subclass states the data below and writes two functions; it registers itself.
     Nodes stand in Kratos order: corners, then mid-edge nodes in the order of `edges`,
-    then face nodes, then the centre.
+    then face nodes, then the center.
 
     Attributes
     ----------
@@ -78,12 +77,12 @@ def quadratic_faces(
     faces: tuple[tuple[int, ...], ...],
     edges: tuple[tuple[int, int], ...],
     corners: int,
-    centres: tuple[int, ...] = (),
+    centers: tuple[int, ...] = (),
 ) -> tuple[tuple[int, ...], ...]:
-    """Append to each corner face its mid-edge nodes and, where given, its centre node."""
+    """Append to each corner face its mid-edge nodes and, where given, its center node."""
     middle = {frozenset(edge): corners + e for e, edge in enumerate(edges)}
     full = []
     for f, face in enumerate(faces):
         mids = tuple(middle[frozenset(pair)] for pair in zip(face, face[1:] + face[:1], strict=True))
-        full.append(face + mids + centres[f : f + 1])
+        full.append(face + mids + centers[f : f + 1])
     return tuple(full)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array, Shape, mid_edges
+from kratos_lite.shapes.base import Shape, mid_edges
 from kratos_lite.shapes.simplex import Linear, Quadratic
 from kratos_lite.shapes.tensor import Lagrange, Multilinear, Serendipity
+from kratos_lite.typing import Array
 
 _TRIANGLE = np.array([[0, 0], [1, 0], [0, 1]], dtype=float)
 _TRIANGLE_EDGES = ((0, 1), (1, 2), (2, 0))

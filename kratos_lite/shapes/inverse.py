@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.shapes.base import Array, Shape
+from kratos_lite.shapes.base import Shape
+from kratos_lite.typing import Array
 
 INSIDE = 1e-9
 """How far outside the reference cell a point still counts as inside, in reference coordinates."""

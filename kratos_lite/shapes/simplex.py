@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array, Shape
+from kratos_lite.shapes.base import Shape
+from kratos_lite.typing import Array
 
 
 def barycentric(xi: ArrayLike) -> tuple[Array, Array]:

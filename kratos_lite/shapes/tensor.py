@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array, Shape
+from kratos_lite.shapes.base import Shape
+from kratos_lite.typing import Array
 
 
 def _product(f: Array) -> Array:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Array, Shape, mid_edges, quadratic_faces
+from kratos_lite.shapes.base import Shape, mid_edges, quadratic_faces
 from kratos_lite.shapes.simplex import barycentric
+from kratos_lite.typing import Array
 
 _CORNERS = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0, 1], [0, 1, 1]], dtype=float)
 _EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))

@@ -1,11 +1,11 @@
 """Solvers: dense, sparse direct, and conjugate gradients with algebraic multigrid.
 
-`Equations` holds K and its supports, chooses a method and says why, and solves for as many right
+`LinearSolver` holds K and its supports, chooses a method and says why, and solves for as many right
 sides as asked.  Every answer carries its backward error |b - A x| / (|A| |x| + |b|) in the maximum
 norm: the size of the smallest change of A and b for which x would be exact.
 """
 
 from kratos_lite.solvers.common import Solution, backward_error, choose, matrix_norm
-from kratos_lite.solvers.equations import Equations
+from kratos_lite.solvers.linear_solver import LinearSolver
 
-__all__ = ["Equations", "Solution", "backward_error", "choose", "matrix_norm"]
+__all__ = ["LinearSolver", "Solution", "backward_error", "choose", "matrix_norm"]

@@ -1,8 +1,8 @@
-"""Matrices of one sparsity pattern, factorised and solved in every time step of a small body.
+"""Matrices of one sparsity pattern, factorized and solved in every time step of a small body.
 
 Nodes are renumbered once so that all entries lie near the diagonal; the place of every entry in the
-band is known from then on, and LAPACK factorises the band.  Where the band is so wide that a sparse
-factorisation takes less work, that one is taken.
+band is known from then on, and LAPACK factorizes the band.  Where the band is so wide that a sparse
+factorization takes less work, that one is taken.
 """
 
 from __future__ import annotations
@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
+from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from kratos_lite.assembly import Pattern
+    from kratos_lite.assembly.stiffness import Pattern
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 BAND_LIMIT = 16.0
 """Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
 BAND_NUMBERS = 50_000_000
@@ -31,14 +30,14 @@ BAND_NUMBERS = 50_000_000
 
 
 class Factors(Protocol):
-    """A factorised matrix A."""
+    """A factorized matrix A."""
 
     def solve(self, b: Array) -> Array:
         """Return x of A x = b, both (3n,) or (3n, k)."""
 
 
-class Factoriser:
-    """Factorises matrices (3n, 3n) of 3x3 node blocks that share a sparsity pattern.
+class Factorizer:
+    """Factorizes matrices (3n, 3n) of 3x3 node blocks that share a sparsity pattern.
 
     Parameters
     ----------
@@ -53,14 +52,14 @@ class Factoriser:
     Examples
     --------
     >>> import kratos_lite as kl
-    >>> from kratos_lite.assembly import Pattern, assemble_stiffness
+    >>> from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
     >>> model = kl.Model(kl.box((0.1, 0.1, 1.0), (1, 1, 9)), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> points, batches = model.mesh.points, model.batches()
-    >>> pattern = Pattern(len(points), [batch.nodes for batch in batches])
-    >>> A = assemble_stiffness(points, batches, pattern)
+    >>> points, groups = model.mesh.points, model.element_groups()
+    >>> pattern = Pattern(len(points), [group.nodes for group in groups])
+    >>> A = assemble_stiffness(points, groups, pattern)
     >>> add_scalar(A, np.full(len(points), 2.0), A.diagonal_blocks())
     >>> b = np.arange(120.0)
-    >>> bool(np.allclose(A @ Factoriser(pattern).factorise(A).solve(b), b))
+    >>> bool(np.allclose(A @ Factorizer(pattern).factorize(A).solve(b), b))
     True
     """
 
@@ -88,17 +87,17 @@ class Factoriser:
         self._from = kept[np.argsort(to[kept])]
         self._to = to[self._from]
 
-    def factorise(self, A: BlockMatrix) -> Factors:
+    def factorize(self, A: BlockMatrix) -> Factors:
         """Return the factors of a matrix with the pattern.
 
         Raises
         ------
         SolveError
             If the matrix is singular, or not positive definite though it should be; a sparse
-            factorisation may notice singular ones alone.
+            factorization may notice singular ones alone.
         """
         if self.method == "sparse":
-            return direct.factorise(A.scipy().tocsr(), symmetric=self.symmetric)
+            return direct.factorize(A.scipy().tocsr(), symmetric=self.symmetric)
         band = np.zeros(len(self._dofs) * self._height)
         band[self._to] = A.data.ravel().take(self._from)
         matrix = band.reshape(-1, self._height).T
@@ -150,14 +149,14 @@ class LU:
 
 
 def choose(n: int, width: int, height: int) -> tuple[str, str]:
-    """Return how to factorise n unknowns in a band of a width, stored in so many rows, and why.
+    """Return how to factorize n unknowns in a band of a width, stored in so many rows, and why.
 
     >>> choose(567, 44, 45)[0], choose(30_000, 4000, 4001)[0]
     ('band', 'sparse')
     """
     limit = int(BAND_LIMIT * np.sqrt(n))
     if width > limit:
-        return "sparse", f"width {width} > {limit}: a sparse factorisation takes less work"
+        return "sparse", f"width {width} > {limit}: a sparse factorization takes less work"
     if n * height > BAND_NUMBERS:
         return "sparse", f"{n * height} numbers > {BAND_NUMBERS}: a band takes too much memory"
     return "band", f"width {width} ≤ {limit}: a band is fastest"
@@ -210,7 +209,7 @@ def _orders(pattern: Pattern) -> Iterator[Ints]:
 def _layers(graph: csr_array, order: Ints) -> Ints:
     """Return the nodes by their distance from the face farthest from the last one of an order.
 
-    Within a layer they follow the mean place of their neighbours in the layer before.  The first layers
+    Within a layer they follow the mean place of their neighbors in the layer before.  The first layers
     of Cuthill–McKee, from one corner, are wider than those of a long body.
     """
     from scipy.sparse.csgraph import dijkstra

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.blockmatrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.native import kernels
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+from kratos_lite.typing import Array
 
 DENSE_LIMIT = 600
 """Up to this many unknowns a full matrix needs no sparse library at all."""
@@ -23,7 +19,7 @@ COMPILED_DENSE_LIMIT = 60
 DENSE_MAX = 10_000
 """Above this many degrees of freedom a full matrix is refused (it would take 0.8 GB several times)."""
 DIRECT_LIMIT = 10_000
-"""Up to this many unknowns factorising is the fastest sparse way."""
+"""Up to this many unknowns factorizing is the fastest sparse way."""
 METHODS = ("auto", "dense", "direct", "amg")
 
 
@@ -55,7 +51,7 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
     if compiled:
         return "amg", f"{unknowns} unknowns > {limit}: multigrid is fastest and takes least memory"
     if unknowns <= DIRECT_LIMIT:
-        return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorisation is fastest"
+        return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorization is fastest"
     if not symmetric:
         return "direct", "the matrix is not symmetric: conjugate gradients do not apply"
     return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"

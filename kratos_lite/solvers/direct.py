@@ -1,4 +1,4 @@
-"""Factorisations, made once and kept: dense for small matrices, sparse for larger ones.
+"""Factorizations, made once and kept: dense for small matrices, sparse for larger ones.
 
 Sparse ones come from MKL PARDISO where `pypardiso` is installed, which takes a tenth of the time
 and half the memory, and else from SuperLU, which comes with SciPy.
@@ -12,26 +12,25 @@ from typing import TYPE_CHECKING, Any
 from weakref import finalize
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import SolveError
+from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Array = NDArray[np.float64]
 NO_MEMORY = -2
-"""PARDISO's error code for too little memory; the others mean a matrix it cannot factorise."""
+"""PARDISO's error code for too little memory; the others mean a matrix it cannot factorize."""
 REPLACED_PIVOTS = 14
 """PARDISO's parameter (from 1) that counts pivots too small to divide by."""
 
 
 class Unsuitable(Exception):
-    """A way of factorising that is not installed, or does not do for a matrix."""
+    """A way of factorizing that is not installed, or does not do for a matrix."""
 
 
-class Factorisation:
-    """A factorised matrix A.
+class Factorization:
+    """A factorized matrix A.
 
     Attributes
     ----------
@@ -41,7 +40,7 @@ class Factorisation:
 
     Examples
     --------
-    >>> factors = factorise_dense(np.array([[2.0, 0.0], [0.0, 4.0]]))
+    >>> factors = factorize_dense(np.array([[2.0, 0.0], [0.0, 4.0]]))
     >>> factors.method, factors.solve(np.array([1.0, 1.0]))
     ('dense', array([0.5 , 0.25]))
     """
@@ -58,8 +57,8 @@ class Factorisation:
         return np.asarray(x + self.apply(b - self.A @ x))
 
 
-def factorise_dense(A: Array) -> Factorisation:
-    """Return a full matrix (n, n) factorised: its inverse, as NumPy alone keeps no other factors.
+def factorize_dense(A: Array) -> Factorization:
+    """Return a full matrix (n, n) factorized: its inverse, as NumPy alone keeps no other factors.
 
     Raises
     ------
@@ -70,11 +69,11 @@ def factorise_dense(A: Array) -> Factorisation:
         inverse = np.linalg.inv(A)
     except np.linalg.LinAlgError:
         raise singular() from None
-    return Factorisation("dense", A, lambda b: np.asarray(inverse @ b))
+    return Factorization("dense", A, lambda b: np.asarray(inverse @ b))
 
 
-def factorise(A: csr_array, symmetric: bool = True) -> Factorisation:
-    """Return a sparse matrix (n, n) factorised, by the fastest of `BACKENDS` that does.
+def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
+    """Return a sparse matrix (n, n) factorized, by the fastest of `BACKENDS` that does.
 
     Parameters
     ----------
@@ -88,18 +87,18 @@ def factorise(A: csr_array, symmetric: bool = True) -> Factorisation:
     """
     for backend in BACKENDS:
         try:
-            return Factorisation(backend.__name__, A, backend(A, symmetric))
+            return Factorization(backend.__name__, A, backend(A, symmetric))
         except Unsuitable:
             continue
         except MemoryError:
             raise SolveError(
-                f"not enough memory to factorise {A.shape[0]} unknowns; use solver='amg' or a coarser mesh"
+                f"not enough memory to factorize {A.shape[0]} unknowns; use solver='amg' or a coarser mesh"
             ) from None
     raise singular()
 
 
 def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
-    """Factorise with MKL PARDISO: Cholesky with nested dissection, or LU for a matrix that is not symmetric.
+    """Factorize with MKL PARDISO: Cholesky with nested dissection, or LU for a matrix that is not symmetric.
 
     Where a pivot is not positive (Cholesky) or had to be replaced (LU), SuperLU has to say whether A is
     singular.
@@ -126,7 +125,7 @@ def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
 
 
 def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
-    """Factorise with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
+    """Factorize with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
     from scipy.sparse.linalg import splu
 
     options: dict[str, Any] = {"permc_spec": "COLAMD"}
@@ -149,4 +148,4 @@ def singular(detail: str = "") -> SolveError:
 
 
 BACKENDS: tuple[Callable[[csr_array, bool], Callable[[Array], Array]], ...] = (pardiso, superlu)
-"""Ways to factorise a sparse matrix, fastest first; each returns b -> x, or raises Unsuitable."""
+"""Ways to factorize a sparse matrix, fastest first; each returns b -> x, or raises Unsuitable."""

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+from kratos_lite.typing import Array, Progress
+
 MAX_ITERATIONS = 1000
 """A multigrid that needs more than these does not converge."""
 STALLED = 200

@@ -13,17 +13,14 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.blockmatrix import BlockMatrix, LinearLevel
+from kratos_lite.assembly.block_matrix import BlockMatrix, LinearLevel
 from kratos_lite.native import kernels
 from kratos_lite.solvers.blas import one_thread
-from kratos_lite.solvers.common import Progress
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
-from kratos_lite.supports import rigid_modes
+from kratos_lite.solvers.supports import rigid_modes
+from kratos_lite.typing import Array, Mask, Progress
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 GoOn = Callable[[float], bool]
 
 DEGREE = 2

@@ -5,15 +5,14 @@ from __future__ import annotations
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.rules import VOLUME
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 Element = type[KinematicLinear]
 
 C_ISOTROPIC = Isotropic3D(E=2.0, nu=0.3).C

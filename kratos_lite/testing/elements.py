@@ -10,7 +10,7 @@ from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import Shape
-from kratos_lite.supports import rigid_modes
+from kratos_lite.solvers.supports import rigid_modes
 from kratos_lite.testing import patches
 from kratos_lite.testing.cells import C_ISOTROPIC, affine, anisotropic, distorted, linear_field, rotations
 from kratos_lite.testing.report import Finding, Measured, difference, failures, run, run_after, worst
@@ -236,10 +236,10 @@ def body_force(element: Element) -> Measured:
     """Check that a constant body force adds up to V b and has no moment about the centroid."""
     X, V = affine(element)
     b = np.array([1.0, -2.0, 3.0])
-    centre = element(X).gauss_points().T @ element(X).dV / V
+    center = element(X).gauss_points().T @ element(X).dV / V
     f = element(X).body_force(b)
     force = difference(f.sum(axis=0), V * b)
-    moment = float(np.abs(np.cross(X - centre, f).sum(axis=0)).max() / (V * np.abs(b).max()))
+    moment = float(np.abs(np.cross(X - center, f).sum(axis=0)).max() / (V * np.abs(b).max()))
     nodal = difference(element(X).body_force(np.tile(b, (len(X), 1))), f)
     text = f"total against V b: {force:.3g}; moment: {moment:.3g}; nodal b against constant b: "
     return Measured(float(np.max([force, moment, nodal])), 1e-13, text + f"{nodal:.3g}")

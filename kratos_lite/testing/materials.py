@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.materials import Isotropic3D, LinearMaterial
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, difference, run, worst
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 STRAIN = 1e-3 * np.array([1.0, -0.7, 0.4, 0.9, -0.3, 0.6])
 """A strain whose components are told apart by size and sign."""

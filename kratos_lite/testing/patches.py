@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.surface import area_vectors
-from kratos_lite.generate import SPLITS, box, raise_order
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.generators import SPLITS, box, raise_order
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.report import Measured
+from kratos_lite.typing import Array, Ints
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Element = type[KinematicLinear]
 
 MATERIAL = Isotropic3D(E=1e6, nu=0.25)

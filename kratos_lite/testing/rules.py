@@ -6,13 +6,11 @@ from itertools import product
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.quadrature import CELLS, Rule
 from kratos_lite.shapes.inverse import outside_by
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, run, run_after, worst
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 VOLUME = {
     "point": 1.0, "line": 2.0, "triangle": 1 / 2, "quadrilateral": 4.0,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.shapes import (
     FACE_SHAPES,
@@ -19,8 +18,7 @@ from kratos_lite.shapes import (
 )
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, at, run, run_after, worst
 from kratos_lite.testing.rules import exponents, monomial
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
 
 REFERENCE: dict[str, type[Shape]] = {
     shape.cell: shape
@@ -234,7 +232,7 @@ def bounded(shape: type[Shape]) -> Measured | str:
     """Check that N is continuous and dN bounded at and beside every node, such as the apex of a pyramid."""
     (n, d), h, usual = shape.nodes.shape, 1e-8, np.abs(gradients(shape, inside(shape, 40))).max(initial=0.0)
     if d == 0:
-        return "a point has no neighbourhood"
+        return "a point has no neighborhood"
     targets = inside(shape, 8)
     near = (shape.nodes[:, None] + h * (targets - shape.nodes[:, None])).reshape(-1, d)
     jump = np.abs(values(shape, near).reshape(n, -1, n) - values(shape, shape.nodes)[:, None]).max()
@@ -264,9 +262,9 @@ def faces(shape: type[Shape]) -> Measured | str:
         return "only solids have faces"
     wrong = [] if shape.faces else ["the shape lists no faces"]
     directed: dict[tuple[int, int], int] = {}
-    centre = shape.nodes[: shape.corners].mean(axis=0)
+    center = shape.nodes[: shape.corners].mean(axis=0)
     for f, face in enumerate(shape.faces):
-        wrong += [f"face {f} {face} {why}" for why in _face_problems(shape, face, centre)]
+        wrong += [f"face {f} {face} {why}" for why in _face_problems(shape, face, center)]
         ring = [a for a in face if a < shape.corners]
         for edge in zip(ring, ring[1:] + ring[:1], strict=True):
             directed[edge] = directed.get(edge, 0) + 1
@@ -276,14 +274,14 @@ def faces(shape: type[Shape]) -> Measured | str:
     return Measured(len(wrong), 0, wrong[0] if wrong else "no fault in the faces")
 
 
-def _face_problems(shape: type[Shape], face: tuple[int, ...], centre: Array) -> list[str]:
+def _face_problems(shape: type[Shape], face: tuple[int, ...], center: Array) -> list[str]:
     if len(face) not in FACE_SHAPES or len(face) < 3:
         return [f"has {len(face)} nodes; faces have 3, 4, 6, 8 or 9"]
     kind, X = FACE_SHAPES[len(face)], shape.nodes[list(face)]
     c = kind.corners
     normal = sum(np.cross(X[i], X[(i + 1) % c]) for i in range(c))
     problems = []
-    if not (X[:c].mean(axis=0) - centre) @ normal > 0:
+    if not (X[:c].mean(axis=0) - center) @ normal > 0:
         problems.append("has its nodes clockwise from outside; write them counter-clockwise")
     on_plane = np.abs((shape.nodes - X[0]) @ normal) < 1e-9
     if set(np.flatnonzero(on_plane).tolist()) != set(face):

@@ -1,4 +1,4 @@
-"""Pictures: bodies deformed and coloured, in motion, and reference cells with node numbers."""
+"""Pictures: bodies deformed and colored, in motion, and reference cells with node numbers."""
 
 from kratos_lite.view.canvas import check_picture_target
 from kratos_lite.view.cells import OBLIQUE, element_picture

@@ -1,4 +1,4 @@
-"""Canvas: all that needs matplotlib; figures without a screen, polygons, lines and colour bars."""
+"""Canvas: all that needs matplotlib; figures without a screen, polygons, lines and color bars."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.io.output import write_whole
-from kratos_lite.mesh import Floats
+from kratos_lite.typing import Array
 
 
 def _canvas() -> Any:
@@ -69,8 +69,8 @@ def save_figure(path: str | Path, figure: Any) -> None:
     write_whole(path, lambda file: figure.savefig(file, format=kind, bbox_inches="tight", pad_inches=0.1))
 
 
-def colours_of(value: Floats) -> tuple[Any, Floats]:
-    """Return the scale of the colour bar and the colour of each value."""
+def colors_of(value: Array) -> tuple[Any, Array]:
+    """Return the scale of the color bar and the color of each value."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -83,31 +83,31 @@ def colours_of(value: Floats) -> tuple[Any, Floats]:
     return shown, np.asarray(shown.to_rgba(value))
 
 
-def colour_bar(figure: Any, axes: Any, colours: Any, unit: str) -> None:
-    """Draw the colour bar with one prefix for all its numbers."""
+def color_bar(figure: Any, axes: Any, colors: Any, unit: str) -> None:
+    """Draw the color bar with one prefix for all its numbers."""
     from matplotlib.ticker import EngFormatter, FuncFormatter
 
-    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colours.get_clim()))) / 3), -24, 24))
+    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colors.get_clim()))) / 3), -24, 24))
     shown = FuncFormatter(lambda value, _: f"{value / 10.0**power:g}")
-    bar = figure.colorbar(colours, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
+    bar = figure.colorbar(colors, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
     prefix = EngFormatter.ENG_PREFIXES[power]
     bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
     bar.outline.set_visible(False)
 
 
-def polygons(axes: Any, corners: Floats, colours: Floats, widths: Floats) -> None:
-    """Draw flat polygons (m, k, 2) in their order, each edged in its own colour (m, 4)."""
+def polygons(axes: Any, corners: Array, colors: Array, widths: Array) -> None:
+    """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
     axes.add_collection(
-        PolyCollection(flat, facecolors=colours, edgecolors=colours, linewidths=widths, zorder=2)
+        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=widths, zorder=2)
     )
 
 
-def lines(axes: Any, ends: Floats, colour: str = "0.55", width: float = 0.8) -> None:
+def lines(axes: Any, ends: Array, color: str = "0.55", width: float = 0.8) -> None:
     """Draw thin lines (m, 2, 2) behind everything else."""
     from matplotlib.collections import LineCollection
 
     pieces: Any = ends
-    axes.add_collection(LineCollection(pieces, colors=colour, linewidths=width, zorder=1))
+    axes.add_collection(LineCollection(pieces, colors=color, linewidths=width, zorder=1))

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Floats
 from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array
 from kratos_lite.view.canvas import new_figure, save_figure
 
-OBLIQUE: Floats = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
+OBLIQUE: Array = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
 """Rows: right, up and towards the viewer; no two corners of a cube fall on one another."""
 
 
@@ -42,7 +42,7 @@ def element_picture(path: str | Path, shape: type[Shape], points: ArrayLike | No
     d = shape.nodes.shape[1]
     view = OBLIQUE if d == 3 else np.eye(3)
 
-    def flat(x: Floats) -> Floats:
+    def flat(x: Array) -> Array:
         return np.pad(x, ((0, 0), (0, 3 - d))) @ view[:2].T
 
     X = flat(shape.nodes)
@@ -67,7 +67,7 @@ def element_picture(path: str | Path, shape: type[Shape], points: ArrayLike | No
     save_figure(path, figure)
 
 
-def _triad(axes: Any, X: Floats, directions: Floats) -> None:
+def _triad(axes: Any, X: Array, directions: Array) -> None:
     """Draw the reference axes below and to the left of a cell."""
     length = 0.2 * np.ptp(X, axis=0).max()
     low = X.min(axis=0) - 1.2 * length

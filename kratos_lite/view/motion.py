@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Floats, Mesh
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
 from kratos_lite.view.canvas import new_figure, new_figure_with_curves, save_figure
 from kratos_lite.view.surface import ISOMETRIC, PLAIN, draw, fineness, visible
 
 FADED = 0.25
-"""Strength of the colours of the first position; the last has 1."""
+"""Strength of the colors of the first position; the last has 1."""
 PATH = "#c8442b"
 
 
 def motion_picture(
     path: str | Path,
     mesh: Mesh,
-    positions: Sequence[Floats],
-    centers: Floats,
-    times: Floats,
-    curves: Mapping[str, Floats],
+    positions: Sequence[Array],
+    centers: Array,
+    times: Array,
+    curves: Mapping[str, Array],
     *,
     title: str = "",
     unit: str = "J",
@@ -40,7 +41,7 @@ def motion_picture(
     path : picture to write; .png, .pdf or .svg.
     mesh : the elements.
     positions : of the nodes, each (n, 3) in m, in the order of time.
-    centers : (k, 3) m, path of the mass centre.
+    centers : (k, 3) m, path of the mass center.
     times : (k,) s.
     curves : (k,) numbers against time by name.
     title : above the picture.
@@ -72,7 +73,7 @@ def motion_picture(
     save_figure(path, figure)
 
 
-def _draw_curves(below: Any, times: Floats, curves: Mapping[str, Floats], unit: str) -> None:
+def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array], unit: str) -> None:
     """Draw curves against time; a sum is dashed, as it may lie on one of its parts."""
     for name, values in curves.items():
         style = {"ls": (0, (4, 3)), "color": "0.15", "lw": 1.2} if name == "sum" else {"lw": 1.8}
@@ -83,7 +84,7 @@ def _draw_curves(below: Any, times: Floats, curves: Mapping[str, Floats], unit: 
         below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _label_times(axes: Any, positions: Sequence[Floats], times: Floats, near: float) -> None:
+def _label_times(axes: Any, positions: Sequence[Array], times: Array, near: float) -> None:
     """Write the times of the first and the last position beneath them; as one text if these are one."""
     ends = [x @ ISOMETRIC[:2].T for x in (positions[0], positions[-1])]
     feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{times[i]:.3g} s" for i in (0, -1)]
@@ -96,7 +97,7 @@ def _label_times(axes: Any, positions: Sequence[Floats], times: Floats, near: fl
         )
 
 
-def _triad(axes: Any, drawn: Floats) -> None:
+def _triad(axes: Any, drawn: Array) -> None:
     """Draw the three axes, of one length that is written to them, left of and below what is drawn."""
     (left, low), extent = drawn.min(axis=0), float(np.ptp(drawn, axis=0).max())
     power = 10.0 ** np.floor(np.log10(0.2 * extent))
@@ -108,11 +109,11 @@ def _triad(axes: Any, drawn: Floats) -> None:
     axes.text(*(start - (0, 0.5 * length)), f"{length:g} m", ha="center", va="top", size=9, color="0.25")
 
 
-def _body(axes: Any, mesh: Mesh, x: Floats, strength: float, n: int, edged: bool) -> None:
-    """Draw one position over those before it, its colours mixed with white."""
+def _body(axes: Any, mesh: Mesh, x: Array, strength: float, n: int, edged: bool) -> None:
+    """Draw one position over those before it, its colors mixed with white."""
     drawn = [visible(block, x, np.zeros(len(x)), n) for block in mesh.boundary]
     P, light, _, E = (np.concatenate(arrays) for arrays in zip(*drawn, strict=True))
-    colours = np.ones((len(P), 4))
-    colours[:, :3] -= strength * (1 - np.array(PLAIN) * light[:, None])
+    colors = np.ones((len(P), 4))
+    colors[:, :3] -= strength * (1 - np.array(PLAIN) * light[:, None])
     ink = np.array([0.1, 0.1, 0.15, 0.55 * strength])
-    draw(axes, P, colours, E if edged else E[:0], ink)
+    draw(axes, P, colors, E if edged else E[:0], ink)

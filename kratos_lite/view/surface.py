@@ -1,4 +1,4 @@
-"""Pictures of bodies: the surface in isometric view, deformed and coloured."""
+"""Pictures of bodies: the surface in isometric view, deformed and colored."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Block, Floats, Mesh
+from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
-from kratos_lite.view.canvas import colour_bar, colours_of, lines, new_figure, polygons, save_figure
+from kratos_lite.typing import Array
+from kratos_lite.view.canvas import color_bar, colors_of, lines, new_figure, polygons, save_figure
 
-ISOMETRIC: Floats = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
+ISOMETRIC: Array = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
 """Rows: right, up and towards the viewer."""
 PLAIN = (0.62, 0.72, 0.84)
-"""Colour of a body without values."""
-LIGHT: Floats = np.array([0.35, -0.65, 0.67])
+"""Color of a body without values."""
+LIGHT: Array = np.array([0.35, -0.65, 0.67])
 UNITS = {
     "STRESS": "Pa",
     "PRESSURE": "Pa",
@@ -42,16 +43,16 @@ def picture(
     scale: float | None = None,
     size: tuple[float, float] = (8, 6),
 ) -> None:
-    """Draw the surface of a body, deformed and coloured, in isometric view.
+    """Draw the surface of a body, deformed and colored, in isometric view.
 
     Parameters
     ----------
     path : picture to write; .png, .pdf or .svg.
     mesh : points in m and element blocks.
     displacement : (n, 3) m; the undeformed edges are drawn thin.
-    values : (n,) numbers on the nodes that colour the surface.
+    values : (n,) numbers on the nodes that color the surface.
     title : first line above the picture.
-    unit : of `values`, at the colour bar; found from the title if it names a variable that we know.
+    unit : of `values`, at the color bar; found from the title if it names a variable that we know.
     scale : factor on the displacement; by default at least 1, the largest being a tenth of the body.
     size : largest width and height in inches, at 150 dots per inch.
 
@@ -80,17 +81,17 @@ def picture(
         lines(axes, _outline(mesh))
         X = X + scale * u
     field = None if values is None else _numbers("values", values, (mesh.n_nodes,))
-    colours = _paint(axes, mesh.boundary, X, field)
+    colors = _paint(axes, mesh.boundary, X, field)
     _rulers(axes, mesh.points, X)
-    if colours is not None:
+    if colors is not None:
         if unit is None:
             unit = next((unit for word, unit in UNITS.items() if word in title.upper()), "")
-        colour_bar(figure, axes, colours, unit)
+        color_bar(figure, axes, colors, unit)
     axes.set_title(title, fontsize=11)
     save_figure(path, figure)
 
 
-def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Floats:
+def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Array:
     array = np.asarray(given, dtype=float)
     if array.shape != shape:
         raise InputError(f"{name} must have shape {shape}; got {array.shape}")
@@ -99,7 +100,7 @@ def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Floats:
     return array
 
 
-def _exaggeration(X: Floats, u: Floats) -> float:
+def _exaggeration(X: Array, u: Array) -> float:
     """Return 1, 2 or 5 times a power of ten, at least 1, that makes the displacement a tenth of the body."""
     largest = np.linalg.norm(u, axis=1).max()
     if largest == 0:
@@ -111,7 +112,7 @@ def _exaggeration(X: Floats, u: Floats) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
 
-def _facets(cell: str, n: int) -> tuple[Floats, NDArray[np.intp]]:
+def _facets(cell: str, n: int) -> tuple[Array, NDArray[np.intp]]:
     """Return grid points on a reference face, and the corners of its n² facets."""
     steps = np.linspace(0, 1, n + 1)
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -124,14 +125,14 @@ def _facets(cell: str, n: int) -> tuple[Floats, NDArray[np.intp]]:
     return grid, np.vstack([np.stack([a, b, d, d], -1)[lower], np.stack([b, c, d, d], -1)[upper]])
 
 
-def _rim(shape: type[Shape], n: int) -> Floats:
+def _rim(shape: type[Shape], n: int) -> Array:
     """Return the pieces of the edges of a reference face, (edges · n, 2, 2)."""
     t = np.linspace(0, 1, n + 1)[:, None]
     pieces = [(1 - t) * shape.nodes[a] + t * shape.nodes[b] for a, b in shape.edges]
     return np.array([pair for line in pieces for pair in pairwise(line)])
 
 
-def visible(block: Block, X: Floats, field: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats]:
+def visible(block: Block, X: Array, field: Array, n: int) -> tuple[Array, Array, Array, Array]:
     """Return of the facets that face the viewer: corners, light, value; and the edges of their faces."""
     assert block.shape is not None
     xi, corners = _facets(block.shape.cell, n)
@@ -147,14 +148,14 @@ def visible(block: Block, X: Floats, field: Floats, n: int) -> tuple[Floats, Flo
     return P[front], light, value, rim.reshape(-1, 2, 3)
 
 
-def _paint(axes: Any, boundary: list[Block], X: Floats, field: Floats | None) -> Any:
-    """Draw facets and element edges from back to front; return what the colour bar shows."""
+def _paint(axes: Any, boundary: list[Block], X: Array, field: Array | None) -> Any:
+    """Draw facets and element edges from back to front; return what the color bar shows."""
     n, edged = fineness(sum(map(len, boundary)))
     drawn = [visible(block, X, np.zeros(len(X)) if field is None else field, n) for block in boundary]
     P, light, value, E = (np.concatenate(arrays) for arrays in zip(*drawn, strict=True))
-    shown, colours = (None, np.tile([*PLAIN, 1], (len(P), 1))) if field is None else colours_of(value)
-    colours[:, :3] *= light[:, None]
-    draw(axes, P, colours, E if edged else E[:0])
+    shown, colors = (None, np.tile([*PLAIN, 1], (len(P), 1))) if field is None else colors_of(value)
+    colors[:, :3] *= light[:, None]
+    draw(axes, P, colors, E if edged else E[:0])
     return shown
 
 
@@ -163,8 +164,8 @@ def fineness(count: int) -> tuple[int, bool]:
     return int(np.clip(np.sqrt(MANY / max(count, 1)), 1, 16)), count < MANY
 
 
-def draw(axes: Any, P: Floats, colours: Floats, E: Floats, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)) -> None:
-    """Draw facets (m, 4, 3) in colours (m, 4) and edges (k, 2, 3) in ink from back to front."""
+def draw(axes: Any, P: Array, colors: Array, E: Array, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)) -> None:
+    """Draw facets (m, 4, 3) in colors (m, 4) and edges (k, 2, 3) in ink from back to front."""
     E = E[:, [0, 1, 1, 0]]
     near = P @ ISOMETRIC[2]
     # An edge lies on top of the facets beside it, however these lean.
@@ -172,12 +173,12 @@ def draw(axes: Any, P: Floats, colours: Floats, E: Floats, ink: ArrayLike = (0.1
     order = np.argsort(
         np.concatenate([near.mean(axis=1), E.mean(axis=1) @ ISOMETRIC[2] + above]), kind="stable"
     )
-    both = np.vstack([colours, np.tile(ink, (len(E), 1))])[order]
+    both = np.vstack([colors, np.tile(ink, (len(E), 1))])[order]
     widths = np.repeat([0.4, 0.5], [len(P), len(E)])[order]
     polygons(axes, np.concatenate([P, E])[order] @ ISOMETRIC[:2].T, both, widths)
 
 
-def _outline(mesh: Mesh) -> Floats:
+def _outline(mesh: Mesh) -> Array:
     """Return the sharp edges of the undeformed body, (m, 2, 2) in the picture."""
     pairs, normals = [], []
     for block in mesh.boundary:
@@ -196,7 +197,7 @@ def _outline(mesh: Mesh) -> Floats:
     return np.asarray(mesh.points[unique[sharp]] @ ISOMETRIC[:2].T)
 
 
-def _rulers(axes: Any, X: Floats, moved: Floats) -> None:
+def _rulers(axes: Any, X: Array, moved: Array) -> None:
     """Draw the extent of the body along x, y and z beside its lower and left edges, clear of `moved`."""
     low, high = X.min(axis=0), X.max(axis=0)
     beyond = max(0.0, float((low - moved.min(axis=0)).max()), float((moved.max(axis=0) - high).max()))

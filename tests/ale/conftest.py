@@ -8,9 +8,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices
-from kratos_lite.assembly import Pattern
+from kratos_lite.assembly.stiffness import Pattern
 from kratos_lite.elements.surface import area_vectors, face_rule
-from kratos_lite.mass import Mass
+from kratos_lite.solvers.mass import Mass
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 
@@ -38,16 +38,16 @@ def bar(element: str, n: int, half: float = 10.0, tied: str = "") -> kl.Model:
     for section in np.unique(x) if tied == "all" else np.unique(x)[:-1] if tied else []:
         first, *others = np.flatnonzero(x == section).tolist()
         for node in others:
-            model.link((node, "x"), {(first, "x"): 1.0})
+            model.constrain((node, "x"), {(first, "x"): 1.0})
     return model
 
 
 def matrices(motion: kl.ale.Motion, model: kl.Model) -> SimpleNamespace:
     """Return M, G, S, H as full matrices (n, n) of the motion in a model, and its loads."""
-    batches, points = model.batches(), model.mesh.points
-    pattern = Pattern(len(points), [batch.nodes for batch in batches])
-    mass = Mass(points, batches, pattern, False)
-    terms = MotionMatrices(motion, points, batches, pattern, mass)
+    groups, points = model.element_groups(), model.mesh.points
+    pattern = Pattern(len(points), [group.nodes for group in groups])
+    mass = Mass(points, groups, pattern, False)
+    terms = MotionMatrices(motion, points, groups, pattern, mass)
     unit = np.eye(len(points))
     full = {name: terms.times(getattr(terms, name), unit) for name in "GSH"}
     return SimpleNamespace(terms=terms, M=mass.scalar.toarray(), **full)

@@ -5,8 +5,8 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.dynamics import EquationsOfMotion
-from kratos_lite.dynamics.modal import critical_rate, reduced
+from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.modal import critical_rate, reduced
 
 ANTIPLANE = [180.108469387701, 225.729859510629, 323.298640126683, 434.583943383590, 547.913923852690]
 INPLANE = [92.603470580, 178.757457325, 198.549756141, 271.030562452, 332.796300827, 323.505740705]
@@ -24,7 +24,7 @@ def antiplane(wheels, element, radial, around):
         master = place.get(tuple(np.round(mesh.points[i, :2], 9)))
         assert master is not None
         if not model.supports.fixed[i, 2]:
-            model.link((int(i), "z"), {(master, "z"): 1.0})
+            model.constrain((int(i), "z"), {(master, "z"): 1.0})
     return model
 
 
@@ -123,7 +123,7 @@ def test_periodic_window_has_its_discrete_symbol(share, wheels):
 @pytest.mark.parametrize("rate", [0.0, 1e-3])
 def test_repeated_frequencies_are_found_at_rest(rate, monkeypatch):
     """Waves come in pairs that a slow rate splits by n times itself."""
-    from kratos_lite.dynamics import modal
+    from kratos_lite.analysis import modal
 
     monkeypatch.setattr(modal, "DENSE_MODES", 100)
     model = kl.Model(kl.annulus(0.1, 0.3, 0.02, (2, 16, 1)), kl.Isotropic3D(210e9, 0.3, 7850.0))

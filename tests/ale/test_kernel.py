@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import inertia
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.matrices import exact_rule
-from kratos_lite.assembly import Pattern
+from kratos_lite.assembly import inertia
+from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.stiffness import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.inertia import inertia_matrices
-from kratos_lite.mass import Mass
 from kratos_lite.native import kernels
+from kratos_lite.solvers.mass import Mass
 
 compiled = pytest.mark.skipif(kernels("inertia") is None, reason="the compiled kernels were not built")
 KINDS = (4, 5, 6, 8, 10, 13, 15, 20, 27)
@@ -23,16 +23,16 @@ VELOCITY = np.random.default_rng(1).uniform(-1, 1, (3, 4))
 
 
 def parts(kind, cells=(3, 2, 3), amount=0.05):
-    """Return points, batches and pattern of a distorted box of two materials."""
+    """Return points, groups and pattern of a distorted box of two materials."""
     mesh = kl.box((1.1, 0.9, 1.3), cells, f"KinematicLinear3D{kind}N")
     mesh.points += amount / max(cells) * np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
     light, heavy = (kl.Isotropic3D(E=1.0, nu=0.3, density=density) for density in (2.0, 700.0))
     block = mesh.blocks[0]
     block.properties[len(block.nodes) // 3 :] = 2
     model = kl.Model(mesh, {1: light, 2: heavy})
-    batches = model.batches()
-    assert len(batches) == 2
-    return mesh.points, batches, Pattern(mesh.n_nodes, [batch.nodes for batch in batches])
+    groups = model.element_groups()
+    assert len(groups) == 2
+    return mesh.points, groups, Pattern(mesh.n_nodes, [group.nodes for group in groups])
 
 
 def fine(element):
@@ -74,9 +74,9 @@ def test_threads_change_no_bit(kind):
 
 @pytest.mark.parametrize("names", ["M", "G", "H", "MG", "GH"])
 def test_only_what_is_asked_for_is_made_and_nothing_else_changes(names):
-    points, batches, pattern = parts(8)
-    every = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
-    some = inertia_matrices(points, batches, pattern, names, fine, VELOCITY)
+    points, groups, pattern = parts(8)
+    every = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
+    some = inertia_matrices(points, groups, pattern, names, fine, VELOCITY)
     assert "".join(some) == names
     for name in names:
         np.testing.assert_array_equal(some[name], every[name])
@@ -103,8 +103,8 @@ def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
 @pytest.mark.parametrize("changed", ["scalar_mass", "_gauss", "gauss_points"])
 def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed, monkeypatch):
     base = KinematicLinear
-    points, batches, pattern = parts(8)
-    plain = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
+    points, groups, pattern = parts(8)
+    plain = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
     ways = {
         "scalar_mass": lambda self, density=1.0: 2 * base.scalar_mass(self, density),
         "_gauss": property(lambda self: (2 * base._gauss.func(self)[0], *base._gauss.func(self)[1:])),
@@ -112,7 +112,7 @@ def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed
     }
     factors = {"scalar_mass": (2, 1, 1), "_gauss": (1, 2, 2), "gauss_points": (1, None, None)}[changed]
     monkeypatch.setattr(kl.KinematicLinear3D8N, changed, ways[changed])
-    own = inertia_matrices(points, batches, pattern, "MGH", fine, VELOCITY)
+    own = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
     for name, factor in zip("MGH", factors, strict=True):
         if factor:
             assert_close({name: own[name]}, {name: factor * plain[name]}, 1e-14)
@@ -121,24 +121,24 @@ def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed
 
 
 def test_velocity_is_linear_in_its_numbers():
-    points, batches, pattern = parts(10)
+    points, groups, pattern = parts(10)
 
     def made(velocity):
-        return inertia_matrices(points, batches, pattern, "GH", fine, velocity)
+        return inertia_matrices(points, groups, pattern, "GH", fine, velocity)
 
     moved = VELOCITY.copy()
     moved[:, 3] += VELOCITY[:, :3] @ (1.0, 2.0, 3.0)
-    again = inertia_matrices(points - (1.0, 2.0, 3.0), batches, pattern, "GH", fine, moved)
+    again = inertia_matrices(points - (1.0, 2.0, 3.0), groups, pattern, "GH", fine, moved)
     assert_close(again, made(VELOCITY), 1e-13)
     assert_close(made(-2 * VELOCITY), {"G": -2 * made(VELOCITY)["G"], "H": 4 * made(VELOCITY)["H"]}, 1e-14)
 
 
 @pytest.mark.parametrize(
-    "motion", [Rotation("z", 1.0, centre=(1e3, 2e3, 0.0)), Translation((1.0, 2.0, 2.0), 1.0)]
+    "motion", [Rotation("z", 1.0, center=(1e3, 2e3, 0.0)), Translation((1.0, 2.0, 2.0), 1.0)]
 )
 def test_matrices_of_a_motion_act_on_linear_fields_as_they_must(motion):
-    points, batches, pattern = parts(27, amount=0.0)
-    terms = MotionMatrices(motion, points, batches, pattern, Mass(points, batches, pattern, False))
+    points, groups, pattern = parts(27, amount=0.0)
+    terms = MotionMatrices(motion, points, groups, pattern, Mass(points, groups, pattern, False))
     c, mass = motion.field(points), terms.mass.scalar
     np.testing.assert_allclose(
         terms.times(terms.G, points), mass @ c, rtol=0, atol=1e-12 * abs(mass @ c).max()
@@ -148,10 +148,8 @@ def test_matrices_of_a_motion_act_on_linear_fields_as_they_must(motion):
 
 
 def test_both_matrices_of_a_motion_are_made_in_one_pass(monkeypatch):
-    points, batches, pattern = parts(8)
-    terms = MotionMatrices(
-        Rotation("z", 1.0), points, batches, pattern, Mass(points, batches, pattern, False)
-    )
+    points, groups, pattern = parts(8)
+    terms = MotionMatrices(Rotation("z", 1.0), points, groups, pattern, Mass(points, groups, pattern, False))
     asked = []
 
     def counted(*arguments):

@@ -6,9 +6,9 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.ale.matrices import exact_rule
+from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.quadrature import rule_for
-from kratos_lite.rotations import exp
 
 KINDS = list(kl.ELEMENTS)
 UNIT = kl.Isotropic3D(E=1.0, nu=0.3, density=1.0)
@@ -89,7 +89,7 @@ def test_unit_simplex(wheels):
 # ---- what holds on any mesh ------------------------------------------------------------------------
 
 MOTIONS = {
-    "rotation": Rotation((1.0, 2.0, -0.5), centre=(0.3, -4.0, 1.0)),
+    "rotation": Rotation((1.0, 2.0, -0.5), center=(0.3, -4.0, 1.0)),
     "translation": Translation((1.0, -0.4, 0.3)),
 }
 
@@ -127,13 +127,13 @@ def test_linear_fields_on_affine_cells(kind, wheels):
 
 def mass_by_the_same_rule(model: kl.Model) -> np.ndarray:
     """Return ∫ ρ N_i N_j by the rule of the motion, (n, n)."""
-    (batch,), n = model.batches(), model.mesh.n_nodes
-    rule = exact_rule(batch.element.shape)
-    dV = batch.element(model.mesh.points[batch.nodes], rule)._gauss[0]
-    N = np.array([batch.element.shape.N(xi) for xi in rule.points])
-    local = batch.material.density * (N.T * dV[:, None, :]) @ N
+    (group,), n = model.element_groups(), model.mesh.n_nodes
+    rule = exact_rule(group.element.shape)
+    dV = group.element(model.mesh.points[group.nodes], rule)._gauss[0]
+    N = np.array([group.element.shape.N(xi) for xi in rule.points])
+    local = group.material.density * (N.T * dV[:, None, :]) @ N
     out = np.zeros((n, n))
-    np.add.at(out, (batch.nodes[:, :, None], batch.nodes[:, None, :]), local)
+    np.add.at(out, (group.nodes[:, :, None], group.nodes[:, None, :]), local)
     return out
 
 
@@ -153,7 +153,7 @@ def test_second_derivative_inside(kind, wheels):
     inside = np.ones(mesh.n_nodes, dtype=bool)
     for part in ("x-", "x+", "y-", "y+", "z-", "z+"):
         inside[mesh.nodes(part)] = False
-    expected = m.M @ ((mesh.points - motion.centre) @ (L @ motion.A @ motion.A).T)
+    expected = m.M @ ((mesh.points - motion.center) @ (L @ motion.A @ motion.A).T)
     size = scaled(np.abs(m.H) @ np.abs(mesh.points @ L.T))
     assert scaled((m.H @ mesh.points @ L.T + expected)[inside]) <= 1e-13 * size
     assert scaled(expected[inside]) > 1e-6 * size
@@ -207,13 +207,13 @@ def test_the_rule_is_exact_on_affine_cells(kind, motion):
 
 @pytest.mark.parametrize("kind", ["KinematicLinear3D8N", "KinematicLinear3D10N"])
 def test_objectivity(kind, wheels):
-    """Mesh, axis and centre turned and shifted far away together: the same matrices, turned loads."""
+    """Mesh, axis and center turned and shifted far away together: the same matrices, turned loads."""
     R, shift = exp(np.array([0.4, -1.1, 0.7])), np.array([300.0, -200.0, 50.0])
     model, turned = distorted(kind), distorted(kind)
     turned.mesh.points[:] = model.mesh.points @ R.T + shift
-    axis, centre = np.array([1.0, 2.0, -0.5]), np.array([0.3, -0.1, 0.2])
-    a = wheels.matrices(Rotation(axis, centre=centre), model)
-    b = wheels.matrices(Rotation(R @ axis, centre=R @ centre + shift), turned)
+    axis, center = np.array([1.0, 2.0, -0.5]), np.array([0.3, -0.1, 0.2])
+    a = wheels.matrices(Rotation(axis, center=center), model)
+    b = wheels.matrices(Rotation(R @ axis, center=R @ center + shift), turned)
     for name in "GH":
         np.testing.assert_allclose(getattr(b, name), getattr(a, name), atol=1e-12 * scaled(getattr(a, name)))
     np.testing.assert_allclose(

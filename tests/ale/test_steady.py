@@ -6,7 +6,7 @@ from scipy.special import jv, yv
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.dynamics import EquationsOfMotion
+from kratos_lite.analysis import EquationsOfMotion
 
 E_PLANE, NU_PLANE = 210e6 / (1 - 0.3**2), 0.3 / 0.7
 A, B, RHO = 0.3, 1.0, 7620.0
@@ -116,13 +116,13 @@ def test_orders_of_growth(wheels):
 
 
 def test_long_cylinder(wheels):
-    """Free ends, the load alone: generalised plane strain, eps_z = -5.34e-3 at 30 rad/s."""
+    """Free ends, the load alone: generalized plane strain, eps_z = -5.34e-3 at 30 rad/s."""
     mesh = kl.annulus(A, B, 0.2, cells=(4, 24, 1), element="KinematicLinear3D20N")
     model = kl.Model(mesh, wheels.steel)
     model.fix("z-", "z")
     tops = mesh.nodes("z+")
     for node in tops[1:]:
-        model.link((int(node), "z"), {(int(tops[0]), "z"): 1.0})
+        model.constrain((int(node), "z"), {(int(tops[0]), "z"): 1.0})
     r, angle, *_ = wheels.polar(mesh, np.zeros_like(mesh.points))
     for k, axis in enumerate("yxyx"):
         model.fix((np.abs(np.angle(np.exp(1j * (angle - k * np.pi / 2)))) < 1e-9) & (r < A + 1e-9), axis)

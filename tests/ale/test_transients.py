@@ -1,4 +1,4 @@
-"""Moving bodies in time: another frame of reference, energy, travelling waves."""
+"""Moving bodies in time: another frame of reference, energy, traveling waves."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from scipy.sparse.linalg import splu, spsolve
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.dynamics import EquationsOfMotion
-from kratos_lite.loads import Varying
-from kratos_lite.rotations import exp
+from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.bodies.rotations import exp
+from kratos_lite.model.loads import Varying
 from kratos_lite.voigt import acoustic_tensor
 
 A = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -50,7 +50,7 @@ def reference(wheels):
     take = lambda full: np.kron(full, np.eye(3))[np.ix_(free, free)]  # noqa: E731
     M, S, H = (take(full) for full in (own.M, own.S, own.H))
     K, inverse = e.K.scipy().toarray()[np.ix_(free, free)], np.linalg.inv(M)
-    push = model.loads[0].load.forces(model.mesh, model.batches()).ravel()[free]
+    push = model.loads[0].load.forces(model.mesh, model.element_groups()).ravel()[free]
 
     def slope(t, y):
         u, v = y.reshape(2, -1)
@@ -66,7 +66,7 @@ def reference(wheels):
 
 @pytest.mark.parametrize(
     "scheme",
-    [kl.newmark(), kl.hht(-0.05), kl.hht(-0.3), kl.generalised_alpha(0.8), kl.generalised_alpha(0.3)],
+    [kl.newmark(), kl.hht(-0.05), kl.hht(-0.3), kl.generalized_alpha(0.8), kl.generalized_alpha(0.3)],
     ids=lambda scheme: scheme.name,
 )
 def test_order_two_while_the_rate_changes(scheme, wheels, reference):
@@ -109,7 +109,7 @@ def test_kinks_between_the_steps_give_the_whole_impulse(wheels):
     assert rates[-1] == 0.0
 
 
-@pytest.mark.parametrize("scheme", [kl.newmark(), kl.generalised_alpha(0.5)], ids=lambda scheme: scheme.name)
+@pytest.mark.parametrize("scheme", [kl.newmark(), kl.generalized_alpha(0.5)], ids=lambda scheme: scheme.name)
 def test_restarts_beside_a_kink_of_the_rate_are_bitwise(scheme, wheels, tmp_path):
     def spun_up():
         model = wheels.disk("8N", 1, 12)

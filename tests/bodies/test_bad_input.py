@@ -84,7 +84,7 @@ def test_no_mass(kind):
 
 def test_a_negative_mass():
     with pytest.raises(kl.ModelError, match="mass of a body must be > 0 kg; got -1"):
-        kl.RigidBody(characteristics=kl.Characteristics(mass=-1.0, inertia=np.eye(3)))
+        kl.RigidBody(mass_properties=kl.MassProperties(mass=-1.0, inertia=np.eye(3)))
 
 
 def test_a_node_without_mass():
@@ -94,17 +94,17 @@ def test_a_node_without_mass():
 
 def test_nothing_to_make_a_body_of():
     with pytest.raises(
-        kl.InputError, match="a rigid body needs a mesh and a material, or its characteristics"
+        kl.InputError, match="a rigid body needs a mesh and a material, or its mass_properties"
     ):
         kl.RigidBody()
-    with pytest.raises(kl.InputError, match="needs a mesh, or its characteristics"):
+    with pytest.raises(kl.InputError, match="needs a mesh, or its mass_properties"):
         kl.PseudoRigidBody(material=STEEL)
 
 
 def test_an_inertia_that_no_deformable_body_has():
-    top = kl.Characteristics(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0]), volume=1.0)
+    top = kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0]), volume=1.0)
     with pytest.raises(kl.ModelError, match="triangle inequality"):
-        kl.PseudoRigidBody(material=STEEL, characteristics=top)
+        kl.PseudoRigidBody(material=STEEL, mass_properties=top)
 
 
 @pytest.mark.parametrize(
@@ -247,7 +247,7 @@ def test_a_torque_on_a_body_that_deforms(kind, refused):
     "load", [kl.Traction("z+", (1, 0, 0)), kl.FollowerPressure("z+", 1.0), kl.BodyForce((1, 0, 0))]
 )
 def test_a_load_on_faces_of_a_body_without_a_mesh(load, refused):
-    body = kl.RigidBody(characteristics=kl.Characteristics(mass=1.0, inertia=np.eye(3)))
+    body = kl.RigidBody(mass_properties=kl.MassProperties(mass=1.0, inertia=np.eye(3)))
     refused(body, lambda body: body.add(load), kl.ModelError, "acts on .*mesh; this body has none")
 
 
@@ -255,7 +255,7 @@ def test_a_load_on_faces_of_a_body_without_a_mesh(load, refused):
 @pytest.mark.parametrize(
     ("function", "words"),
     [
-        (lambda q, u, t: np.zeros(5), "a callback must return a generalised force of shape"),
+        (lambda q, u, t: np.zeros(5), "a callback must return a generalized force of shape"),
         (lambda q, u, t: np.full_like(u, NAN), "what a callback returns at t = .* must be finite"),
     ],
 )
@@ -343,7 +343,7 @@ def test_units_that_may_be_wrong_are_told(kind, E, density, speed, caplog):
 
 @pytest.mark.parametrize(("E", "density"), [(1e3, 1000.0), (1050e9, 3510.0), (1.0, 0.0)])  # jelly, diamond
 def test_sound_units_leave_no_doubt(E, density):
-    from kratos_lite.checks import check_wave_speeds
+    from kratos_lite.model.checks import check_wave_speeds
 
     assert check_wave_speeds([kl.Isotropic3D(E, 0.2, density)]) == []
 
@@ -355,7 +355,7 @@ def test_a_constraint_holds_one_body(refused):
 
 
 def test_many_bodies_take_no_constraint(refused):
-    many = kl.RigidBody(characteristics=kl.Characteristics.box([[1.0, 1, 1]] * 2, [1.0, 1.0]))
+    many = kl.RigidBody(mass_properties=kl.MassProperties.box([[1.0, 1, 1]] * 2, [1.0, 1.0]))
     refused(many, lambda body: body.constrain(kl.FixPoint((0, 0, 0))), kl.ModelError, "one by one")
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.rotations import exp
+from kratos_lite.bodies.rotations import exp
 
 SPIN, FLIGHT = (0.05, 10, 0.05), (1, 2, 3)
 KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
@@ -100,6 +100,6 @@ def test_a_word_is_a_kind_too(kind, brick):
 
 
 def test_a_body_without_a_mesh_stays_what_it_is():
-    top = kl.RigidBody(characteristics=kl.Characteristics(mass=1.0, inertia=np.eye(3)))
+    top = kl.RigidBody(mass_properties=kl.MassProperties(mass=1.0, inertia=np.eye(3)))
     with pytest.raises(kl.ModelError, match="only a single body with a mesh and a material"):
         kl.convert(top, kl.PseudoRigidBody)

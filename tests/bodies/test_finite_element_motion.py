@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.rotations import exp
 
 SCHEMES = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")
 each_scheme = pytest.mark.parametrize("scheme", SCHEMES)
 SPIN, FLIGHT, G = (0.05, 10, 0.05), (1, 2, 3), (0, 0, -9.81)
 MOMENTUM = np.array([1.36, 232, 0.52])
-"""Angular momentum of the box about its mass centre."""
+"""Angular momentum of the box about its mass center."""
 ALL = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 
 

@@ -170,7 +170,7 @@ def test_an_obstacle_has_a_mesh_and_stays_one():
 
 
 def test_each_of_many_bodies_may_have_its_own_force_and_torque():
-    many = kl.RigidBody(characteristics=kl.Characteristics.box(np.ones((3, 3)), density=2.0))
+    many = kl.RigidBody(mass_properties=kl.MassProperties.box(np.ones((3, 3)), density=2.0))
     force = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
     many.add(kl.Force((0, 0, 0), force))
     many.add(kl.Torque(force))
@@ -181,7 +181,7 @@ def test_each_of_many_bodies_may_have_its_own_force_and_torque():
 
 @pytest.mark.parametrize("lumped", [False, True])
 def test_a_tapered_body_stays_undeformed_when_converted(lumped):
-    """Lumped mass has its centre elsewhere, which must not look like deformation."""
+    """Lumped mass has its center elsewhere, which must not look like deformation."""
     mesh = kl.box(element="KinematicLinear3D20N")
     mesh.points[:, 1:] *= 1 + mesh.points[:, :1]
     soft = kl.FiniteElementBody(mesh, RUBBER, lumped=lumped)

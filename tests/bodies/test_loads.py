@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.rotations import exp
+from kratos_lite.bodies.rotations import exp
 
 KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
 each_kind = pytest.mark.parametrize("kind", KINDS)
@@ -15,7 +15,7 @@ CENTER = np.array([0.5, 0.3, 0.2])
 
 
 def at(*arm):
-    """Return the point at an arm from the mass centre."""
+    """Return the point at an arm from the mass center."""
     return CENTER + np.array(arm)
 
 
@@ -47,7 +47,7 @@ def stirred(kind, seed=3):
 
 
 def resultant(body):
-    """Return force and torque about the mass centre of the loads: their powers on six rigid motions."""
+    """Return force and torque about the mass center of the loads: their powers on six rigid motions."""
     load, u, powers = body.external_load(), body.u.copy(), []
     for unit in np.eye(6):
         body.set_velocity(unit[:3], unit[3:])
@@ -56,7 +56,7 @@ def resultant(body):
     return np.array(powers[:3]), np.array(powers[3:])
 
 
-# ---- the generalised force is conjugate to the velocity --------------------------------------------
+# ---- the generalized force is conjugate to the velocity --------------------------------------------
 
 
 @each_kind
@@ -183,7 +183,7 @@ MODEL_LOADS = [
 @pytest.mark.parametrize("load", MODEL_LOADS, ids=lambda load: type(load).__name__)
 def test_loads_of_models_have_the_resultant_of_their_nodal_forces(kind, load):
     body = moved(block(kind))
-    f = load.forces(body.mesh, block(kl.FiniteElementBody).batches)
+    f = load.forces(body.mesh, block(kl.FiniteElementBody).groups)
     assert np.abs(f).max() > 0
     body.add(load)
     force, torque = resultant(body)
@@ -196,7 +196,7 @@ def test_loads_of_models_have_the_resultant_of_their_nodal_forces(kind, load):
 @pytest.mark.parametrize("load", MODEL_LOADS, ids=lambda load: type(load).__name__)
 def test_loads_of_models_do_the_work_of_their_nodal_forces(kind, load):
     body = stirred(kind)
-    f = load.forces(body.mesh, block(kl.FiniteElementBody).batches)
+    f = load.forces(body.mesh, block(kl.FiniteElementBody).groups)
     body.add(load)
     power = (f * body.velocity(body.mesh.points)).sum()
     assert body.external_load() @ body.u == pytest.approx(power, rel=1e-11)
@@ -270,7 +270,7 @@ def volume(body, q):
     if isinstance(body, kl.PseudoRigidBody):
         return 0.24 * np.linalg.det(q[:9].reshape(3, 3))
     x = kl.Mesh(body.points + q.reshape(-1, 3), body.mesh.blocks)
-    return float(kl.RigidBody(x, body.material).characteristics.volume)
+    return float(kl.RigidBody(x, body.material).mass_properties.volume)
 
 
 @soft_kind

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.bodies.forms import base as forms
+from kratos_lite.bodies.formulations import base as forms
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
@@ -27,24 +27,24 @@ def spinning(form, scheme, damping=0.0):
     ],
 )
 def test_large_bodies_iterate_and_move_alike(form, scheme, damping, monkeypatch):
-    factorised = spinning(form, scheme, damping)
-    list(kl.march(factorised, 5e-3, 10))
-    monkeypatch.setattr(forms, "FACTORISED_MAX", 10)
-    monkeypatch.setattr(forms, "FACTORISED_ONCE_MAX", 10)
+    factorized = spinning(form, scheme, damping)
+    list(kl.march(factorized, 5e-3, 10))
+    monkeypatch.setattr(forms, "FACTORIZED_MAX", 10)
+    monkeypatch.setattr(forms, "FACTORIZED_ONCE_MAX", 10)
     made = []
     iterated = forms.Form._iterated
     monkeypatch.setattr(forms.Form, "_iterated", lambda self, A: made.append(A) or iterated(self, A))
     large = spinning(form, scheme, damping)
     list(kl.march(large, 5e-3, 10))
     assert made
-    np.testing.assert_allclose(large.q, factorised.q, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(large.u, factorised.u, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(large.q, factorized.q, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(large.u, factorized.u, rtol=0, atol=1e-9)
 
 
-def test_constant_matrices_are_factorised_once(monkeypatch):
+def test_constant_matrices_are_factorized_once(monkeypatch):
     made = []
-    factorise = forms.Factoriser.factorise
-    monkeypatch.setattr(forms.Factoriser, "factorise", lambda self, A: made.append(A) or factorise(self, A))
+    factorize = forms.Factorizer.factorize
+    monkeypatch.setattr(forms.Factorizer, "factorize", lambda self, A: made.append(A) or factorize(self, A))
     for form, count in (("BC", 1), ("TL", 7)):
         made.clear()
         list(kl.march(spinning(form, "DEF_LIM"), 1e-3, 7))
@@ -72,5 +72,5 @@ def test_nothing_is_integrated_over_the_volume_after_setup(kind, monkeypatch):
         raise AssertionError("the volume is integrated again")
 
     monkeypatch.setattr(kl.KinematicLinear, "_jacobian", refuse)
-    monkeypatch.setattr(kl.Characteristics, "of", refuse)
+    monkeypatch.setattr(kl.MassProperties, "of", refuse)
     assert len(list(kl.march(body, 1e-3, 5))) == 5

@@ -63,7 +63,7 @@ def test_nodes_are_chosen_by_parts_and_predicates():
     other.constrain(kl.FixPoint(lambda X: X[:, 2] < 0.5))
     np.testing.assert_array_equal(one.constraints[0].points, other.constraints[0].points)
     with pytest.raises(kl.ModelError, match="this body has none"):
-        kl.RigidBody(characteristics=kl.Characteristics.ball(1.0, 1.0)).constrain(kl.FixPoint("z-"))
+        kl.RigidBody(mass_properties=kl.MassProperties.ball(1.0, 1.0)).constrain(kl.FixPoint("z-"))
 
 
 @each_kind

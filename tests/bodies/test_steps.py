@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from kratos_lite.bodies import steps
+from kratos_lite.bodies.rotations import exp, hat
 from kratos_lite.bodies.steps import PSEUDO_SCHEMES, RIGID_SCHEMES
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
-from kratos_lite.rotations import exp, hat
 
 compiled = pytest.mark.skipif(kernels("motion") is None, reason="the compiled kernels were not built")
 NONE3, NONE6, NONE12 = np.zeros(3), np.zeros(6), np.zeros(12)
@@ -67,7 +67,7 @@ def spinning_box(young):
 
 
 def energy_and_momentum(q, u, constant):
-    """Return energy and angular momentum about the centre of one pseudo-rigid body."""
+    """Return energy and angular momentum about the center of one pseudo-rigid body."""
     E0, _, volume, C, _ = constant
     F, rate = q[:9].reshape(3, 3), u[:9].reshape(3, 3)
     G = F.T @ F - np.eye(3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.rotations import exp
+from kratos_lite.bodies.rotations import exp
 
 SCHEMES = ("RIG_POS", "RIG_NEG", "RIG_IMP")
 EXACT = ("RIG_NEG", "RIG_IMP")
@@ -27,7 +27,7 @@ FREE_AT_1 = np.array(
 
 def top(J, W, scheme, rotation=None):
     body = kl.RigidBody(
-        characteristics=kl.Characteristics(mass=1.0, inertia=np.diag(np.array(J, dtype=float))), scheme=scheme
+        mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag(np.array(J, dtype=float))), scheme=scheme
     )
     if rotation is not None:
         body.turn(rotation)
@@ -54,7 +54,7 @@ def end(body, dt, steps):
 
 def gains(body, dt, steps, energy=None):
     """Return relative changes of the energy over a motion, at every tenth step."""
-    energy = energy or (lambda state: float((state.u[:3] ** 2 @ body.characteristics.inertia.diagonal()) / 2))
+    energy = energy or (lambda state: float((state.u[:3] ** 2 @ body.mass_properties.inertia.diagonal()) / 2))
     start = energy(kl.State.of(body))
     return np.array([energy(state) for state in kl.march(body, dt, steps, every=10)]) - start
 

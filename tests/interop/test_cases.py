@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.assembly import assemble_dense
+from kratos_lite.assembly.stiffness import assemble_dense
 
 SOLVED = [
     "eigen_cube_8N",
@@ -76,7 +76,7 @@ def test_displacements_reactions_and_stresses_are_those_of_kratos(shared, name):
         total = np.array(reference["summary"]["reaction_sum"])
         scale = np.abs(result.reaction()).sum() + np.abs(result.loads).sum()
         assert np.abs(result.reaction().sum(axis=0) - total).max() <= 1e-9 * scale
-        volume = sum(float(batch.at(model.mesh.points).volume().sum()) for batch in result.batches)
+        volume = sum(float(group.at(model.mesh.points).volume().sum()) for group in result.groups)
         assert abs(volume / reference["volume"] - 1) <= 1e-9
         if (
             "TotalLagrangian" not in model.mesh.blocks[0].name
@@ -100,7 +100,7 @@ def test_pressure_on_rve_differs_from_kratos_by_its_load_stiffness_alone(shared)
     expected = reference_displacement(reference, model.mesh)
     assert np.abs(result.displacement() - expected).max() < 6e-5 * np.abs(expected).max()
 
-    K = assemble_dense(model.mesh.points, result.batches)
+    K = assemble_dense(model.mesh.points, result.groups)
     pressure = case["surface_pressure"][0]["value"]
     dN = np.array([[-1, -1], [1, 0], [0, 1]])
     for nodes in model.mesh.conditions[0].nodes:

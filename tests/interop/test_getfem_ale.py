@@ -14,9 +14,9 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
 from kratos_lite.ale.matrices import exact_rule
-from kratos_lite.assembly import Pattern, assemble_stiffness
+from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
 from kratos_lite.elements.kinematic_linear import lame_constants
-from kratos_lite.mass import Mass
+from kratos_lite.solvers.mass import Mass
 
 ROOT = Path(__file__).resolve().parents[2]
 MATERIAL = kl.Isotropic3D(E=3e7, nu=0.3, density=1100.0)
@@ -51,14 +51,14 @@ def wheel(kind):
 
 def computed(model):
     """Return our matrices as entries (nnz, b, b) and loads (n, 3), and the points of the rule of each."""
-    points, batches = model.mesh.points, model.batches()
-    (element,) = {batch.element for batch in batches}
-    pattern = Pattern(len(points), [batch.nodes for batch in batches])
-    mass = Mass(points, batches, pattern, False)
-    terms = MotionMatrices(Rotation("z"), points, batches, pattern, mass)
+    points, groups = model.mesh.points, model.element_groups()
+    (element,) = {group.element for group in groups}
+    pattern = Pattern(len(points), [group.nodes for group in groups])
+    mass = Mass(points, groups, pattern, False)
+    terms = MotionMatrices(Rotation("z"), points, groups, pattern, mass)
     found = {"M": mass.scalar.data, "G": terms.G, "H": terms.H}
     found = {name: data[:, None, None] for name, data in found.items()}
-    found["K"] = assemble_stiffness(points, batches, pattern).data
+    found["K"] = assemble_stiffness(points, groups, pattern).data
     found |= {"centrifugal": terms.centrifugal, "euler": terms.euler}
     rules = [element.mass_rule, *[exact_rule(element.shape)] * 2, element.rule, *[element.mass_rule] * 2]
     gauss = [round(len(rule) ** (1 / 3)) for rule in rules]

@@ -159,7 +159,7 @@ def test_kratos_reads_material_and_supports_that_we_write(cubes, kind):
 def test_volume_of_each_element_is_that_of_kratos(cubes, kind):
     """A wrong node order of the file would twist the cells."""
     model, found = cubes[kind, "sheared"]
-    volumes = model.batches()[0].at(model.mesh.points).volume()
+    volumes = model.element_groups()[0].at(model.mesh.points).volume()
     theirs = [sum(element["weights"]) for element in found["elements"].values()]
     assert_close(volumes, np.array(theirs), 1e-14)
 
@@ -404,7 +404,7 @@ def test_orthotropic_body_is_that_of_kratos(tmp_path):
     assert_close(by_node(model.mesh, by_file["displacement"]), expected, 1e-12)
     assert_close(model.solve().displacement(), expected, 1e-12)
     again = kl.read(path)
-    assert again.batches()[0].material == wood
+    assert again.element_groups()[0].material == wood
     path.write_text(path.read_text().replace("YOUNG_MODULUS_X 11", "YOUNG_MODULUS_X 12"))
     with pytest.raises(kl.InputError, match=r"a\.mdpa:1\d*: Properties 1: ELASTICITY_TENSOR is not"):
         kl.read(path)
@@ -417,7 +417,7 @@ def hanging(links):
     model.add(kl.Gravity((3.0, -2.0, -9.81)))
     top = model.mesh.nodes("z+").tolist()
     for (slave, axis), masters, constant in links:
-        model.link((top[slave], axis), {(top[i], a): w for (i, a), w in masters.items()}, constant)
+        model.constrain((top[slave], axis), {(top[i], a): w for (i, a), w in masters.items()}, constant)
     return model
 
 

@@ -65,7 +65,7 @@ def test_a_march_is_that_of_python(scene):
         loads=[{"type": "gravity", "acceleration": [0, 0, -9.81]}],
         time={"step": 0.001, "steps": 6, "every": 2, "substeps": 2},
     )
-    from kratos_lite.rotations import exp
+    from kratos_lite.bodies.rotations import exp
 
     body = kl.FiniteElementBody(
         kl.box((0.4, 0.6, 1.0), (1, 2, 2)), RUBBER, lumped=True, scheme="DEF_LIM", damping=1e-4
@@ -143,15 +143,15 @@ def test_every_constraint_holds(scene, name):
 
 def test_a_body_without_mesh_has_characteristics(scene):
     given = {"mass": 1.0, "inertia": [5, 10, 1], "center": [1, 2, 3]}
-    body = scene(mesh=None, material=None, body={"kind": "rigid", "characteristics": given}).body
+    body = scene(mesh=None, material=None, body={"kind": "rigid", "mass_properties": given}).body
     assert body.mesh is None
     assert float(body.mass) == 1.0
-    assert body.characteristics.inertia.diagonal().tolist() == [5, 10, 1]
+    assert body.mass_properties.inertia.diagonal().tolist() == [5, 10, 1]
     assert body.mass_center().tolist() == [1, 2, 3]
 
 
 def test_characteristics_take_the_place_of_those_of_the_mesh(scene):
-    body = scene(body={"kind": "rigid", "characteristics": {"mass": 1.0}}).body
+    body = scene(body={"kind": "rigid", "mass_properties": {"mass": 1.0}}).body
     assert float(body.mass) == 1.0
     np.testing.assert_allclose(body.center, [0.2, 0.3, 0.5])
 
@@ -201,8 +201,8 @@ MISTAKES = [
     ({"body": {"kind": "rigid", "form": "TL"}}, r"unknown key 'body\.form'"),
     ({"body": {"kind": "rigid", "scheme": "DEF_LIM"}}, "schemes of a rigid body are RIG_NEG"),
     ({"body": {"kind": "finite-element", "form": "TLL"}}, "unknown form of a finite-element body 'TLL'"),
-    ({"body": {"kind": "rigid", "characteristics": {"mas": 1}}}, r"unknown key 'body\.characteristics\.mas'"),
-    ({"body": {"kind": "rigid", "characteristics": {"inertia": [1, 2]}}}, "three rows of three numbers"),
+    ({"body": {"kind": "rigid", "mass_properties": {"mas": 1}}}, r"unknown key 'body\.mass_properties\.mas'"),
+    ({"body": {"kind": "rigid", "mass_properties": {"inertia": [1, 2]}}}, "three rows of three numbers"),
     ({"mesh": None}, "key 'mesh' is missing: it is the shape of the body"),
     ({"mesh": {"bix": {}}}, r'mesh must be the name of a file, \{"box": \{…\}\} or'),
     ({"mesh": {"box": {"size": [1, 1, 0]}}}, r"mesh\.box: size must be three lengths > 0 m"),

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from kratos_lite.io.project.expressions import evaluate
+from kratos_lite.io.kratos.expressions import evaluate
 
 AT = {"x": 2.0, "y": 3.0, "z": 5.0, "t": 0.5, "X": 7.0, "Y": 11.0, "Z": 13.0}
 KRATOS = {

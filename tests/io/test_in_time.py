@@ -105,9 +105,9 @@ def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
     for kind in (kl.Gravity, type(scene.model.loads[1].load)):
         forces = kind.forces
 
-        def counted(self, mesh, batches, forces=forces):
+        def counted(self, mesh, groups, forces=forces):
             calls.append(type(self).__name__)
-            return forces(self, mesh, batches)
+            return forces(self, mesh, groups)
 
         monkeypatch.setattr(kind, "forces", counted)
     moments(scene)

@@ -9,9 +9,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.io.document import Constraint, Document
-from kratos_lite.io.elem import read_elem, write_elem
-from kratos_lite.io.mdpa.reader import read_mdpa
-from kratos_lite.io.mdpa.writer import write_mdpa
+from kratos_lite.io.formats.elem import read_elem, write_elem
+from kratos_lite.io.formats.mdpa.reader import read_mdpa
+from kratos_lite.io.formats.mdpa.writer import write_mdpa
 from kratos_lite.io.text import blank_comments, read_bytes
 from kratos_lite.mesh import Block, Mesh
 
@@ -59,7 +59,7 @@ def load(tmp_path):
 
 
 def total(model):
-    return sum(load.forces(model.mesh, model.batches()) for load in model.loads).sum(axis=0)
+    return sum(load.forces(model.mesh, model.element_groups()) for load in model.loads).sum(axis=0)
 
 
 @pytest.mark.parametrize(

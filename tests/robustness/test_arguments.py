@@ -48,24 +48,24 @@ WRONG = {
     "where mask": (lambda: model().fix(np.ones(5, bool)), r"a node mask must have shape \(27,\)"),
     "where nothing": (lambda: model().fix(np.zeros(27, bool)), "cannot fix xyz: no node is chosen"),
     "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),
-    "link negative": (lambda: model().link((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),
-    "link word": (lambda: model().link("a", {TOP: 1.0}), "a degree of freedom is"),
-    "link float": (lambda: model().link((1.5, "x"), {TOP: 1.0}), "a degree of freedom is"),
-    "link axis": (lambda: model().link((1, "xy"), {TOP: 1.0}), "a degree of freedom is"),
-    "link axis number": (lambda: model().link((1, 0), {TOP: 1.0}), "a degree of freedom is"),
-    "link master": (lambda: model().link((1, "x"), {7: 1.0}), "a degree of freedom is"),
-    "link masters": (lambda: model().link((1, "x"), [TOP]), "masters must map"),
+    "link negative": (lambda: model().constrain((-1, "x"), {TOP: 1.0}), "a degree of freedom is"),
+    "link word": (lambda: model().constrain("a", {TOP: 1.0}), "a degree of freedom is"),
+    "link float": (lambda: model().constrain((1.5, "x"), {TOP: 1.0}), "a degree of freedom is"),
+    "link axis": (lambda: model().constrain((1, "xy"), {TOP: 1.0}), "a degree of freedom is"),
+    "link axis number": (lambda: model().constrain((1, 0), {TOP: 1.0}), "a degree of freedom is"),
+    "link master": (lambda: model().constrain((1, "x"), {7: 1.0}), "a degree of freedom is"),
+    "link masters": (lambda: model().constrain((1, "x"), [TOP]), "masters must map"),
     "link weight": (
-        lambda: model().link((1, "x"), {TOP: "a"}),
+        lambda: model().constrain((1, "x"), {TOP: "a"}),
         "weights of a constraint must be made of real",
     ),
-    "link weight none": (lambda: model().link((1, "x"), {TOP: None}), "weights of a constraint must be"),
+    "link weight none": (lambda: model().constrain((1, "x"), {TOP: None}), "weights of a constraint must be"),
     "link weight nan": (
-        lambda: model().link((1, "x"), {TOP: np.nan}),
+        lambda: model().constrain((1, "x"), {TOP: np.nan}),
         "weights of a constraint must be finite",
     ),
     "link constant": (
-        lambda: model().link((1, "x"), {TOP: 1.0}, np.inf),
+        lambda: model().constrain((1, "x"), {TOP: 1.0}, np.inf),
         "constant of a constraint must be finite",
     ),
     "load number": (lambda: model().add(5), "a load such as Gravity or Traction is needed; got int"),
@@ -158,7 +158,7 @@ def test_numbers_of_every_kind_are_accepted():
     one = kl.Model(kl.box(cells=np.array([2, 2, 2])), {np.int64(1): STEEL})
     one.fix(np.array([0, 1, 2], dtype=np.uint8), "xyz", np.float32(0))
     one.fix("z-", value=[0, 0, 0])
-    one.link((np.int32(26), "z"), {(np.int64(25), "z"): 1}, 0)
+    one.constrain((np.int32(26), "z"), {(np.int64(25), "z"): 1}, 0)
     one.add(kl.Gravity([0, 0, -10]))
     one.add(kl.Pressure(np.arange(27), np.float64(2)))
     assert np.isfinite(one.solve(tolerance=np.float64(1e-8)).u).all()

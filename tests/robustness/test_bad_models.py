@@ -153,7 +153,7 @@ def test_constraint_weights_of_any_size_do_not_hide_supports():
     model = kl.Model(kl.box(), STEEL)
     model.fix("z-")
     top = [int(n) for n in model.mesh.nodes("z+")]
-    model.link((top[0], "x"), {(top[1], "x"): 1e9})
+    model.constrain((top[0], "x"), {(top[1], "x"): 1e9})
     assert model.check() == []
 
 

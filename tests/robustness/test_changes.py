@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import system
-from kratos_lite.checks import check_rules
+from kratos_lite.model.checks import check_rules
+from kratos_lite.solvers import constrained_system as system
 
 ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
 
@@ -23,8 +23,8 @@ def pressed(stress=1e5):
 
 def refuse(model, equations):
     """Have a change of the constraints refused, and take it back."""
-    model.link((13, "x"), {(14, "x"): 1.0})
-    model.link((13, "x"), {(12, "x"): 1.0})
+    model.constrain((13, "x"), {(14, "x"): 1.0})
+    model.constrain((13, "x"), {(12, "x"): 1.0})
     with pytest.raises(kl.ModelError, match="slave of two constraints"):
         equations.solve()
     model.supports.links.clear()
@@ -100,7 +100,7 @@ def test_a_result_keeps_the_points_it_was_solved_with():
 def test_warnings_of_rules_come_once():
     model = pressed()
     model.use_rule(1)
-    batches = model.batches()
-    same = [replace(batch, rule=replace(batch.rule, name="another")) for batch in batches]
-    (text,) = check_rules(model.mesh, batches + same)
+    groups = model.element_groups()
+    same = [replace(group, rule=replace(group.rule, name="another")) for group in groups]
+    (text,) = check_rules(model.mesh, groups + same)
     assert text.startswith("KinematicLinear3D8N with 1 Gauss points has 12 spurious zero-energy modes")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import system
-from kratos_lite.assembly import Pattern, PatternCache
+from kratos_lite.assembly.stiffness import Pattern, PatternCache
 from kratos_lite.materials import MATERIALS
-from kratos_lite.supports import rigid_modes
+from kratos_lite.solvers import constrained_system as system
+from kratos_lite.solvers.supports import rigid_modes
 
 STEEL = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
 
@@ -150,11 +150,11 @@ def test_body_whose_nodes_all_belong_to_others_is_still_a_body():
     model = kl.Model(mesh, STEEL)
     model.fix("z-")
     model.add(kl.Gravity((1.0, 2.0, -9.81)))
-    from kratos_lite.assembly import assemble_dense
+    from kratos_lite.assembly.stiffness import assemble_dense
 
     used = mesh.used_nodes()
     free = ~(model.supports.fixed | ~used[:, None]).ravel()
-    K = assemble_dense(mesh.points, model.batches())[np.ix_(free, free)]
+    K = assemble_dense(mesh.points, model.element_groups())[np.ix_(free, free)]
     smallest = np.linalg.eigvalsh(K)[[0, -1]]
     if smallest[0] > 1e-9 * smallest[1]:
         assert np.isfinite(model.solve().u).all()
@@ -164,10 +164,10 @@ def test_body_whose_nodes_all_belong_to_others_is_still_a_body():
 
 
 def test_rigid_modes_of_the_model_carry_no_stress():
-    from kratos_lite.assembly import assemble_dense
+    from kratos_lite.assembly.stiffness import assemble_dense
 
     model = kl.Model(kl.box(cells=(2, 1, 1), element="KinematicLinear3D20N"), STEEL)
-    K = assemble_dense(model.mesh.points, model.batches())
+    K = assemble_dense(model.mesh.points, model.element_groups())
     R = model.rigid_modes()
     assert R.shape == (3 * model.mesh.n_nodes, 6)
     assert np.abs(K @ R).max() < 1e-12 * np.abs(K).max()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.generate import SPLITS, raise_order
+from kratos_lite.mesh.generators import SPLITS, raise_order
 
 
 def split_hexes(points: np.ndarray, hexes: np.ndarray, kind: str, order: int | None = None) -> kl.Mesh:

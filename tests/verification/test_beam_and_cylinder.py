@@ -74,7 +74,7 @@ def test_thick_cylinder(nodes, nu):
     model.fix("z+", "z")
     model.fix(bottom, "y")
     for node in top:  # the normal displacement of the slanted side is zero
-        model.link((int(node), "y"), {(int(node), "x"): np.tan(np.deg2rad(10))})
+        model.constrain((int(node), "y"), {(int(node), "x"): np.tan(np.deg2rad(10))})
     model.add(kl.Pressure("x-", 1.0))
     result = model.solve()
     ratio = np.hypot(*result.displacement("x-")[:, :2].T).mean() / EXACT[nu]
@@ -116,13 +116,13 @@ def octant(n, nodes, split):
     brick = kl.box((1, 1, 1), (n, n, n))
     s, t, r = brick.points.T
     points, bricks = [], []
-    centre, edge = np.ones(3) / np.sqrt(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]]) / np.sqrt(2)
+    center, edge = np.ones(3) / np.sqrt(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]]) / np.sqrt(2)
     for k in range(3):
         pole = np.roll([1.0, 0, 0], k)
         a, b = edge[k], edge[(k + 2) % 3]
         flat = (
             np.outer((1 - s) * (1 - t), pole) + np.outer(s * (1 - t), a)
-            + np.outer((1 - s) * t, b) + np.outer(s * t, centre)
+            + np.outer((1 - s) * t, b) + np.outer(s * t, center)
         )  # fmt: skip
         bricks.append(brick.blocks[0].nodes + k * len(s))
         points.append(flat / np.linalg.norm(flat, axis=1, keepdims=True) * (1 + r)[:, None])

@@ -98,12 +98,12 @@ def test_every_solver_gives_the_exact_solution(solver, nodes):
 def test_stress_of_quadratic_elements_is_exact_at_gauss_points_and_nodes(nodes):
     result = cube(kl.box(cells=(2, 2, 2), element=kind(nodes))).solve()
     peak = RHO * G
-    (batch,) = result.batches
-    z = batch.at(result.mesh.points).gauss_points()[..., 2]
+    (group,) = result.groups
+    z = group.at(result.mesh.points).gauss_points()[..., 2]
     expected = stress_at(z)
     np.testing.assert_allclose(result.stress(), expected, atol=1e-11 * peak)
     np.testing.assert_allclose(result.stress("node"), stress_at(result.mesh.points[:, 2]), atol=1e-11 * peak)
-    middle = np.einsum("eg,eg->e", batch.at(result.mesh.points).dV, z) / batch.at(result.mesh.points).volume()
+    middle = np.einsum("eg,eg->e", group.at(result.mesh.points).dV, z) / group.at(result.mesh.points).volume()
     np.testing.assert_allclose(result.stress("element"), stress_at(middle), atol=1e-11 * peak)
 
 

@@ -15,8 +15,8 @@ def kind(n):
 
 def nodal(mesh, *loads, material=STEEL):
     model = kl.Model(mesh, material)
-    batches = model.batches()
-    return sum(load.forces(mesh, batches) for load in loads)
+    groups = model.element_groups()
+    return sum(load.forces(mesh, groups) for load in loads)
 
 
 def moment(mesh, forces):
@@ -209,7 +209,7 @@ def test_loads_on_conditions_of_unknown_kind_are_refused():
 
 
 def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
-    from kratos_lite.loads import ConditionLoads
+    from kratos_lite.model.loads import ConditionLoads
 
     mesh = faces_as_conditions(kl.box(), "z+", flip=False)
     own, at_nodes = np.array([[1.0, 0, 0]]), np.zeros((8, 3))
@@ -221,7 +221,7 @@ def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
 
 
 def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
-    from kratos_lite.loads import ConditionLoads
+    from kratos_lite.model.loads import ConditionLoads
     from kratos_lite.shapes import Line2
 
     box = kl.box()

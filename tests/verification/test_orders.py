@@ -59,19 +59,19 @@ def body_force(X):
     return -(mu * laplacian + (lam + mu) * grad_div)
 
 
-def fine(batch, points):
-    """Return the elements of a batch with a rule of degree 8, and the shape functions there."""
-    rule = rule_for(batch.element.shape.cell, 8)
-    return batch.element(points[batch.nodes], rule), np.array([batch.element.N(xi) for xi in rule.points])
+def fine(group, points):
+    """Return the elements of a group with a rule of degree 8, and the shape functions there."""
+    rule = rule_for(group.element.shape.cell, 8)
+    return group.element(points[group.nodes], rule), np.array([group.element.N(xi) for xi in rule.points])
 
 
 def nodal_load(model):
-    (batch,) = model.batches()
-    element, N = fine(batch, model.mesh.points)
+    (group,) = model.element_groups()
+    element, N = fine(group, model.mesh.points)
     X = element.gauss_points()
     b = body_force(X.reshape(-1, 3)).reshape(X.shape) * element.dV[..., None]
     total = np.zeros_like(model.mesh.points)
-    np.add.at(total, batch.nodes, np.einsum("gn,egi->eni", N, b))
+    np.add.at(total, group.nodes, np.einsum("gn,egi->eni", N, b))
     return total
 
 
@@ -86,9 +86,9 @@ def errors(split, nodes, n, distorted):
     model.fix(edge, "xyz", displacement(mesh.points[edge]))
     model.add(kl.NodalForces(nodal_load(model)))
     result = model.solve("direct")
-    (batch,) = result.batches
-    element, N = fine(batch, mesh.points)
-    X, u = element.gauss_points(), result.u[batch.nodes]
+    (group,) = result.groups
+    element, N = fine(group, mesh.points)
+    X, u = element.gauss_points(), result.u[group.nodes]
     gap = N @ u - displacement(X.reshape(-1, 3)).reshape(X.shape)
     exact = symmetric_gradient(gradient(X.reshape(-1, 3))).reshape(*X.shape[:2], 6)
     strain = element.strain(u) - exact

@@ -98,8 +98,8 @@ def test_quadratic_field_on_parallelepipeds(split, nodes):
     mesh = split(points, brick.blocks[0].nodes, kind(nodes))
     result, u = solve_patch(mesh, field, body)
     np.testing.assert_allclose(result.u, u, rtol=0, atol=1e-13 * np.abs(u).max())
-    (batch,) = result.batches
-    X = batch.at(mesh.points).gauss_points()
+    (group,) = result.groups
+    X = group.at(mesh.points).gauss_points()
     strain = symmetric_gradient(gradient(X.reshape(-1, 3))).reshape(*X.shape[:2], 6)
     np.testing.assert_allclose(result.strain(), strain, rtol=0, atol=1e-11 * np.abs(strain).max())
     np.testing.assert_allclose(

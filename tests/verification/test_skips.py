@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import statics, system
-from kratos_lite.system import System
+from kratos_lite.analysis import static as statics
+from kratos_lite.solvers import constrained_system as system
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
 STEEL = kl.Isotropic3D(E=2e9, nu=0.3, density=1000.0)
 ALWAYS = ["load steps, as the law is linear", "mass", "strains and stresses until asked for"]
@@ -27,9 +28,11 @@ def bodies(n=3, cells=(2, 2, 2)):
 
 def everything(model, result, solver="direct"):
     """Compare a result with a solution of all equations of all elements."""
-    whole = System(model.mesh.points, model.batches(), model.supports, solver=solver, tolerance=1e-13)
+    whole = ConstrainedSystem(
+        model.mesh.points, model.element_groups(), model.supports, solver=solver, tolerance=1e-13
+    )
     forces = np.array(result.loads)
-    initial = statics.initial_loads(model, model.batches())
+    initial = statics.initial_loads(model, model.element_groups())
     forces = forces if initial is None else forces - initial
     u, _ = whole.solve(forces)
     assert len(whole.nodes) == model.mesh.used_nodes().sum()
@@ -78,16 +81,16 @@ def by_prescribed_value(model):
 
 
 def by_link_between_parts(model):
-    model.link((26, "x"), {(53, "x"): 1.0})
+    model.constrain((26, "x"), {(53, "x"): 1.0})
 
 
 def by_constant_of_a_link(model):
-    model.link((26, "x"), {(25, "x"): 1.0}, 1e-3)
+    model.constrain((26, "x"), {(25, "x"): 1.0}, 1e-3)
 
 
 def by_fixed_master(model):
     model.fix([0], "x", 1e-3, override=True)
-    model.link((26, "x"), {(0, "x"): 1.0})
+    model.constrain((26, "x"), {(0, "x"): 1.0})
 
 
 def by_prestress(model):
@@ -200,7 +203,7 @@ def test_elements_whose_nodes_are_all_held_are_left_out(element, solver):
     result = ready.solve()
     left = model.mesh.n_elements // 2
     assert f"{left} elements, as all their nodes are held" in result.report.skipped
-    assert sum(len(batch) for batch in ready.equations.batches) == left
+    assert sum(len(group) for group in ready.equations.groups) == left
     assert ready.equations.nodes.min() > 0
     everything(model, result)
 
@@ -247,6 +250,6 @@ def test_solving_computes_neither_stress_nor_mass(monkeypatch):
     assert result.report.skipped[-3:] == ALWAYS
     assert result.stress().any()
     asked.clear()
-    element = model.batches()[0].at(model.mesh.points)
+    element = model.element_groups()[0].at(model.mesh.points)
     element.strain(np.zeros((8, 8, 3)))
     assert asked == ["strain"]

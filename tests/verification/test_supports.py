@@ -80,14 +80,14 @@ def test_skew_rollers_let_a_turned_bar_behave_as_the_straight_one(solver):
     corner = set(sides["x-"]) & set(sides["y-"])
     model.fix(sorted(corner), "xy")
     for node in set(sides["x-"]) - corner:  # u · (c, s) = 0
-        model.link((int(node), "x"), {(int(node), "y"): -s / c})
+        model.constrain((int(node), "x"), {(int(node), "y"): -s / c})
     for node in set(sides["y-"]) - corner - set(sides["x+"]):  # u · (-s, c) = 0
-        model.link((int(node), "y"), {(int(node), "x"): s / c})
+        model.constrain((int(node), "y"), {(int(node), "x"): s / c})
     for node in sides["x+"]:
         if node in sides["y-"]:
             model.fix([int(node)], "xy", 1e-3 * np.array([c, s]))
         else:
-            model.link((int(node), "x"), {(int(node), "y"): -s / c}, 1e-3 / c)
+            model.constrain((int(node), "x"), {(int(node), "y"): -s / c}, 1e-3 / c)
     result = model.solve(solver, tolerance=1e-12)
     np.testing.assert_allclose(result.u, straight.u @ turn.T, rtol=0, atol=1e-9 * 1e-3)
 
@@ -96,12 +96,12 @@ def test_periodic_constraints_make_a_layered_cell_as_stiff_as_its_layers():
     """Layers in parallel: E = mean; the cell is stretched by a periodic jump along x."""
     mesh = kl.box(cells=(2, 1, 2))
     model = kl.Model(mesh)
-    model.assign(kl.Isotropic3D(E=1.0, nu=0.0), np.flatnonzero(centres(mesh)[:, 2] < 0.5))
-    model.assign(kl.Isotropic3D(E=3.0, nu=0.0), np.flatnonzero(centres(mesh)[:, 2] > 0.5))
+    model.assign(kl.Isotropic3D(E=1.0, nu=0.0), np.flatnonzero(centers(mesh)[:, 2] < 0.5))
+    model.assign(kl.Isotropic3D(E=3.0, nu=0.0), np.flatnonzero(centers(mesh)[:, 2] > 0.5))
     left, right = mesh.nodes("x-"), mesh.nodes("x+")
     for a, b in zip(left, right, strict=True):
         for axis in "xyz":
-            model.link((int(b), axis), {(int(a), axis): 1.0}, 0.01 if axis == "x" else 0.0)
+            model.constrain((int(b), axis), {(int(a), axis): 1.0}, 0.01 if axis == "x" else 0.0)
     model.fix([0], "xyz")
     model.fix(mesh.nodes(lambda X: (X[:, 0] == 0) & (X[:, 2] == 0) & (X[:, 1] > 0)), "xz")
     model.fix(mesh.nodes(lambda X: (X[:, 0] == 0) & (X[:, 2] == 1) & (X[:, 1] == 0)), "xy")
@@ -110,7 +110,7 @@ def test_periodic_constraints_make_a_layered_cell_as_stiff_as_its_layers():
     assert result.energy() == pytest.approx(0.5 * 2.0 * 0.01**2, rel=1e-12)
 
 
-def centres(mesh):
+def centers(mesh):
     return mesh.points[mesh.blocks[0].nodes].mean(axis=1)
 
 
@@ -119,16 +119,16 @@ def test_a_rigid_plate_by_constraints_keeps_its_shape_and_carries_the_moment():
     model = kl.Model(mesh, STEEL)
     model.fix("x-")
     end = mesh.nodes("x+")
-    centre = mesh.points[end] - (4, 0, 0)
-    a, b = (int(end[np.argmin(np.linalg.norm(centre - p, axis=1))]) for p in ((0, 0.5, 0.5), (0, 0.5, -0.5)))
-    for node, (_, _, z) in zip(end, centre, strict=True):
+    center = mesh.points[end] - (4, 0, 0)
+    a, b = (int(end[np.argmin(np.linalg.norm(center - p, axis=1))]) for p in ((0, 0.5, 0.5), (0, 0.5, -0.5)))
+    for node, (_, _, z) in zip(end, center, strict=True):
         if node not in (a, b):  # u_x is linear in z and does not depend on y
-            model.link((int(node), "x"), {(a, "x"): 0.5 + z, (b, "x"): 0.5 - z})
+            model.constrain((int(node), "x"), {(a, "x"): 0.5 + z, (b, "x"): 0.5 - z})
     model.add(kl.PointLoad([a], (1e3, 0, 0)))
     model.add(kl.PointLoad([b], (-1e3, 0, 0)))
     result = model.solve()
     u = result.u[end, 0]
-    np.testing.assert_allclose(u, (result.u[a, 0] - result.u[b, 0]) * centre[:, 2], atol=1e-20)
+    np.testing.assert_allclose(u, (result.u[a, 0] - result.u[b, 0]) * center[:, 2], atol=1e-20)
     slope = result.u[a, 0] - result.u[b, 0]
     assert slope == pytest.approx(1e3 * 4 / (STEEL.E / 12), rel=0.03)
 
@@ -139,8 +139,8 @@ def test_chains_of_constraints_with_constants_and_fixed_masters_are_followed_to_
     model.fix("z-", "xyz", (0.0, 0.0, 1e-4))
     top = [int(n) for n in mesh.nodes("z+")]
     low = int(mesh.nodes("z-")[0])
-    model.link((top[1], "z"), {(top[2], "z"): 2.0}, 1e-5)
-    model.link((top[2], "z"), {(top[3], "z"): 0.5, (low, "z"): 1.0}, -3e-5)
+    model.constrain((top[1], "z"), {(top[2], "z"): 2.0}, 1e-5)
+    model.constrain((top[2], "z"), {(top[3], "z"): 0.5, (low, "z"): 1.0}, -3e-5)
     model.add(kl.PointLoad([top[3]], (0, 0, 1e5)))
     u = model.solve().u[:, 2]
     assert u[top[2]] == pytest.approx(0.5 * u[top[3]] + 1e-4 - 3e-5, rel=1e-12)
@@ -155,22 +155,22 @@ def test_constraints_that_contradict_are_errors():
 
     top = [int(n) for n in kl.box().nodes("z+")]
     circle = model()
-    circle.link((top[0], "x"), {(top[1], "x"): 1.0})
-    circle.link((top[1], "x"), {(top[2], "x"): 1.0})
-    circle.link((top[2], "x"), {(top[0], "x"): 0.5})
+    circle.constrain((top[0], "x"), {(top[1], "x"): 1.0})
+    circle.constrain((top[1], "x"), {(top[2], "x"): 1.0})
+    circle.constrain((top[2], "x"), {(top[0], "x"): 0.5})
     with pytest.raises(kl.ModelError, match="go round in a circle"):
         circle.solve()
     own = model()
-    own.link((top[0], "x"), {(top[0], "x"): 0.5})
+    own.constrain((top[0], "x"), {(top[0], "x"): 0.5})
     with pytest.raises(kl.ModelError, match="go round in a circle"):
         own.solve()
     fixed = model()
-    fixed.link((0, "x"), {(top[0], "x"): 1.0})
+    fixed.constrain((0, "x"), {(top[0], "x"): 1.0})
     with pytest.raises(kl.ModelError, match="node 1 along x is both fixed and the slave of a constraint"):
         fixed.solve()
     twice = model()
-    twice.link((top[0], "x"), {(top[1], "x"): 1.0})
-    twice.link((top[0], "x"), {(top[2], "x"): 1.0})
+    twice.constrain((top[0], "x"), {(top[1], "x"): 1.0})
+    twice.constrain((top[0], "x"), {(top[2], "x"): 1.0})
     with pytest.raises(kl.ModelError, match="is the slave of two constraints"):
         twice.solve()
 
@@ -190,7 +190,7 @@ def test_tied_coincident_nodes_join_two_bodies():
         one.add(kl.Gravity((1, 0, -9.81)))
     for a, b in zip(low.nodes("z+"), high.nodes("z-"), strict=True):
         for axis in "xyz":
-            model.link((int(b) + 8, axis), {(int(a), axis): 1.0})
+            model.constrain((int(b) + 8, axis), {(int(a), axis): 1.0})
     result = model.solve()
     np.testing.assert_allclose(result.displacement("z+"), whole.solve().displacement("z+"), rtol=1e-11)
     assert any("pairs of nodes coincide" in text for text in result.report.warnings)
@@ -233,11 +233,11 @@ def test_cells_of_several_kinds_in_one_mesh_pass_the_patch_test(order):
     strain = (F + F.T) / 2
     sigma = STEEL.lame[0] * np.trace(strain) * np.eye(3) + 2 * STEEL.lame[1] * strain
     forces = np.zeros_like(points)
-    for batch in model.batches():
+    for group in model.element_groups():
         stress = np.array([sigma[0, 0], sigma[1, 1], sigma[2, 2], sigma[0, 1], sigma[1, 2], sigma[0, 2]])
-        element = batch.at(points)
-        part = element.internal_load(np.tile(stress, (len(batch), len(batch.rule), 1)))
-        np.add.at(forces, batch.nodes, part)
+        element = group.at(points)
+        part = element.internal_load(np.tile(stress, (len(group), len(group.rule), 1)))
+        np.add.at(forces, group.nodes, part)
     outside = np.zeros_like(points)
     for face in mesh.boundary:  # the same forces from the outside: traction σ n on every boundary face
         from kratos_lite.elements import surface
@@ -261,7 +261,7 @@ def test_prestress_that_balances_gravity_leaves_the_body_unmoved():
     for side in ("x-", "x+", "y-", "y+", "z-"):
         model.fix(side, side[0])
     model.add(kl.Gravity((0, 0, -g)))
-    depth = 1 - centres(mesh)[:, 2]
+    depth = 1 - centers(mesh)[:, 2]
     stress = -rho * g * depth[:, None] * np.array([0.4, 0.4, 1, 0, 0, 0])
     model.add_prestress(stress)
     result = model.solve()

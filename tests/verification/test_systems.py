@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import statics, system
-from kratos_lite.supports import Link
-from kratos_lite.system import System
+from kratos_lite.analysis import static as statics
+from kratos_lite.solvers import constrained_system as system
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.supports import MultiPointConstraint
 
 STEEL = kl.Isotropic3D(E=2e9, nu=0.3, density=1000.0)
 SOFT = kl.Isotropic3D(E=1e9, nu=0.2, density=500.0)
@@ -79,7 +80,7 @@ def test_a_system_takes_the_loads_of_its_model_or_others_in_their_place(assemble
 def test_new_prescribed_values_are_taken_over_without_a_new_matrix(assembled):
     model = block()
     model.fix("z+", "x", 1e-3)
-    model.link((4, "y"), {(7, "y"): 0.5, (35, "x"): 2.0}, 1e-4)  # the last one is on top
+    model.constrain((4, "y"), {(7, "y"): 0.5, (35, "x"): 2.0}, 1e-4)  # the last one is on top
     ready = model.system()
     ready.solve()
     model.fix("z+", "x", -2e-3, override=True)
@@ -110,7 +111,7 @@ def further_support(model):
 
 def tied(model):
     a, b = model.mesh.nodes("x+")[-2:]
-    model.link((int(a), "z"), {(int(b), "z"): 1.0})
+    model.constrain((int(a), "z"), {(int(b), "z"): 1.0})
 
 
 def prestressed(model):
@@ -169,7 +170,7 @@ def test_a_change_that_breaks_the_model_is_found():
     with pytest.raises(kl.ModelError, match="can still move"):
         ready.solve()
     model.fix("z-")
-    model.supports.links.append(Link(0, (3,), (1.0,)))
+    model.supports.links.append(MultiPointConstraint(0, (3,), (1.0,)))
     for _ in range(2):  # it stays broken
         with pytest.raises(kl.ModelError, match="both fixed and the slave"):
             ready.solve()
@@ -222,11 +223,11 @@ def test_wrong_cases_are_refused():
 @pytest.mark.parametrize("solver", ["dense", "direct"])
 def test_equations_alone_reduce_expand_and_multiply(solver):
     model = block()
-    model.link((35, "y"), {(34, "y"): 0.5}, 1e-4)
+    model.constrain((35, "y"), {(34, "y"): 0.5}, 1e-4)
     model.mesh.points = np.vstack([model.mesh.points, [[9.0, 9.0, 9.0]]])
     supports = kl.Model(model.mesh, STEEL).supports
     supports.fixed[:-1], supports.links = model.supports.fixed, model.supports.links
-    one = System(model.mesh.points, model.batches(), supports, solver=solver)
+    one = ConstrainedSystem(model.mesh.points, model.element_groups(), supports, solver=solver)
     assert one.nodes.tolist() == list(range(36))
     rng = np.random.default_rng(4)
     q = rng.standard_normal(len(one.reduced.free))
@@ -253,4 +254,4 @@ def test_systems_of_one_model_share_the_pattern():
     first.solve()
     second.solve()
     assert first.equations.pattern is second.equations.pattern
-    assert isinstance(first, statics.StaticSystem)
+    assert isinstance(first, statics.StaticAnalysis)

@@ -1,6 +1,6 @@
 """Loads on bodies: forces and torques fixed in space or in the body, following pressure, springs, callbacks.
 
-A load is bound to a body when it is added; what is bound gives the generalised force at any configuration.
+A load is bound to a body when it is added; what is bound gives the generalized force at any configuration.
 Loads of models (gravity, tractions, dead pressure, …) act through their nodal forces, on every kind of body.
 """
 

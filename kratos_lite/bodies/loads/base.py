@@ -8,20 +8,19 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.given import elements_of
 from kratos_lite.bodies.rigid import RigidBody
+from kratos_lite.bodies.validation import elements_of
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.loads import Gravity, Load
 from kratos_lite.materials import Isotropic3D
-from kratos_lite.series import Factor, function_of
+from kratos_lite.model.loads import Gravity, Load
+from kratos_lite.time_series import Factor, function_of
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
-Generalised: TypeAlias = Callable[[Array, Array, float], Array]
-"""Gives the generalised force (..., dofs) at a configuration, a velocity and a time."""
+Generalized: TypeAlias = Callable[[Array, Array, float], Array]
+"""Gives the generalized force (..., dofs) at a configuration, a velocity and a time."""
 FRAMES = ("spatial", "convected")
 
 
@@ -36,16 +35,16 @@ class Bound:
 
     Attributes
     ----------
-    generalised : the generalised force for the factor 1.
+    generalized : the generalized force for the factor 1.
     factor : function of the time in s.
     steady : whether the factor never changes.
     acceleration : (3,) m/s² if the load is gravity, alike everywhere.
-    spatial, convected : generalised force (..., dofs) fixed in space, or in a rigid body, if that is all.
+    spatial, convected : generalized force (..., dofs) fixed in space, or in a rigid body, if that is all.
     potential_energy : of a conservative load for the factor 1, (...) in J.
     follows_velocity : whether it may depend on the velocity.
     """
 
-    generalised: Generalised
+    generalized: Generalized
     factor: Callable[[float], float]
     steady: bool
     acceleration: Array | None = None
@@ -58,17 +57,17 @@ class Bound:
     def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> Bound:
         """Return constant loads on many bodies, for compiled steps alone."""
 
-        def generalised(q: Array, u: Array, time: float) -> Array:
+        def generalized(q: Array, u: Array, time: float) -> Array:
             raise ModelError("loads of many bodies are known only to steps that take them all at once")
 
         def potential(q: Array) -> Array:
             return np.asarray(-(mass * (acceleration * q[..., 9:]).sum(axis=-1)))
 
-        return cls(generalised, lambda t: 1.0, True, acceleration, spatial, convected, potential)
+        return cls(generalized, lambda t: 1.0, True, acceleration, spatial, convected, potential)
 
     def __call__(self, q: Array, u: Array, time: float) -> Array:
-        """Return the generalised force (..., dofs) at a configuration, a velocity and a time."""
-        return self.factor(time) * self.generalised(q, u, time)
+        """Return the generalized force (..., dofs) at a configuration, a velocity and a time."""
+        return self.factor(time) * self.generalized(q, u, time)
 
     @property
     def is_constant(self) -> bool:
@@ -102,7 +101,7 @@ def bind(load: BodyLoad | Load, body: Body, factor: Factor) -> Bound:
 
 
 def _gravity(g: Array, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
-    """Return the weight: no torque about the mass centre, whatever the body does."""
+    """Return the weight: no torque about the mass center, whatever the body does."""
     pull = body.times_mass(uniform(body, g))
     mass = body.mass
 
@@ -127,14 +126,14 @@ def _dead(load: Load, body: Body, factor: Callable[[float], float], steady: bool
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
     if body.mesh is None:
         raise ModelError(f"a {type(load).__name__} acts on a mesh; this body has none: use Force or Torque")
-    batches = (
-        body.batches
+    groups = (
+        body.groups
         if isinstance(body, FiniteElementBody)
         else elements_of(
             body.mesh, getattr(body, "material", None) or Isotropic3D(1.0, 0.0, float(body.mass))
         )
     )
-    f = load.forces(body.mesh, batches)
+    f = load.forces(body.mesh, groups)
 
     def potential(q: Array) -> Array:
         assert body.mesh is not None

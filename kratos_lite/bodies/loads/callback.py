@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.bodies.rigid_step import rotation
 from kratos_lite.errors import InputError
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 
 class Callback(BodyLoad):
@@ -22,7 +21,7 @@ class Callback(BodyLoad):
 
     Parameters
     ----------
-    function : takes configuration q, velocity u and time t in s, and returns the generalised force
+    function : takes configuration q, velocity u and time t in s, and returns the generalized force
         (..., dofs); for a rigid body also nine numbers: spatial force, spatial and referential torque.
     of_velocity : whether it depends on u; then each step is taken twice, with the old velocity and with the
         mean of old and new.
@@ -43,7 +42,7 @@ class Callback(BodyLoad):
     def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body."""
 
-        def generalised(q: Array, u: Array, time: float) -> Array:
+        def generalized(q: Array, u: Array, time: float) -> Array:
             out = finite(self.function(q, u, time), f"what a callback returns at t = {time:g} s")
             if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
                 R = rotation(q)
@@ -52,8 +51,8 @@ class Callback(BodyLoad):
             if out.shape != u.shape:
                 nine = " (or 9 numbers a body)" if isinstance(body, RigidBody) else ""
                 raise InputError(
-                    f"a callback must return a generalised force of shape {u.shape}{nine}; got {out.shape}"
+                    f"a callback must return a generalized force of shape {u.shape}{nine}; got {out.shape}"
                 )
             return out
 
-        return Bound(generalised, factor, steady, follows_velocity=self.of_velocity)
+        return Bound(generalized, factor, steady, follows_velocity=self.of_velocity)

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kratos_lite.arguments import finite
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.given import fitting, one_point, vector_of
 from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, upright
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.bodies.validation import fitting, one_point, vector_of
 from kratos_lite.errors import InputError, ModelError
-
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 
 class Force(BodyLoad):
@@ -75,11 +74,11 @@ class Torque(BodyLoad):
         if self.frame == "convected":
             return Bound(lambda q, u, time: fixed, factor, steady, convected=fixed)
 
-        def generalised(q: Array, u: Array, time: float) -> Array:
+        def generalized(q: Array, u: Array, time: float) -> Array:
             T = (np.swapaxes(rotation(q), -1, -2) @ t[..., None])[..., 0]
             return np.concatenate([T, np.zeros_like(T)], axis=-1)
 
-        return Bound(generalised, factor, steady, spatial=fixed)
+        return Bound(generalized, factor, steady, spatial=fixed)
 
 
 class Spring(BodyLoad):
@@ -113,7 +112,7 @@ class Spring(BodyLoad):
         body.find(X)
         L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
 
-        def generalised(q: Array, u: Array, time: float) -> Array:
+        def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
                 raise ModelError("a spring acts on single bodies; march them one by one")
             y = body.position(X, q) - anchor
@@ -130,7 +129,7 @@ class Spring(BodyLoad):
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
-        return Bound(generalised, factor, steady, potential_energy=potential, follows_velocity=damped)
+        return Bound(generalized, factor, steady, potential_energy=potential, follows_velocity=damped)
 
     def _pull(self, elongation: float, rate: float) -> float:
         if callable(self.stiffness):

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.arguments import finite
-from kratos_lite.batches import add_nodal
+from kratos_lite.assembly.element_groups import add_nodal
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.loads.base import BodyLoad, Bound
 from kratos_lite.elements import surface_pressure
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.loads import outward
 from kratos_lite.mesh import Where
-
-Array = NDArray[np.float64]
+from kratos_lite.model.loads import outward
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 
 class FollowerPressure(BodyLoad):
@@ -53,9 +51,9 @@ class FollowerPressure(BodyLoad):
                 add_nodal(total, block.nodes, surface_pressure(block.shape, x[block.nodes], p))
             return total
 
-        def generalised(q: Array, u: Array, time: float) -> Array:
+        def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
                 raise ModelError("a following pressure acts on single bodies; march them one by one")
             return body.push_nodes(nodal(body.position(mesh.points, q)), q)
 
-        return Bound(generalised, factor, steady)
+        return Bound(generalized, factor, steady)

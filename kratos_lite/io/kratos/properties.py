@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
 from kratos_lite.io.document import Properties
 from kratos_lite.io.names import nearest_variable
-from kratos_lite.loads import BodyForce, Gravity
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model import Model
+from kratos_lite.model.loads import BodyForce, Gravity
 
 ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}
 """Variables that say what material a Properties block means."""

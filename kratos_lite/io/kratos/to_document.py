@@ -6,19 +6,16 @@ from dataclasses import fields as constants_of
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
-from kratos_lite.loads import Gravity, Timed, Varying
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
-from kratos_lite.model import Model
+from kratos_lite.model.loads import Gravity, Timed, Varying
 from kratos_lite.shapes import Point1
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from kratos_lite.typing import Array, Ints
 
 KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}
 
@@ -47,7 +44,7 @@ def document_from(model: Model) -> Document:
         blocks.append(Block(block.name, block.nodes, block.ids, numbers[rows], block.shape))
     forces = np.zeros_like(mesh.points)
     for load in others:
-        forces += load.forces(mesh, model.batches())
+        forces += load.forces(mesh, model.element_groups())
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
     copy = Mesh(
         mesh.points,
@@ -75,14 +72,14 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
     found: dict[int, Properties] = {}
     materials: list[LinearMaterial] = []
-    for batch in model.batches():
-        if batch.rule is not batch.element.rule:
+    for group in model.element_groups():
+        if group.rule is not group.element.rule:
             raise InputError("a model with replaced quadrature rules cannot be written to .mdpa")
-        if batch.material not in materials:
-            materials.append(batch.material)
-        number = materials.index(batch.material) + 1
-        numbers[batch.rows] = number
-        found[number] = Properties(number, _values(batch.material, gravity))
+        if group.material not in materials:
+            materials.append(group.material)
+        number = materials.index(group.material) + 1
+        numbers[group.rows] = number
+        found[number] = Properties(number, _values(group.material, gravity))
     return numbers, found
 
 

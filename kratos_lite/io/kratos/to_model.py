@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.mesh import Block, distinct, rows_of_ids
-from kratos_lite.model import Model
 
 STATIC_ONLY = "do not matter in linear statics"
 
@@ -156,4 +156,4 @@ def _link(model: Model, document: Document) -> None:
         weights: dict[tuple[int, str], float] = {}
         for master, weight in zip(masters, constraint.weights, strict=True):
             weights[master] = weights.get(master, 0.0) + weight
-        model.link(slave, weights, constraint.constant)
+        model.constrain(slave, weights, constraint.constant)

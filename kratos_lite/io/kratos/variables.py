@@ -11,11 +11,11 @@ from collections.abc import Container, Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.loads import SURFACES, ConditionLoads, Gravity
+from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, with_rows
-from kratos_lite.model import Model
+from kratos_lite.model.loads import SURFACES, ConditionLoads, Gravity
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 LOADS = {
     "point": "POINT_LOAD",
     "line": "LINE_LOAD",

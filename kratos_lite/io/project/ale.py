@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from kratos_lite.ale import Motion, Rotation, Translation
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings
-from kratos_lite.io.project.strict_json import Object
-from kratos_lite.model import Model
-from kratos_lite.series import TimeSeries
+from kratos_lite.time_series import TimeSeries
 
 COMMON = ("rate", "acceleration", "damping")
 KEYS = {
-    "rotation": ("axis", "centre", "skew", "stiffening", *COMMON),
+    "rotation": ("axis", "center", "skew", "stiffening", *COMMON),
     "translation": ("direction", "ends", *COMMON),
 }
 
@@ -21,7 +21,7 @@ KEYS = {
 def add_motion(model: Model, settings: Settings, time: float | None = None) -> None:
     """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
 
-    It is ``{"rotation": {"axis", "rate", "acceleration", "centre", "skew", "stiffening", "damping"}}`` or
+    It is ``{"rotation": {"axis", "rate", "acceleration", "center", "skew", "stiffening", "damping"}}`` or
     ``{"translation": {"direction", "rate", "acceleration", "ends", "damping"}}`` with the arguments of
     `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.  Given a
     `time` in s, such tables stay what they are then.
@@ -55,7 +55,7 @@ def read_motion(section: Settings, kind: str, time: float | None = None) -> Moti
     for key in section.values:
         if key in ("axis", "direction"):
             given[key] = section.text(key) if isinstance(section.values[key], str) else section.vector(key)
-        elif key == "centre":
+        elif key == "center":
             given[key] = section.vector(key)
         elif key in ("skew", "stiffening"):
             given[key] = section.flag(key)

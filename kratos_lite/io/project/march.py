@@ -6,17 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.arguments import positive_step, whole_number
 from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings, inside, is_number, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import March
-from kratos_lite.loads import Load, Varying
-from kratos_lite.series import TimeSeries
+from kratos_lite.model.loads import Load, Varying
+from kratos_lite.time_series import TimeSeries
+from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
-    from kratos_lite.dynamics import CentralDifference
-    from kratos_lite.dynamics.schemes import Implicit
+    from kratos_lite.analysis import CentralDifference
+    from kratos_lite.analysis.schemes import Implicit
 
 KEYS = ("step", "steps", "every", "scheme", "rayleigh", "lumped", "restart")
 SERIES = (".pvd", ".csv", ".npz")
@@ -26,7 +26,7 @@ SCHEMES = {
     "newmark": (0, 2),
     "hht": (0, 1),
     "bossak": (0, 1),
-    "generalised_alpha": (0, 1),
+    "generalized_alpha": (0, 1),
     "central_difference": (0,),
 }
 """How many numbers each scheme takes."""
@@ -43,7 +43,7 @@ def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
     counts = SCHEMES[name]
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
-    from kratos_lite import dynamics
+    from kratos_lite import analysis as dynamics
 
     make: Callable[..., Implicit | CentralDifference]
     make = getattr(dynamics, "CentralDifference" if name == "central_difference" else name)

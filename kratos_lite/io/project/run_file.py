@@ -7,18 +7,18 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.json_file import Object
+from kratos_lite.io.kratos.time_integration import DYNAMIC
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
-from kratos_lite.io.project.kratos_time import DYNAMIC
 from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scene import Scene
-from kratos_lite.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model import Model
+from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
@@ -52,7 +52,7 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
     """
     settings, folder = read_settings(path), Path(path).parent
     if "solver_settings" in settings or "problem_data" in settings:
-        from kratos_lite.io.project.kratos import read_kratos_project
+        from kratos_lite.io.kratos.run_file import read_kratos_project
 
         return read_kratos_project(settings, folder, allow_outside)
     if "properties" in settings and "model" not in settings:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kratos_lite.errors import InputError, nearest
-from kratos_lite.io.project.strict_json import Object, read_json
+from kratos_lite.io.json_file import Object, read_json
 
 REQUIRED: Any = object()
 """Default of a key that must be given."""
@@ -30,7 +30,7 @@ class Settings:
 
     Examples
     --------
-    >>> from kratos_lite.io.project.strict_json import parse_json
+    >>> from kratos_lite.io.json_file import parse_json
     >>> Settings(parse_json('{"type": "amg"}'), "run.json").text("type")
     'amg'
     """

@@ -11,7 +11,7 @@ from kratos_lite.bodies import Body
 from kratos_lite.errors import nearest
 from kratos_lite.io.project.settings import Settings
 from kratos_lite.io.scenes.values import Read, function, number, part, placed, points, text, vector
-from kratos_lite.loads import Gravity, PointLoad, Pressure, Traction
+from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
 
 
 @dataclass(frozen=True)

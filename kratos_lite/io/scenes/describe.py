@@ -36,9 +36,9 @@ def describe_scene(scene: BodyScene) -> str:
     body = scene.body
     lines = body_lines(scene)
     if body.q.ndim == 1:
-        moments = ", ".join(f"{value:.7g}" for value in body.characteristics.inertia.diagonal())
+        moments = ", ".join(f"{value:.7g}" for value in body.mass_properties.inertia.diagonal())
         lines += [
-            line("mass centre", f"{vector(body.mass_center())} m"),
+            line("mass center", f"{vector(body.mass_center())} m"),
             line("inertia xx, yy, zz", f"{moments} kg m²"),
             line("energy", f"{float(body.energy()):.7g} J"),
         ]

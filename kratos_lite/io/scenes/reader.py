@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody, State
-from kratos_lite.bodies.given import Material
-from kratos_lite.characteristics import Characteristics
+from kratos_lite.bodies.rotations import exp
+from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.generate import annulus, box
 from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.project.run_file import read_material
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.io.scenes.actions import add_constraint, add_load
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
 from kratos_lite.io.scenes.values import Read, matrix, number, placed, vector
 from kratos_lite.mesh import Mesh
-from kratos_lite.rotations import exp
+from kratos_lite.mesh.generators import annulus, box
+from kratos_lite.model.mass_properties import MassProperties
 
 KEYS = ("mesh", "material", "body", "start", "loads", "constraints", "time", "output", "restart")
 MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str], Any]]]] = {
@@ -199,29 +199,29 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     owner, key = (settings, "body") if whole else (section, "kind")
     kind = placed(owner, key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
-    options = [name for name in (*OPTIONS, "characteristics") if name in arguments]
+    options = [name for name in (*OPTIONS, "mass_properties") if name in arguments]
     section.check_keys(("kind", *options))
     given: dict[str, Any] = {name: OPTIONS[name](section, name) for name in OPTIONS if name in section}
-    if "characteristics" in section:
-        inner = section.section("characteristics")
-        given["characteristics"] = placed(section, "characteristics", _characteristics, inner, mesh, material)
+    if "mass_properties" in section:
+        inner = section.section("mass_properties")
+        given["mass_properties"] = placed(section, "mass_properties", _characteristics, inner, mesh, material)
     elif mesh is None:
         raise settings.error("mesh", "key 'mesh' is missing: it is the shape of the body")
-    if material is None and "characteristics" not in given and not issubclass(kind, Obstacle):
+    if material is None and "mass_properties" not in given and not issubclass(kind, Obstacle):
         raise settings.error(
             "material", 'key \'material\' is missing, and the mesh has none: {"E": …, "nu": …, "density": …}'
         )
     return placed(owner, key, kind, mesh, material, **given)
 
 
-def _characteristics(section: Settings, mesh: Mesh | None, material: Material | None) -> Characteristics:
-    """Return characteristics: those of the mesh with the given ones in their place."""
+def _characteristics(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
+    """Return mass_properties: those of the mesh with the given ones in their place."""
     section.check_keys(CHARACTERISTICS)
     given = {key: CHARACTERISTICS[key](section, key, mesh) for key in section.values}
     if mesh is None or material is None:
         section.get("mass")
-        return Characteristics(**given)
-    return RigidBody(mesh, material).characteristics.with_(**given)
+        return MassProperties(**given)
+    return RigidBody(mesh, material).mass_properties.with_(**given)
 
 
 def _start(settings: Settings, body: Body) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from kratos_lite.assembly import Progress
 from kratos_lite.bodies import Body, State, march
 from kratos_lite.errors import InputError
+from kratos_lite.typing import Progress
 
 OUTPUTS = ("pvd", "csv", "npz", "picture", "state")
 """What a scene can write: series of states, a picture, and the last state for a restart."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kratos_lite.bodies import Body
-from kratos_lite.bodies.many import together
+from kratos_lite.bodies.batched import together
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.scenes.kinds import NEEDED
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene

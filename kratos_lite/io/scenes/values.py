@@ -6,15 +6,14 @@ from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.bodies import TimeSeries
 from kratos_lite.errors import KratosLiteError
+from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings, is_number, shown
-from kratos_lite.io.project.strict_json import Object
 from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Read: TypeAlias = Callable[[Settings, str, "Mesh | None"], Any]
 """Reads the value of a key of an object; the mesh is that of the body, if it has one."""

@@ -1,0 +1,328 @@
+"""The equations of motion of a model: M u'' + C u' + K u = f(t), with what a motion of the material adds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import solvers
+from kratos_lite.ale import MotionMatrices, Rotation, Translation
+from kratos_lite.ale.boundaries import dashpots
+from kratos_lite.ale.checks import warnings_of
+from kratos_lite.ale.matrices import exact_rule
+from kratos_lite.ale.symmetry import check_materials
+from kratos_lite.analysis.time_dependent_loads import AppliedLoads, Prescribed
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.model.rigid_body_modes import check_supports
+from kratos_lite.solvers.banded import add_scalar
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.mass import Mass
+from kratos_lite.solvers.supports import resolve
+from kratos_lite.typing import Array, Progress
+from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
+
+Solve: TypeAlias = Callable[[Array, Array], Array]
+"""Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
+
+DIRECT_MAX = 30_000
+"""Up to this many unknowns matrices are factorized, as they are needed many times."""
+
+
+class EquationsOfMotion:
+    """Mass, damping, stiffness and loads of a model, on the nodes that its elements use.
+
+    Parameters
+    ----------
+    model : elements with density, supports, loads, and its motion if it has one.
+    lumped : whether the mass stands in the nodes.
+    rayleigh : α in 1/s and β in s of the damping α M + β K.
+    free : whether supports may leave rigid motions free.
+    steady : take a rate that changes as one that stays, unless the motion is given an acceleration.
+
+    Attributes
+    ----------
+    groups : the elements, on all nodes of the mesh.
+    system : pattern, K and supports.
+    mass : M.
+    terms : the matrices of the motion, or None.
+    applied : function of the time that gives the nodal forces (3a,) of all loads but those of the motion.
+    prescribed : function of the time that gives the displacements (3a,) where the free ones are 0.
+    step : s, over which an acceleration is taken from the rate; 0 for its slope.
+    warnings : what the checks of the model and of its motion at the time 0 found.
+
+    Vectors are (3a,): dof = 3·node + axis of the nodes that elements use.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        lumped: bool = False,
+        rayleigh: tuple[float, float] = (0.0, 0.0),
+        free: bool = True,
+        steady: bool = False,
+        progress: Progress | None = None,
+    ) -> None:
+        self.model, self._steady = model, steady
+        self.step = 0.0
+        self.rayleigh = _checked_rayleigh(rayleigh)
+        self.groups, part, self.warnings = model.checked(free=free)
+        for group in self.groups:
+            if not group.material.density > 0:
+                raise ModelError(
+                    f"{type(group.material).__name__} has density {group.material.density:g}, but what moves "
+                    "needs mass; give each material a density > 0 kg/m³"
+                )
+        links = resolve(model.supports, part >= 0) if model.supports.links else {}
+        self.system = ConstrainedSystem(
+            model.mesh.points,
+            self.groups,
+            model.supports,
+            links,
+            solver="direct",
+            patterns=model.patterns,
+            progress=progress,
+        )
+        self.applied = AppliedLoads(model, self.system, self.groups)
+        self.prescribed = Prescribed(model, self.system)
+        placed = self.system.points, self.system.groups, self.system.pattern
+        self.mass = Mass(*placed, lumped)
+        self.terms: MotionMatrices | None = None
+        if model.motion is not None:  # by the rule of G and H: then G u = M (L A X) holds for u = L X
+            exact = Mass(*placed, False, lambda element: exact_rule(element.shape))
+            self.mass = Mass(*placed, True, exact.rule_of) if lumped else exact
+            self.terms = MotionMatrices(model.motion, *placed, exact)
+            check_materials(self.terms)
+            self.warnings += warnings_of(self.terms, model)
+            if self.rayleigh[1]:
+                self.warnings.append(
+                    "Rayleigh's β K u' damps in fixed axes, not along with the material that moves; take the "
+                    "damping of the motion"
+                )
+        self._kept: tuple[Any, Solve] | None = None
+        self._scalar_kept: tuple[tuple[float, float], tuple[Any, Any]] | None = None
+
+    # ---- loads and supports ------------------------------------------------------------------------------
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom, the prescribed ones among them."""
+        return 3 * len(self.system.nodes)
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which degrees of freedom (3a,) supports or constraints hold."""
+        held = np.ones(self.size, dtype=bool)
+        held[self.system.reduced.free] = False
+        return held
+
+    def load(self, time: float) -> Array:
+        """Return the nodal forces (3a,) at a time, those of the motion among them."""
+        return self.applied(time) + self.inertia_load(time)
+
+    def inertia_load(self, time: float) -> Array:
+        """Return the centrifugal and Euler load (3a,) of the motion at a time."""
+        if self.terms is None:
+            return np.zeros(self.size)
+        rate, acceleration = self.rates(time)
+        total = np.zeros_like(self.system.points)
+        if rate:
+            total += rate**2 * self.terms.centrifugal
+        if acceleration:
+            total += acceleration * self.terms.euler
+        return total.ravel()
+
+    # ---- matrices ----------------------------------------------------------------------------------------
+
+    @property
+    def K(self) -> BlockMatrix:
+        """Stiffness (3a, 3a) of the elements alone in N/m."""
+        K: BlockMatrix = self.system.K
+        return K
+
+    def stiffness_terms(self, time: float) -> Array | None:
+        """Return what the motion adds to K, data (nnz,) on the pattern, or None."""
+        if self.terms is None:
+            return None
+        motion, terms = self.terms.motion, self.terms
+        rate, acceleration = self.rates(time)
+        out: Array | None = None
+        if rate:
+            out = -(rate**2) * terms.H
+            if self.stiffened:
+                out = out + rate**2 * self.stiffening
+        carried = acceleration + motion.damping * rate
+        if carried:
+            flow = carried * (terms.G if isinstance(motion, Translation) else self._convective)
+            out = flow if out is None else out + flow
+        return out
+
+    def damping_terms(self, time: float) -> Array | None:
+        """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
+        alpha = self.rayleigh[0] + (self.terms.motion.damping if self.terms else 0.0)
+        out: Array | None = alpha * self.mass_data if alpha else None
+        if self.terms is not None and (rate := self.terms.motion.rate(time)):
+            gyroscopic = 2 * rate * self._convective
+            out = gyroscopic if out is None else out + gyroscopic
+        return out
+
+    @property
+    def _convective(self) -> Array:
+        """G, or its skew part where that is asked for: a window takes it for 2 s G u', with its dashpots."""
+        assert self.terms is not None
+        motion = self.terms.motion
+        return self.terms.G if isinstance(motion, Rotation) and not motion.skew else self.terms.S
+
+    @property
+    def stiffened(self) -> bool:
+        """Whether the motion has centrifugal stiffening."""
+        return (
+            self.terms is not None
+            and isinstance(self.terms.motion, Rotation)
+            and self.terms.motion.stiffening
+        )
+
+    @cached_property
+    def stiffening(self) -> Array:
+        """Stiffness by the stress of the centrifugal load for the rate 1, data (nnz,) in kg/s²."""
+        assert self.terms is not None
+        at_zero = replace(self.system.reduced, c=np.zeros_like(self.system.reduced.c))
+        equations = solvers.LinearSolver(self.K, at_zero, self.system.points, "direct", "")
+        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12).x
+        return self.terms.stiffening(u0.reshape(-1, 3))
+
+    @cached_property
+    def mass_data(self) -> Array:
+        """Mass matrix as data (nnz,) on the pattern in kg."""
+        from scipy.sparse import csr_array
+
+        if not self.mass.lumped:
+            return np.asarray(self.mass.scalar.data)
+        pattern = self.system.pattern
+        data = np.zeros(len(pattern.indices))
+        empty = csr_array((data, pattern.indices, pattern.indptr), shape=self.mass.scalar.shape)
+        rows = np.repeat(np.arange(pattern.n_nodes), np.diff(pattern.indptr))
+        empty.data[rows == pattern.indices] = self.mass.nodal
+        return np.asarray(empty.data)
+
+    @cached_property
+    def dashpots(self) -> BlockMatrix | None:
+        """Damping of the absorbing ends of a window, (3a, 3a) in N s/m, or None."""
+        motion = self.terms.motion if self.terms else None
+        if not isinstance(motion, Translation) or motion.ends != "absorbing":
+            return None
+        return dashpots(self.model.mesh, motion, self.system)
+
+    def times_mass(self, v: Array) -> Array:
+        """Return M v."""
+        return self.mass.times(v)
+
+    def times_damping(self, v: Array, time: float) -> Array:
+        """Return C v at a time."""
+        out = self.rayleigh[1] * (self.K @ v) if self.rayleigh[1] else np.zeros_like(v)
+        if (scalar := self._scalars(time)[1]) is not None:
+            out = out + (scalar @ v.reshape(-1, 3)).ravel()
+        if self.dashpots is not None:
+            out = out + self.dashpots @ v
+        return np.asarray(out)
+
+    def times_stiffness(self, u: Array, time: float) -> Array:
+        """Return K u with what the motion adds, at a time."""
+        out = self.K @ u
+        if (scalar := self._scalars(time)[0]) is not None:
+            out = out + (scalar @ u.reshape(-1, 3)).ravel()
+        return np.asarray(out)
+
+    def _scalars(self, time: float) -> tuple[Any, Any]:
+        """Return what the motion adds to K and C as sparse (a, a), or None; kept for the same rates."""
+        from scipy.sparse import csr_array
+
+        key = self.rates(time)
+        if self._scalar_kept is None or self._scalar_kept[0] != key:
+            pattern = self.system.pattern
+            n = pattern.n_nodes
+            pair = [
+                None if data is None else csr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+                for data in (self.stiffness_terms(time), self.damping_terms(time))
+            ]
+            self._scalar_kept = key, (pair[0], pair[1])
+        return self._scalar_kept[1]
+
+    def matrix(self, time: float, m: float, c: float, k: float) -> BlockMatrix:
+        """Return m M + c C + k K at a time, (3a, 3a)."""
+        K = self.K
+        A = BlockMatrix((k + c * self.rayleigh[1]) * K.data, K.indices, K.indptr)
+        scalar = m * self.mass_data
+        for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
+            if factor and (terms := made(time)) is not None:
+                scalar = scalar + factor * terms
+        add_scalar(A, scalar)
+        if c and self.dashpots is not None:
+            A.data += c * self.dashpots.data
+        return A
+
+    def solver(self, time: float, m: float, c: float, k: float) -> Solve:
+        """Return what solves (m M + c C + k K) u = f + reactions; kept as long as the matrix is the same."""
+        key = m, c, k, *self.rates(time)
+        if self._kept is None or self._kept[0] != key:
+            self._kept = key, self._solver(self.matrix(time, m, c, k), self.is_symmetric(time, c))
+        return self._kept[1]
+
+    def rates(self, time: float) -> tuple[float, float]:
+        """Return rate and acceleration of the motion at a time."""
+        if self.terms is None:
+            return 0.0, 0.0
+        motion = self.terms.motion
+        if motion.is_accelerated or not (self._steady or self.step):
+            return motion.rate(time), motion.acceleration(time)
+        if self._steady:
+            return motion.rate(time), 0.0
+        start = max(time - self.step / 2, 0.0)  # the mean over a step: in all the whole change
+        end = time + self.step / 2
+        return motion.rate(time), (motion.rate(end) - motion.rate(start)) / (end - start)
+
+    @cached_property
+    def free_motions(self) -> str:
+        """What the supports leave free of rigid motions; empty where they hold all."""
+        try:
+            check_supports(self.model.mesh, self.model.supports)
+        except ModelError as error:
+            return str(error).removeprefix("the supports leave rigid motions free: ")
+        return ""
+
+    def is_symmetric(self, time: float, c: float) -> bool:
+        """Return whether a matrix with the share c of damping is symmetric at a time."""
+        rate, acceleration = self.rates(time)
+        damped = bool(self.terms and self.terms.motion.damping)
+        return not (acceleration or (rate and (c or damped)))
+
+    def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
+        reduced = self.system.reduced
+        iterate = symmetric and len(reduced.free) > DIRECT_MAX
+        method = "amg" if iterate else "direct"
+        equations = solvers.LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
+
+        def solve(f: Array, prescribed: Array) -> Array:
+            reduced.c, kept = prescribed, reduced.c
+            try:
+                return equations.solve(f, 1e-13).x
+            finally:
+                reduced.c = kept
+
+        return solve
+
+
+def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:
+    values = finite(rayleigh, "the Rayleigh damping")
+    if values.shape != (2,) or (values < 0).any():
+        raise InputError(f"Rayleigh damping is α ≥ 0 in 1/s and β ≥ 0 in s; got {rayleigh!r}")
+    return float(values[0]), float(values[1])

@@ -1,0 +1,167 @@
+"""Natural frequencies of a model, and the complex ones of a model whose material moves through its mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.errors import InputError, SolveError
+from kratos_lite.solvers import direct
+from kratos_lite.solvers.banded import add_scalar
+from kratos_lite.solvers.eigen import DENSE_MODES, modes
+from kratos_lite.typing import Array, Complexes
+from kratos_lite.validation import whole_number
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
+
+FEW = 40
+"""Up to this many unknowns there is nothing to iterate for."""
+
+
+def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array, Array]:
+    """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
+    equations = EquationsOfMotion(model, lumped=lumped)
+    K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
+    omega, shapes = modes(K, M, count)
+    return omega, expanded(equations, shapes)
+
+
+def complex_modes(model: Model, count: int) -> tuple[Complexes, Complexes]:
+    """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
+    e = EquationsOfMotion(model, steady=True)
+    M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    n = K.shape[0]
+    if whole_number(count, "count") > 2 * n:
+        raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
+    if 2 * n <= DENSE_MODES or count > n // 4:
+        inverse = np.linalg.inv(M.toarray())
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K.toarray(), -inverse @ C.toarray()]])
+        values, vectors = np.linalg.eig(A)
+    else:
+        values, vectors = _by_iteration(M, C, K, count)
+    order = np.argsort(np.abs(values), kind="stable")[:count]
+    return values[order], expanded(e, vectors[:n, order])
+
+
+def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Complexes]:
+    """Return eigenvalues nearest to 0 by Arnoldi on the inverse pencil, which needs factors of K alone.
+
+    With x = (u, λ u) the inverse takes (p, q) to (-K^-1 (C p + M q), p).
+    """
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+    n = K.shape[0]
+    factors = direct.factorize(K, symmetric=False)
+
+    def inverse(x: Array) -> Array:
+        p, q = x[:n], x[n:]
+        return np.concatenate([-factors.solve(C @ p + M @ q), p])
+
+    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(2 * n)
+    # Eigenvalues come in pairs, often nearly repeated: room for more of them, no tolerance below rounding.
+    wanted = min(count + 2, 2 * n - 2)
+    try:
+        values, vectors = eigs(operator, wanted, which="LM", v0=start, ncv=3 * wanted + 20, tol=1e-11)
+    except ArpackNoConvergence as error:
+        raise SolveError(
+            f"only {len(error.eigenvalues)} of {wanted} complex modes are found; ask for fewer, or for more "
+            "to have repeated ones in full"
+        ) from None
+    return 1 / values, vectors
+
+
+def critical_rate(model: Model, count: int = 1) -> Array:
+    """Return the lowest rates (count,) at which K - rate² H is singular, in rad/s or m/s.
+
+    They are those of the mesh, and fall with ever finer ones.
+    """
+    count = whole_number(count, "count")
+    e = EquationsOfMotion(model, free=False)
+    if e.terms is None:
+        raise InputError("a critical rate belongs to a motion; add kratos_lite.ale.Rotation or Translation")
+    return critical_rates(e, count)
+
+
+def critical_rates(e: EquationsOfMotion, count: int) -> Array:
+    """Return the lowest critical rates (count,) of equations whose supports hold all rigid motions."""
+    K, H = _critical_pencil(e)
+    n = K.shape[0]
+    if count > n:
+        raise InputError(f"this model has 1 … {n} critical rates; got {count}")
+    if n <= DENSE_MODES or count > n // 4:
+        largest = _dense(K, H)[::-1][:count]
+    else:
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        factors = direct.factorize(K)
+        inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
+        start = np.random.default_rng(0).standard_normal(n)
+        largest = eigsh(H, count, K, which="LA", Minv=inverse, v0=start, return_eigenvectors=False)[::-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sort(np.where(largest > 0, 1 / np.sqrt(np.maximum(largest, 1e-300)), np.inf))
+
+
+def critical_rates_beside(
+    e: EquationsOfMotion, rate: float, factors: direct.Factorization | None = None
+) -> tuple[float, float]:
+    """Return the critical rates of the mesh next below and next above a rate > 0, to some 1 %.
+
+    They are 0 and infinite where there is none.  `factors` are those of K - rate² H, if they are known: some
+    twenty solutions with them are enough.
+    """
+    square, (K, H) = rate**2, _critical_pencil(e)
+    if K.shape[0] <= FEW:
+        with np.errstate(divide="ignore"):
+            squares = 1 / _dense(K, H)
+    else:
+        factors = factors or direct.factorize((K - square * H).tocsr())
+        squares = _beside(K, H, square, factors)
+    below, above = squares[(squares > 0) & (squares <= square)], squares[squares > square]
+    return float(np.sqrt(below.max(initial=0.0))), float(np.sqrt(above.min(initial=np.inf)))
+
+
+def _beside(K: Any, H: Any, square: float, factors: direct.Factorization) -> Array:
+    """Return eigenvalues of K φ = λ H φ on either side of a number, by Lanczos on (K - number H)^-1 K."""
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    n = K.shape[0]
+    inverse = LinearOperator((n, n), matvec=factors.apply, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    way = {"mode": "buckling", "which": "BE", "OPinv": inverse, "v0": start, "return_eigenvectors": False}
+    try:
+        return np.asarray(eigsh(K, 2, H, sigma=square, tol=1e-2, ncv=FEW // 2, maxiter=3, **way))
+    except ArpackError as error:  # what it has found, if anything
+        return np.asarray(getattr(error, "eigenvalues", ()), dtype=float)
+
+
+def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:
+    """Return K and H, less what stiffens, on the free degrees of freedom."""
+    assert e.terms is not None
+    H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
+    add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
+    return reduced(e, e.K), reduced(e, H)
+
+
+def _dense(K: Any, H: Any) -> Array:
+    """Return all 1 / λ of K φ = λ H φ, ascending."""
+    from scipy.linalg import eigh
+
+    return np.asarray(eigh(H.toarray(), K.toarray(), eigvals_only=True))
+
+
+def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:
+    """Return T^T A T on the free degrees of freedom as CSR."""
+    return equations.system.reduced.restrict(A.scipy().tocsr())
+
+
+def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
+    """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
+    system, count = equations.system, shapes.shape[1]
+    out = np.zeros((count, system.n_nodes, 3), dtype=shapes.dtype)
+    out[:, system.nodes] = system.reduced.follow(shapes).T.reshape(count, -1, 3)
+    return out

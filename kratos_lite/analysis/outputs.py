@@ -1,0 +1,177 @@
+"""Outputs of bodies in motion: the velocity of their material, and what their supports carry together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.ale import Rotation
+from kratos_lite.ale.checks import critical_rate_estimate
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.moment import Moment
+from kratos_lite.analysis.result import Report, Result
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Where
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
+
+
+class Reacting(Protocol):
+    """A result or a moment."""
+
+    @property
+    def reactions(self) -> Array:
+        """Return the reactions (n, 3) in N."""
+
+
+def reaction_resultant(
+    model: Model, of: Reacting, where: Where | None = None, center: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Return the force of the supports on the body and its moment about a point, as those of a hub.
+
+    Arms are those of the undeformed body.
+
+    Parameters
+    ----------
+    model : the model.
+    of : its result, or a moment of it.
+    where : nodes whose reactions count; all if not given.
+    center : (3,) m; the center of the rotation of the model, otherwise the origin, if not given.
+
+    Returns
+    -------
+    force (3,) in N, moment (3,) in N m.
+
+    Raises
+    ------
+    InputError
+        The reactions are not those of this model, or the center is not a point.
+    ModelError
+        No node is chosen.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
+    >>> bar.fix("x-")
+    >>> bar.add(kl.Traction("x+", (0, 0, 2.0)))
+    >>> force, moment = reaction_resultant(bar, bar.solve(), "x-", center=(0, 0.5, 0.5))
+    >>> print(f"{force[2]:.6f} N, {moment[1]:.6f} N m")
+    -2.000000 N, 2.000000 N m
+    """
+    if not hasattr(of, "reactions"):
+        raise InputError(f"a Result or a Moment is needed; got {type(of).__name__}")
+    if of.reactions.shape != model.mesh.points.shape:
+        raise InputError(f"reactions of {len(of.reactions)} nodes; the model has {model.mesh.n_nodes}")
+    rows = np.arange(model.mesh.n_nodes) if where is None else model.mesh.nodes(where)
+    if not len(rows):
+        raise ModelError(f"no node is chosen by {where!r}")
+    given = model.motion.center if isinstance(model.motion, Rotation) else np.zeros(3)
+    point = given if center is None else finite(center, "a center")
+    if point.shape != (3,):
+        raise InputError(f"a center must have shape (3,); got {point.shape}")
+    forces = of.reactions[rows]
+    return forces.sum(axis=0), np.cross(model.mesh.points[rows] - point, forces).sum(axis=0)
+
+
+def material_velocity(model: Model, displacement: ArrayLike, time: float = 0.0) -> Array:
+    """Return the velocity of the material in space where nothing changes with the time: (n, 3) in m/s.
+
+    It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
+    window has no first term: its body is at rest but for its waves.  `Transient.material_velocity` adds u'.
+
+    Parameters
+    ----------
+    model : with a motion of the material.
+    displacement : (n, 3) m, such as `Result.u`.
+    time : s, of a rate that changes.
+
+    Raises
+    ------
+    InputError
+        The model has no motion, or the displacement another shape.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> wheel = kl.Model(kl.annulus(0.2, 1.0, 0.1), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    >>> wheel.fix("inner")
+    >>> wheel.add(kl.ale.Rotation("z", rate=10.0))
+    >>> v = material_velocity(wheel, wheel.solve().u)
+    >>> print(f"{abs(v).max():.2f} m/s")
+    10.00 m/s
+    """
+    u = finite(displacement, "a displacement")
+    if model.motion is None:
+        raise InputError("the model has no motion of its material, so that it is at rest")
+    if u.shape != model.mesh.points.shape:
+        raise InputError(f"a displacement needs shape {model.mesh.points.shape}; got {u.shape}")
+    e = EquationsOfMotion(model)
+    local = e.system.local(u)
+    return e.system.whole(velocity_of_material(e, local, np.zeros_like(local), time))
+
+
+def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) -> Array:
+    """Return u' + rate (A (X - X0) + M^-1 G u), (3a,) in m/s."""
+    rate = e.rates(time)[0]
+    if e.terms is None or not rate:
+        return v.copy()
+    along = e.mass.solve(e.terms.times(e.terms.G, u.reshape(-1, 3)).ravel())
+    if isinstance(e.terms.motion, Rotation):
+        along = along + e.terms.motion.field(e.system.points).ravel()
+    return np.asarray(v + rate * along)
+
+
+def motion_summary(
+    e: EquationsOfMotion, of: Reacting, critical: float | None, time: float = 0.0
+) -> dict[str, Any]:
+    """Return the figures of a motion at a time for a report; `critical` is the lowest critical rate."""
+    assert e.terms is not None
+    (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
+    critical = None if critical == np.inf else critical
+    turns = isinstance(e.terms.motion, Rotation)
+    noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
+    force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))
+    return {
+        "kind": "rotation" if turns else "translation",
+        "unit": "rad/s" if turns else "m/s",
+        "direction": e.terms.motion.direction.tolist(),
+        "rate": rate,
+        "acceleration": acceleration,
+        "critical_rate": critical,
+        "critical_rate_of_waves": waves,
+        "margin": 1 - abs(rate) / (critical or waves),
+        "support_force": force.tolist(),
+        "support_moment": moment.tolist(),
+    }
+
+
+def result_of(
+    e: EquationsOfMotion, at: Moment, scheme: str, left: float | None, critical: float | None
+) -> Result:
+    """Return a moment as a result; `left` is what its balance misses, where that is known."""
+    model, loads = e.model, e.system.whole(e.load(at.time)).copy()
+    report = Report(
+        unknowns=len(e.system.reduced.free),
+        total_load=loads.sum(axis=0),
+        total_reaction=at.reactions.sum(axis=0),
+        solver=scheme,
+        reason=f"step {at.step}, t = {at.time:g} s",
+        iterations=0,
+        backward_error=left,
+        force_error=None,
+        moment_error=None,
+        seconds={},
+        warnings=list(e.warnings),
+        notes=list(model.notes),
+    )
+    u0 = model.initial_displacement
+    result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)
+    if e.terms is not None:
+        report.motion = motion_summary(e, result, critical, at.time)
+    return result

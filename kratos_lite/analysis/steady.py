@@ -1,0 +1,92 @@
+"""Steady motion: what rests in space while its material moves through the mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kratos_lite import solvers
+from kratos_lite.ale.checks import critical_rate_estimate, near_critical
+from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
+from kratos_lite.analysis.outputs import motion_summary
+from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.static import Phases, check_arguments, judge, quality
+from kratos_lite.model.checks import equilibrium
+from kratos_lite.model.loads import check_loads
+from kratos_lite.solvers.direct import Factorization
+from kratos_lite.typing import Progress
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.model import Model
+
+
+def solve_steady(
+    model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+) -> Result:
+    """Solve (K - rate² H + …) u = f of a model with a motion, at the time 0; see `Model.solve`."""
+    check_arguments(solver, tolerance, progress)
+    phase = Phases()
+    with phase("check"):
+        e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
+        warnings, changing = list(e.warnings), []
+        if e.terms is not None and not e.terms.motion.steady:
+            changing = [
+                f"the rate changes; this is the steady state of {e.rates(0.0)[0]:g}, as at the time 0"
+            ]
+    with phase("load"):
+        forces, inertia = e.load(0.0), e.inertia_load(0.0)
+        nodal = e.system.whole(forces).copy()
+        warnings += check_loads(model.loads, e.system.groups, nodal, model.supports)
+    with phase("assemble"):
+        A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
+    with phase("solve"):
+        method, why = _way(e, solver, symmetric)
+        equations = solvers.LinearSolver(
+            A, e.system.reduced, e.system.points, method, why, symmetric=symmetric
+        )
+        solution = equations.solve(forces, tolerance, progress)
+    with phase("verify"):
+        u = solution.x
+        left = e.system.whole(A @ u - forces)
+        reactions = model.supports.carried(left)
+        inner = e.system.whole(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
+        balance = equilibrium(model.mesh.points, nodal - inner, reactions)
+        judge(solution, u, balance)
+        critical = None
+        if e.terms is not None and e.rates(0.0)[0]:
+            if solution.method == "direct":
+                critical = _critical_rate(e, equations.factors if symmetric else None)
+            limit = critical_rate_estimate(e.terms) if critical is None else critical
+            warnings += near_critical(e.terms.motion, 0.0, limit, critical is not None)
+    report = Report(
+        unknowns=len(e.system.reduced.free),
+        total_load=nodal.sum(axis=0),
+        total_reaction=reactions.sum(axis=0),
+        **quality(solution, balance),
+        seconds=phase.seconds,
+        warnings=warnings,
+        notes=[*model.notes, *changing],
+        skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
+    )
+    u0 = model.initial_displacement
+    result = Result(model.mesh, e.groups, e.system.whole(u), reactions, nodal, report, u0)
+    report.motion = motion_summary(e, result, critical)
+    return result
+
+
+def _way(e: EquationsOfMotion, solver: str, symmetric: bool) -> tuple[str, str]:
+    """Return how the equations are solved, and why so."""
+    if not symmetric:
+        return "direct", "the matrix of a motion with damping is not symmetric"
+    if solver != "amg" and (solver == "direct" or len(e.system.reduced.free) <= DIRECT_MAX):
+        return "direct", "one of few unknowns"
+    return "amg", "many unknowns"
+
+
+def _critical_rate(e: EquationsOfMotion, factors: Factorization | None) -> float:
+    """Return the critical rate next above that of a motion, or the lowest if one lies below."""
+    assert e.terms is not None
+    rate = e.rates(0.0)[0]
+    below, above = critical_rates_beside(e, rate, factors)
+    far = abs(rate) > critical_rate_estimate(e.terms)  # where those below are too far away to be found
+    return float(critical_rates(e, 1)[0]) if below or far else above

@@ -1,0 +1,1 @@
+"""Assembly: from elements to global matrices and vectors."""

@@ -1,0 +1,271 @@
+"""Large displacements: internal load, stiffness, energy and highest frequency of groups of elements.
+
+Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where C is that of the material and
+S0 the prestress of a group; the formulas are in `elements.total_lagrangian`.  It holds for large
+rotations with small strains; under strong compression the law loses its stiffness (a confined bar at a
+stretch of 1/√3).
+
+Compiled kernels are taken where the element class leaves its geometry as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
+from kratos_lite.assembly.fields import GEOMETRY
+from kratos_lite.assembly.stiffness import SCATTER_BYTES, Pattern
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements import total_lagrangian as lagrange
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.errors import MaterialError
+from kratos_lite.native import kernels
+from kratos_lite.typing import Array
+
+SAME_SHAPE = 1e-10
+"""Elements whose edges differ by less than this share of their size have one frequency."""
+
+
+def _compiled(group: ElementGroup) -> Any:
+    """Return the kernels if they stand for the geometry of an element class, else None."""
+    if all(getattr(group.element, name) is getattr(KinematicLinear, name) for name in GEOMETRY):
+        return kernels("lagrange")
+    return None
+
+
+def _floats(values: Any) -> Array:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
+    """Return points, nodes, dN and weights of a group, as kernels take them."""
+    dN = _floats(tabulate(group.element.shape, group.rule)[1])
+    nodes = np.ascontiguousarray(group.nodes, dtype=np.int32)
+    return _floats(points), nodes, dN, _floats(group.rule.weights)
+
+
+def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
+    """Return displacements, increment and damping, as kernels take them."""
+    return _floats(q), None if dq is None else _floats(dq), damping
+
+
+def _law(group: ElementGroup) -> tuple[Any, ...]:
+    """Return C and prestress of a group, as kernels take them."""
+    return _floats(group.material.C), None if group.prestress is None else _floats(group.prestress)
+
+
+def internal_load(
+    points: Array, groups: Sequence[ElementGroup], q: Array, dq: Array | None = None, damping: float = 0.0
+) -> Array:
+    """Return ∫ P grad N dV as nodal forces (n, 3) in N.
+
+    Parameters
+    ----------
+    points : (n, 3) in m, the reference positions.
+    q : (n, 3) in m, nodal displacements.
+    dq : (n, 3) in m; with it, the load of the step from q to q + dq in energy-momentum form:
+        its work on dq is the change of the strain energy, and what damping takes.
+    damping : η/h, stiffness-proportional damping over the step.
+
+    Examples
+    --------
+    A rotation needs no force.
+
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.3))
+    >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
+    True
+    """
+    total = np.zeros_like(points)
+    for group in groups:
+        if module := _compiled(group):
+            step = _displaced(q, dq, damping)
+            total += module.internal_load(*_placed(points, group), *step, *_law(group))
+            continue
+        for chunk in group.chunks():
+            element, at = _moved(points, group, chunk, q, dq, damping)
+            add_nodal(total, group.nodes[chunk], lagrange.internal_load(element, at))
+    return total
+
+
+def _moved(
+    points: Array, group: ElementGroup, chunk: slice, q: Array, dq: Array | None, damping: float
+) -> tuple[KinematicLinear, lagrange.Motion]:
+    """Return the placed elements of a chunk and their motion."""
+    nodes, element = group.nodes[chunk], group.at(points, chunk)
+    step = None if dq is None else dq[nodes]
+    at = lagrange.motion(element, group.material.C, q[nodes], step, damping, group.initial_stress(chunk))
+    return element, at
+
+
+def stiffness(
+    points: Array,
+    groups: Sequence[ElementGroup],
+    pattern: Pattern,
+    q: Array,
+    dq: Array | None = None,
+    damping: float = 0.0,
+) -> BlockMatrix:
+    """Return the derivative of `internal_load` as 3x3 blocks, (3n, 3n) in N/m.
+
+    Without dq it is the symmetric tangent by q.  With dq it is the derivative by dq, in general not
+    symmetric; for dq → 0 without damping it is half the tangent.
+
+    Parameters
+    ----------
+    pattern : the sparsity of the nodes of the groups, in their order.
+    """
+    data = np.zeros((len(pattern.indices), 3, 3))
+    for number, group in enumerate(groups):
+        if module := _compiled(group):
+            step = _displaced(q, dq, damping)
+            rows = (pattern.indptr, pattern.indices)
+            module.add_stiffness(*_placed(points, group), *step, *_law(group), *rows, data)
+        else:
+            _add_stiffness(data, points, group, pattern, number, (q, dq, damping))
+    return BlockMatrix(data, pattern.indices, pattern.indptr)
+
+
+def _add_stiffness(
+    data: Array,
+    points: Array,
+    group: ElementGroup,
+    pattern: Pattern,
+    number: int,
+    step: tuple[Array, Array | None, float],
+) -> None:
+    """Add the stiffness of a group in NumPy, in parts."""
+    k = group.nodes.shape[1]
+    for window in group.chunks(SCATTER_BYTES):
+        blocks = np.empty((window.stop - window.start, k, k, 3, 3))
+        for chunk in group.chunks(within=window):
+            element, at = _moved(points, group, chunk, *step)
+            K = lagrange.stiffness_by_axis(element, group.material.C, at)
+            place = slice(chunk.start - window.start, chunk.stop - window.start)
+            blocks[place] = K.transpose(0, 2, 4, 1, 3)
+        pattern.add(data, number, window, blocks)
+
+
+def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> float:
+    """Return ∫ (½ E:C:E + S0:E) dV in J of nodal displacements q (n, 3) in m."""
+    return _totals(points, groups, q)[0]
+
+
+def largest_strain(points: Array, groups: Sequence[ElementGroup], q: Array) -> float:
+    """Return the largest |E| = √(E:E) at a Gauss point of nodal displacements q (n, 3) in m."""
+    return _totals(points, groups, q)[1]
+
+
+def _totals(points: Array, groups: Sequence[ElementGroup], q: Array) -> tuple[float, float]:
+    """Return the strain energy and the largest strain."""
+    energy, largest = 0.0, 0.0
+    for group in groups:
+        module = _compiled(group)
+        parts = (
+            [module.totals(*_placed(points, group), _floats(q), *_law(group))]
+            if module
+            else [_totals_of(points, group, q, chunk) for chunk in group.chunks()]
+        )
+        for share, strain in parts:
+            energy += share
+            largest = max(largest, strain)
+    return energy, largest
+
+
+def _totals_of(points: Array, group: ElementGroup, q: Array, chunk: slice) -> tuple[float, float]:
+    element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
+    initial = group.initial_stress(chunk)
+    energy = lagrange.strain_energy(element, group.material.C, displaced, initial).sum()
+    E = lagrange.green_strain(element, displaced)
+    E[..., 3:] /= np.sqrt(2)  # E:E counts the two tensor shears, each half the engineering shear
+    return float(energy), float(np.sqrt((E**2).sum(axis=-1)).max())
+
+
+def nodal_gradients(points: Array, groups: Sequence[ElementGroup]) -> tuple[Array, float]:
+    """Return g_a = ∫ grad N_a dV as (n, 3) in m² and the volume V in m³.
+
+    The mean deformation gradient of displacements q is 1 + Σ q_a g_a^T / V.
+
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box((1.0, 2.0, 3.0)), kl.Isotropic3D(E=1.0, nu=0.3))
+    >>> g, V = nodal_gradients(model.mesh.points, model.element_groups())
+    >>> float(np.abs(model.mesh.points.T @ g - V * np.eye(3)).max()) < 1e-14
+    True
+    """
+    total, volume = np.zeros_like(points), 0.0
+    for group in groups:
+        for chunk in group.chunks():
+            dV, D = group.at(points, chunk)._gauss
+            values = np.swapaxes((D * dV[..., None, None]).sum(axis=-3), -1, -2)
+            add_nodal(total, group.nodes[chunk], values)
+            volume += float(dV.sum())
+    return total, volume
+
+
+# ---- the highest frequency -------------------------------------------------------------------------
+
+
+def highest_frequency(
+    points: Array, groups: Sequence[ElementGroup], q: Array | None = None, lumped: bool = False
+) -> float:
+    """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone.
+
+    Parameters
+    ----------
+    q : (n, 3) in m, displacements whose tangent counts; without, the linear stiffness.
+    lumped : take the lumped mass of the elements in place of the consistent one.
+
+    Raises
+    ------
+    MaterialError
+        If a material has no density.
+
+    Notes
+    -----
+    Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971).
+    It takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
+    elements that are translations of each other take one together.
+    """
+    largest = 0.0
+    for group in groups:
+        if not group.material.density > 0:
+            raise MaterialError("an angular frequency needs a density > 0; give the material its density")
+        part = _distinct(points, group) if q is None else group
+        for chunk in part.chunks():
+            largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))
+    return float(np.sqrt(largest))
+
+
+def _distinct(points: Array, group: ElementGroup) -> ElementGroup:
+    """Return a group of one element of each shape, whatever its place."""
+    edges = points[group.nodes] - points[group.nodes[:, :1]]
+    size = np.abs(edges).max()
+    rows = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
+    chosen = np.zeros(len(group), dtype=bool)
+    chosen[np.unique(rows, axis=0, return_index=True)[1]] = True
+    return group.take(chosen)
+
+
+def _eigenvalues(points: Array, group: ElementGroup, chunk: slice, q: Array | None, lumped: bool) -> Array:
+    """Return the eigenvalues (m, 3k) of K x = λ M x of each element of a chunk."""
+    C, density = group.material.C, group.material.density
+    if q is None:
+        element = group.at(points, chunk)
+        K = element.stiffness_by_axis(C)
+    else:
+        element, at = _moved(points, group, chunk, q, None, 0.0)
+        K = lagrange.stiffness_by_axis(element, C, at)
+    m, k = len(K), K.shape[2]
+    if lumped:
+        root = 1 / np.sqrt(element.lumped_mass(density))
+        K = root[:, None, :, None, None] * K * root[:, None, None, None, :]
+    else:
+        inverse = np.linalg.inv(np.linalg.cholesky(element.scalar_mass(density)))
+        K = (inverse[:, None] @ K.reshape(m, 3, k, 3 * k)).reshape(m, 3 * k, 3, k)
+        K = K @ np.swapaxes(inverse, -1, -2)[:, None]
+    return np.asarray(np.linalg.eigvalsh(K.reshape(m, 3 * k, 3 * k)))

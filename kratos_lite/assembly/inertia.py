@@ -1,0 +1,125 @@
+"""Inertia: the matrices of the mass of elements, at rest or flowing through their mesh.
+
+    M_ij = ∫ ρ N_i N_j,    G_ij = ∫ ρ N_i c·grad N_j,    H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
+
+with the velocity c = A X + b: one number for each pair of nodes, alike for x, y and z.  Compiled, one pass
+over the elements makes all that are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.native import kernels
+from kratos_lite.quadrature import Rule
+from kratos_lite.typing import Array
+
+STEPS = ("__init__", "_jacobian", "_gauss", "dV", "gauss_points", "scalar_mass")
+"""What an element class may redefine so that its matrices are not those of its tables."""
+REST = np.zeros((3, 4))
+
+
+def inertia_matrices(
+    points: Array,
+    groups: Sequence[ElementGroup],
+    pattern: Pattern,
+    names: str,
+    rule_of: Callable[[type[KinematicLinear]], Rule],
+    velocity: Array = REST,
+) -> dict[str, Array]:
+    """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s².
+
+    Parameters
+    ----------
+    points : (n, 3) float, m.
+    groups : elements with these points.
+    pattern : the sparsity of their nodes, in the order of the groups.
+    names : some of ``"MGH"``; the others are not computed.
+    rule_of : gives the quadrature rule of an element class.
+    velocity : (3, 4), A in 1/s and b in m/s of c = A X + b.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
+    >>> groups = model.element_groups()
+    >>> pattern = Pattern(model.mesh.n_nodes, [group.nodes for group in groups])
+    >>> made = inertia_matrices(model.mesh.points, groups, pattern, "M", lambda element: element.mass_rule)
+    >>> round(float(made["M"].sum()), 8)
+    7620.0
+    """
+    data = {name: np.zeros(len(pattern.indices)) for name in names}
+    points = np.ascontiguousarray(points, dtype=float)
+    for number, group in enumerate(groups):
+        add = _add_compiled if _from_tables(group.element) and kernels("inertia") else _add_computed
+        add(data, points, group, pattern, number, rule_of(group.element), velocity)
+    return data
+
+
+def _from_tables(element: type[KinematicLinear]) -> bool:
+    """Return whether tables of shape and rule give the matrices: their steps are not redefined."""
+    return all(getattr(element, name) is getattr(KinematicLinear, name) for name in STEPS)
+
+
+def _add_compiled(
+    data: dict[str, Array],
+    points: Array,
+    group: ElementGroup,
+    pattern: Pattern,
+    number: int,
+    rule: Rule,
+    velocity: Array,
+) -> None:
+    """Add the matrices of a group in one pass."""
+    tables: list[Any] = [
+        *tabulate(group.element.shape, rule),
+        group.material.density * rule.weights,
+        velocity,
+    ]
+    kernels("inertia").add(
+        points,
+        pattern.connectivity[number],
+        *(np.ascontiguousarray(table, dtype=float) for table in tables),
+        pattern.indptr,
+        pattern.indices,
+        **data,
+    )
+
+
+def _add_computed(
+    data: dict[str, Array],
+    points: Array,
+    group: ElementGroup,
+    pattern: Pattern,
+    number: int,
+    rule: Rule,
+    velocity: Array,
+) -> None:
+    """Do the same in NumPy, in parts."""
+    for chunk in group.chunks():
+        element = group.element(points[group.nodes[chunk]], rule)
+        element.mass_rule = rule
+        for name, matrices in _computed(element, group.material.density, data, velocity).items():
+            pattern.add(data[name], number, chunk, matrices)
+
+
+def _computed(element: KinematicLinear, density: float, names: Any, velocity: Array) -> dict[str, Array]:
+    """Return the matrices (m, k, k) of elements by name."""
+    found = {"M": element.scalar_mass(density)} if "M" in names else {}
+    if "G" in names or "H" in names:
+        dV, D = element._gauss
+        c = element.gauss_points() @ velocity[:, :3].T + velocity[:, 3]
+        along = (c[..., None, :] @ D)[..., 0, :]
+        weights = (density * dV)[..., None, :]
+        if "G" in names:
+            found["G"] = (tabulate(element.shape, element.rule)[0].T * weights) @ along
+        if "H" in names:
+            found["H"] = (np.swapaxes(along, -1, -2) * weights) @ along
+    return found

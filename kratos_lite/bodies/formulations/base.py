@@ -1,0 +1,141 @@
+"""Forms: how the deformation of a finite-element body becomes a load.
+
+`TotalLagrangian`: Green's strain at every Gauss point.  `Corotational`: one rotation for the whole body, and
+small strains seen from it.  `Modal`: the same, with the lowest modes only.
+
+Source: Solfec-1.0 theory, finite-element formulations.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from kratos_lite.assembly import finite_strain
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.bodies.deformable import Solve
+from kratos_lite.errors import ModelError
+from kratos_lite.registry import Registry
+from kratos_lite.solvers import LinearSolver
+from kratos_lite.solvers.banded import Factorizer
+from kratos_lite.solvers.mass import Mass
+from kratos_lite.solvers.supports import ConstraintMap
+from kratos_lite.typing import Array
+
+FACTORIZED_MAX = 4000
+"""Up to this many displacements a matrix for each step is factorized."""
+FACTORIZED_ONCE_MAX = 30_000
+"""Up to this many a matrix for all steps is."""
+RESIDUAL = 1e-13
+"""Relative residual at which an iteration stops: momentum is as exact."""
+
+FORMS: Registry[type[Form]] = Registry("form of a finite-element body")
+"""Every form by its class name and by its `name`."""
+
+
+class Form(ABC):
+    """Internal load of nodal displacements q (3n,), and solutions with its tangent.
+
+    Parameters
+    ----------
+    points : (n, 3) m.
+    groups : the elements.
+    mass : their mass.
+    """
+
+    name: ClassVar[str]
+    schemes: ClassVar[tuple[str, ...]]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "name" in cls.__dict__:
+            FORMS.add(cls.__name__, cls, [cls.name])
+
+    def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:
+        self.points, self.groups, self.mass = points, groups, mass
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """The sparsity of matrices on the nodes."""
+        return self.mass.pattern
+
+    @cached_property
+    def _factorizer(self) -> Factorizer:
+        return Factorizer(self.pattern)
+
+    @cached_property
+    def _factorizer_unsymmetric(self) -> Factorizer:
+        return Factorizer(self.pattern, symmetric=False)
+
+    @cached_property
+    def K0(self) -> BlockMatrix:
+        """Stiffness matrix (3n, 3n) of small strains in N/m."""
+        return assemble_stiffness(self.points, self.groups, self.pattern)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether it takes less time to iterate with multigrid than to factorize a matrix for each step."""
+        return self.points.size > FACTORIZED_MAX
+
+    def _factorized(self, K: BlockMatrix, c: float, symmetric: bool = True, iterate: bool = False) -> Solve:
+        """Return what solves (M + c K) x = b, made ready by a factorization or by multigrid."""
+        A = BlockMatrix(c * K.data, K.indices, K.indptr)
+        self.mass.add_to(A)
+        if iterate:
+            return self._iterated(A)
+        factorizer = self._factorizer if symmetric else self._factorizer_unsymmetric
+        return factorizer.factorize(A).solve
+
+    def _iterated(self, A: BlockMatrix) -> Solve:
+        """Return what solves A x = b by conjugate gradients with multigrid."""
+        every = ConstraintMap(np.arange(self.points.size), np.zeros(self.points.size))
+        equations = LinearSolver(A, every, self.points, "amg", "a matrix for each step")
+
+        def solve(b: Array) -> Array:
+            columns = b.reshape(len(b), -1).T
+            x = [equations.solve(np.ascontiguousarray(column), RESIDUAL).x for column in columns]
+            return np.stack(x, axis=1).reshape(b.shape)
+
+        return solve
+
+    @abstractmethod
+    def load(self, q: Array) -> Array:
+        """Return the internal load (3n,) in N."""
+
+    @abstractmethod
+    def energy(self, q: Array) -> float:
+        """Return the strain energy in J."""
+
+    @abstractmethod
+    def stiffness(self, q: Array) -> BlockMatrix:
+        """Return the tangent of the load (3n, 3n) in N/m."""
+
+    @abstractmethod
+    def solver(self, q: Array, c: float) -> Solve:
+        """Return what solves (M + c K(q)) x = b."""
+
+    def damping_load(self, q: Array, u: Array) -> Array:
+        """Return K(q) u, (3n,)."""
+        return self.stiffness(q) @ u
+
+    def load_over(self, q: Array, dq: Array, damping: float) -> Array:
+        """Return the load of the energy–momentum method; see `FiniteElementBody`."""
+        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+
+    def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
+        """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
+        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+
+    def highest_frequency(self, q: Array) -> float:
+        """Return an upper bound of the angular frequencies in rad/s."""
+        return finite_strain.highest_frequency(self.points, self.groups, lumped=self.mass.lumped)
+
+    def project(self, q: Array, u: Array) -> tuple[Array, Array]:
+        """Return configuration and velocity as the form can represent them."""
+        return q, u

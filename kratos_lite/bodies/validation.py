@@ -1,0 +1,86 @@
+"""What users give to bodies, checked: mesh and material, points, vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.grouping import element_class, element_groups_of
+from kratos_lite.errors import InputError
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Mesh
+from kratos_lite.model import checks
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
+
+
+def elements_of(mesh: Mesh, material: Material) -> list[ElementGroup]:
+    """Return the elements of a mesh with their material, after checks of its geometry.
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        If the mesh is broken or inverted, or elements have no material.
+    """
+    kinds = [element_class(mesh, block) for block in mesh_of(mesh).blocks]
+    checks.check_blocks(mesh, kinds)
+    checks.check_points(mesh)
+    checks.check_repeated_nodes(mesh)
+    checks.check_jacobians(mesh, kinds)
+    given = material if isinstance(material, Mapping) else {None: material}
+    material_of = np.full(mesh.n_elements, -1)
+    for number, (where, one) in enumerate(given.items()):
+        if not isinstance(one, LinearMaterial):
+            raise InputError(f"a material such as Isotropic3D is needed; got {type(one).__name__}")
+        material_of[mesh.elements(where)] = number
+    return element_groups_of(mesh, list(given.values()), material_of)
+
+
+def points_of(X: ArrayLike) -> Array:
+    """Return material points as floats (3,) or (m, 3)."""
+    points = finite(X, "material points")
+    if points.ndim not in (1, 2) or points.shape[-1] != 3:
+        raise InputError(f"material points must have shape (3,) or (m, 3); got {points.shape}")
+    return points
+
+
+def one_point(X: ArrayLike) -> Array:
+    """Return one point (3,) as floats."""
+    point = points_of(X)
+    if point.ndim != 1:
+        raise InputError(f"one point (3,) is needed; got shape {point.shape}")
+    return point
+
+
+def vector_of(value: ArrayLike, what: str) -> Array:
+    """Return a vector (..., 3) as floats."""
+    vector = finite(value, what)
+    if vector.shape[-1:] != (3,):
+        raise InputError(f"{what} must have three components; got shape {vector.shape}")
+    return vector
+
+
+def fitting(value: Array, lead: tuple[int, ...], tail: int, what: str) -> Array:
+    """Return a value with `tail` axes of its own if its other axes broadcast to those of the bodies."""
+    own = value.shape[: value.ndim - tail]
+    try:
+        fits = np.broadcast_shapes(own, lead) == lead
+    except ValueError:
+        fits = False
+    if not fits:
+        bodies = f"bodies of shape {lead}" if lead else "a single body"
+        raise InputError(f"{what} of shape {value.shape} does not fit {bodies}")
+    return value
+
+
+def mesh_of(mesh: Mesh) -> Mesh:
+    """Return a mesh; InputError if it is none."""
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
+    return mesh

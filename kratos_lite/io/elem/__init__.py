@@ -1,5 +1,0 @@
-"""The five-file sets NAME.node, .elem, .cond, .prop and .init (Kratos data of 2008)."""
-
-from kratos_lite.io.elem.sets import read_elem, write_elem
-
-__all__ = ["read_elem", "write_elem"]

@@ -1,0 +1,5 @@
+"""The five-file sets NAME.node, .elem, .cond, .prop and .init (Kratos data of 2008)."""
+
+from kratos_lite.io.formats.elem.sets import read_elem, write_elem
+
+__all__ = ["read_elem", "write_elem"]

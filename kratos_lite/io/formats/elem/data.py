@@ -1,0 +1,150 @@
+"""Properties and nodal data of a five-file set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.io.document import Data, Properties
+from kratos_lite.io.formats.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
+from kratos_lite.io.formats.elem.grammar import Form, Run, Source
+from kratos_lite.io.formats.elem.mesh import twice
+from kratos_lite.mesh import Mesh, without_repeats
+from kratos_lite.typing import Array, Ints
+
+VECTORS = frozenset((b"DISPLACEMENT", b"VELOCITY", b"ACCELERATION", b"ROTATION", b"REACTION"))
+MAX_NAMES = 100
+"""More variables than this are taken statement by statement, in linear time."""
+Values: TypeAlias = "dict[int, tuple[float, int]]"
+"""Value and line by node id."""
+
+
+def read_properties(files: ElemFiles) -> dict[int, Properties]:
+    """Return the properties by id; values are floats, vectors and matrices."""
+    found: dict[int, Properties] = {}
+    for run in files.runs[".prop"]:
+        source = files.sources[".prop"]
+        numbers = source.integers(run.columns[0], run.starts, least=0).tolist()
+        lines = source.lines(run.starts).tolist()
+        for number, line, start, name, text in zip(numbers, lines, run.starts, *run.columns[1:], strict=True):
+            properties = found.setdefault(number, Properties(number, line=line, source=source.name))
+            variable = name.decode("ascii")
+            if variable in properties.values:
+                source.add(start, twice(f"{variable} of properties {number}", properties.lines[variable]))
+            properties.values[variable] = _value(source, run.form, text, start)
+            properties.lines[variable] = line
+    return found
+
+
+def use_properties(files: ElemFiles, mesh: Mesh, properties: dict[int, Properties]) -> None:
+    """Check the property ids of the elements; conditions may name any."""
+    declared = {0, *properties}
+    for block in mesh.blocks:
+        used, cells = np.unique(block.properties, return_index=True)
+        for number, cell in zip(used.tolist(), cells.tolist(), strict=True):
+            if number not in declared and properties:
+                have = ", ".join(map(str, sorted(declared - {0})))
+                message = f"properties {number} are not declared in {files.stem}.prop; expected one of {have}"
+                files.problems.add(f"{mesh.place(block, cell)}: {message}")
+    for number in sorted({int(number) for block in mesh.blocks for number in np.unique(block.properties)}):
+        properties.setdefault(number, Properties(number))
+
+
+def read_nodal_data(files: ElemFiles, mesh: Mesh) -> list[Data]:
+    """Return one Data per variable for its fixed degrees of freedom, then one for its free ones."""
+    fixed, initial = _by_variable(files, ".cond", mesh), _by_variable(files, ".init", mesh)
+    cond, init = (files.sources[e].name if e in files.sources else "" for e in (".cond", ".init"))
+    data = []
+    for variable, nodes in fixed.items():
+        values = initial.get(variable, {})
+        held = {n: (values.pop(n, at)[0], at[1]) for n, at in nodes.items()}
+        data.append(_data(variable, held, True, cond))
+    return data + [_data(variable, nodes, False, init) for variable, nodes in initial.items() if nodes]
+
+
+def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]:
+    """Return the nodes that ``Fix`` or ``.init`` statements name, with their values."""
+    found: dict[str, Values] = {}
+    for run in files.runs[ending]:
+        if run.form not in (FIX, INIT):
+            continue
+        source = files.sources[ending]
+        ids = source.integers(run.columns[0], run.starts)
+        for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
+            source.add(run.starts[i], files.no_node(ids[i]))
+        values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
+        if not _add_all(found, run.columns[1], ids, values, source.lines(run.starts)):
+            _add_singly(found, source, run, ids, values)
+        for name in sorted(set(run.columns[1]) & VECTORS):
+            start = run.starts[run.columns[1].index(name)]
+            text = name.decode("ascii")
+            source.add(start, f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z")
+    return found
+
+
+def _add_all(
+    found: dict[str, Values], names: Sequence[bytes], ids: Ints, values: Array, lines: NDArray[np.int32]
+) -> bool:
+    """Add all statements at once if each names a degree of freedom of its own; return whether they do."""
+    place = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    if len(place) > MAX_NAMES or any(name.decode("ascii") in found for name in place):
+        return False
+    codes = np.fromiter(map(place.__getitem__, names), np.int64, len(names))
+    rows = [np.flatnonzero(codes == i) for i in range(len(place))]
+    if any(len(without_repeats(ids[mine])) < len(mine) for mine in rows):
+        return False
+    for name, mine in zip(place, rows, strict=True):
+        pairs = zip(values[mine].tolist(), lines[mine].tolist(), strict=True)
+        found[name.decode("ascii")] = dict(zip(ids[mine].tolist(), pairs, strict=True))
+    return True
+
+
+def _add_singly(found: dict[str, Values], source: Source, run: Run, ids: Ints, values: Array) -> None:
+    """Add statements one by one; note which repeat an earlier one, and which contradict it."""
+    lines, repeated = source.lines(run.starts).tolist(), []
+    for node, name, value, line, start in zip(
+        ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
+    ):
+        nodes = found.setdefault(name.decode("ascii"), {})
+        earlier, at = nodes.setdefault(node, (value, line))
+        if earlier != value:
+            source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
+        elif at != line:
+            repeated.append(start)
+    if repeated:
+        source.note(repeated[0], f"{len(repeated)} statements repeat earlier ones, from here on")
+
+
+def _initial(source: Source, run: Run) -> Array:
+    """Return the values of ``.init`` statements; their step must be 0."""
+    steps = source.integers(run.columns[2], run.starts, least=0)
+    for i in np.flatnonzero(steps):
+        source.add(run.starts[i], f"step {steps[i]} of the solution is not known at the start; expected 0")
+    return source.reals(run.columns[3], run.starts)
+
+
+def _value(source: Source, form: Form, text: bytes | float, start: int) -> Any:
+    """Return the value of a property: a float, or a vector or matrix as an array."""
+    if not isinstance(text, bytes):
+        return float(text)
+    if form is not MATRIX:
+        values = source.reals([text], [start] * (text.count(b",") + 1))
+        return values if form is VECTOR else float(values[0])
+    rows = [row.strip(b", \t\n") for row in text.replace(b"[", b"").split(b"]")[:-1]]
+    matrix = [source.reals([row], [start] * (row.count(b",") + 1)) for row in rows]
+    if len({len(row) for row in matrix}) > 1:
+        source.add(
+            start, f"the rows of the matrix have {[len(row) for row in matrix]} numbers; expected equal rows"
+        )
+        return None
+    return np.array(matrix)
+
+
+def _data(variable: str, nodes: Values, fixed: bool, source: str) -> Data:
+    values = np.array([value for value, _ in nodes.values()])
+    ids = np.array(list(nodes), dtype=np.int64)
+    line = min(line for _, line in nodes.values())
+    return Data(variable, ids, np.full(len(ids), fixed), values, line, source)

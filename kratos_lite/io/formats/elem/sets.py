@@ -1,0 +1,203 @@
+"""Reader and writer of the five-file sets NAME.node, .elem, .cond, .prop and .init (Kratos data of 2008)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError, Problems
+from kratos_lite.io.document import Data, Document, Note
+from kratos_lite.io.formats.elem.data import read_nodal_data, read_properties, use_properties
+from kratos_lite.io.formats.elem.files import ElemFiles, stem
+from kratos_lite.io.formats.elem.mesh import read_mesh
+from kratos_lite.io.output import replacing
+from kratos_lite.mesh import Block, Mesh
+
+
+def read_elem(path: str | Path) -> Document:
+    """Read a five-file set.
+
+    Kratos skips what it does not understand in these files; here it is an error with its place.
+
+    Parameters
+    ----------
+    path : any file of the set (also gzipped, ``.gz``), or the name without ending.  ``.node`` and
+        ``.elem`` must exist; absent others are noted.
+
+    Returns
+    -------
+    Document
+        Coordinates in m; fixed degrees of freedom carry the value of ``.init``, or 0.  If the set declares no
+        property at all, the ids that its elements use become empty properties.
+
+    Raises
+    ------
+    InputError
+        All problems of the set, up to 20, each as ``file:line:column: …``.
+
+    Examples
+    --------
+    >>> stem = getfixture("tmp_path") / "bar"
+    >>> _ = stem.with_suffix(".node").write_text("NODES = NodesList([[1, 0, 0, 0], [2, 1, 0, 0]])")
+    >>> _ = stem.with_suffix(".elem").write_text("ELEMENTS[7] = Bar3D2N([1, 2], 0);")
+    >>> document = read_elem(stem)
+    >>> document.mesh.n_nodes, document.mesh.element_ids
+    (2, array([7]))
+    """
+    files = ElemFiles(path)
+    mesh = read_mesh(files)
+    properties = read_properties(files)
+    use_properties(files, mesh, properties)
+    nodal_data = read_nodal_data(files, mesh)
+    files.problems.raise_if_any()
+    return Document(mesh, properties, nodal_data, notes=files.notes)
+
+
+def write_elem(path: str | Path, document: Document) -> list[Note]:
+    """Write a document as a five-file set, the whole of it or nothing; reals keep all their digits.
+
+    Parameters
+    ----------
+    path : name of the set; an ending of the set is cut off.  Sets are not written gzipped.
+    document : coordinates in m.
+
+    Returns
+    -------
+    list of Note
+        What is left out because the format has no place for it, such as parts and constraints.
+
+    Raises
+    ------
+    InputError
+        What is left would be another model, or a set that `read_elem` refuses; nothing is written.
+
+    Examples
+    --------
+    >>> document = Document(Mesh([[0, 0, 0.1]]))
+    >>> write_elem(getfixture("tmp_path") / "point", document)
+    []
+    >>> print((getfixture("tmp_path") / "point.node").read_text())
+    NODES = NodesList([
+    [1, 0.0, 0.0, 0.1]
+    ])
+    """
+    if str(path).lower().endswith(".gz"):
+        # A plain file of the same name beside it would be read in its place.
+        raise InputError(f"{path}: five-file sets are not written gzipped; leave out the ending .gz")
+    problems, notes = Problems(), _left_out(document)
+    _check(document, problems)
+    dofs = _dofs(document)
+    fixed = [f"NODES[{n}].Fix({name});" for (n, name), (_, is_fixed) in dofs.items() if is_fixed]
+    lines = {
+        ".node": _node_lines(document.mesh),
+        ".elem": _cell_lines(document.mesh, document.mesh.blocks, "ELEMENTS"),
+        ".cond": [*fixed, *_cell_lines(document.mesh, document.mesh.conditions, "CONDITIONS")],
+        ".prop": list(_property_lines(document, problems, notes)),
+        ".init": [f"NODES[{n}]({name}, 0) = {value!r};" for (n, name), (value, _) in dofs.items()],
+    }
+    problems.raise_if_any()
+    with ExitStack() as stack:
+        # All are on the disk before the first takes its place.
+        for ending, text in lines.items():
+            data = "".join(f"{line}\n" for line in text).encode("ascii")
+            stack.enter_context(replacing(stem(path) + ending, len(data))).write_bytes(data)
+    return notes
+
+
+def _left_out(document: Document) -> list[Note]:
+    have = {
+        "parts": document.mesh.parts,
+        "constraints": document.constraints,
+        "geometries": document.geometries,
+        "tables": document.tables,
+        "variables of the model": document.model_data,
+        "variables on elements": document.element_data,
+        "variables on conditions": document.condition_data,
+    }
+    texts = [f"{len(items)} {name}" for name, items in have.items() if items]
+    texts += [f"nodal {data.variable}" for data in document.nodal_data if not _is_scalar(data)]
+    return [Note(0, f"left out: {text}; a five-file set cannot hold it") for text in texts]
+
+
+def _is_scalar(data: Data) -> bool:
+    return data.values.shape == data.ids.shape
+
+
+def _check(document: Document, problems: Problems) -> None:
+    mesh = document.mesh
+    if not mesh.n_nodes:
+        problems.add("there are no nodes to write; expected at least one")
+    if not np.isfinite(mesh.points).all():
+        problems.add("some coordinates are not finite; expected finite numbers")
+    for data in document.nodal_data:
+        if not _is_scalar(data) and data.fixed.any():
+            problems.add(f"{data.variable} is fixed as a whole; fix its components, e.g. {data.variable}_X")
+        elif not np.isfinite(data.values).all():
+            problems.add(f"some values of {data.variable} are not finite; expected finite numbers")
+    variables = [name for properties in document.properties.values() for name in properties.values]
+    names = [block.name for block in [*mesh.blocks, *mesh.conditions]]
+    for name in dict.fromkeys([*names, *(data.variable for data in document.nodal_data), *variables]):
+        if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
+            problems.add(f"{name!r} cannot be written; expected a name of letters, digits and _")
+
+
+def _node_lines(mesh: Mesh) -> list[str]:
+    rows = zip(mesh.node_ids.tolist(), mesh.points.tolist(), strict=True)
+    text = ",\n".join(f"[{node}, {x!r}, {y!r}, {z!r}]" for node, (x, y, z) in rows)
+    return ["NODES = NodesList([", text, "])"]
+
+
+def _cell_lines(mesh: Mesh, blocks: list[Block], word: str) -> list[str]:
+    return [
+        f"{word}[{cell}] = {block.name}({nodes},{properties});"
+        for block in blocks
+        for cell, nodes, properties in zip(
+            block.ids.tolist(), mesh.node_ids[block.nodes].tolist(), block.properties.tolist(), strict=True
+        )
+    ]
+
+
+def _property_lines(document: Document, problems: Problems, notes: list[Note]) -> Iterator[str]:
+    """Yield the statements; what is no number is left out, with a note."""
+    written = set()
+    for number, properties in document.properties.items():
+        for name, value in properties.values.items():
+            text = _number_text(value)
+            if text:
+                written.add(number)
+                yield f"PROPERTIES[{number}][{name}] = {text};"
+            else:
+                text = f"left out: {name} of properties {number}; .prop files hold numbers, not {value!r}"
+                notes.append(Note(0, text))
+    used = {0, *(int(number) for block in document.mesh.blocks for number in np.unique(block.properties))}
+    for number in sorted(used - written - {0}) if written else ():
+        problems.add(f"properties {number} have no number to write, but elements use them; give them a value")
+
+
+def _number_text(value: Any) -> str:
+    """Return a number, vector or matrix as text; nothing for anything else."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return ""
+    if array.dtype.kind not in "iuf" or array.ndim > 2 or not array.size or not np.isfinite(array).all():
+        return ""
+    return repr(array.astype(float).tolist())
+
+
+def _dofs(document: Document) -> dict[tuple[int, str], tuple[float, bool]]:
+    """Return value and fixity by node and variable; where the document states one twice, the last value."""
+    dofs: dict[tuple[int, str], tuple[float, bool]] = {}
+    for data in filter(_is_scalar, document.nodal_data):
+        # Values on nodes that do not exist mean nothing; the reader of the document noted them.
+        known = document.mesh.node_rows(data.ids) >= 0
+        columns = data.ids[known], data.values[known], data.fixed[known]
+        for node, value, fixed in zip(*columns, strict=True):
+            dof = int(node), data.variable
+            dofs[dof] = float(value), bool(fixed) or dofs.get(dof, (0.0, False))[1]
+    return dofs

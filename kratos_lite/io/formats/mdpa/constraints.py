@@ -1,0 +1,68 @@
+"""Multi-point constraints of an `.mdpa` file."""
+
+from __future__ import annotations
+
+import re
+
+from kratos_lite.io.document import Constraint
+from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
+from kratos_lite.io.text import integer, real, shown
+from kratos_lite.typing import Ints
+
+CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
+
+
+def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constraint]:
+    """Return the rows ``id constant [w1, w2] slave master1 master2`` of a block.
+
+    The variables in the header are the slave's and then one for each master, or one for all.
+    """
+    if len(frame.arguments) < 2:
+        source.problem("expected 'Begin Constraints NAME SLAVE_VARIABLE [MASTER_VARIABLE …]'", frame.offset)
+        return []
+    at, end = frame.spans[0]
+    found: list[Constraint] = []
+    known = set(nodes.tolist())
+    while word := WORD.search(source.data, at, end):
+        here = word.start()
+        try:
+            constraint, at = _constraint(source, frame, (here, end))
+            missing = [n for n, _ in (constraint.slave, *constraint.masters) if n not in known]
+            if missing:
+                raise ValueError(f"there is no node {missing[0]}")
+            found.append(constraint)
+        except ValueError as error:
+            source.problem(f"constraint {shown(word.group())}: {error}", here)
+            at = source.data.find(b"\n", here, end)
+            if at < 0:
+                break
+    if len({len(c.masters) for c in found}) > 1:
+        text = "Kratos misreads a block of Constraints with different numbers of masters; "
+        source.note(
+            text + "kratos_lite reads it as written; give each number a block of its own", frame.offset
+        )
+    return found
+
+
+def _constraint(source: Source, frame: Frame, span: tuple[int, int]) -> tuple[Constraint, int]:
+    match = CONSTRAINT.match(source.data, *span)
+    if match is None:
+        raise ValueError("expected 'id constant [w1, w2, …] slave master1 master2 …'")
+    number, constant = integer(match.group(1)), real(match.group(2))
+    weights = tuple(real(part.strip()) for part in match.group(3).split(b","))
+    at = match.end()
+    ids: list[int] = []
+    for _ in range(len(weights) + 1):
+        word = WORD.search(source.data, at, span[1])
+        if word is None:
+            raise ValueError(f"has {len(weights)} weights, but {len(ids)} nodes; expected slave and masters")
+        ids.append(integer(word.group()))
+        at = word.end()
+    name, slave, *masters = frame.arguments
+    if len(masters) != len(weights):
+        if len(masters) > 1:
+            raise ValueError(f"has {len(weights)} masters, but the header names {len(masters)} variables")
+        masters = (masters or [slave]) * len(weights)
+    pairs = tuple(zip(ids[1:], masters, strict=True))
+    line = source.line(span[0])
+    return Constraint(number, (ids[0], slave), pairs, weights, constant, line, name), at

@@ -1,0 +1,112 @@
+"""Data on nodes, elements and conditions of an `.mdpa` file."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.io.document import Data, Note
+from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
+from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at
+from kratos_lite.io.text import integer, shown
+from kratos_lite.mesh import rows_of_ids, without_repeats
+from kratos_lite.typing import Ints
+
+WORDS = {"NodalData": "node", "ElementalData": "element", "ConditionalData": "condition"}
+IS_FIXED = rb"\s*([^\s\[(]+)"
+
+
+def read_data(source: Source, frame: Frame, known: Ints) -> Data:
+    """Return one block of nodal, elemental or conditional data; `known` are the ids in the mesh."""
+    variable, word = frame.arguments[0], WORDS[frame.name]
+    kind, span = kind_of(variable), frame.spans[0]
+    if kind is None:
+        note_unknown(source, variable, frame.offset)
+    width = width_of_first_line(source, span)
+    first = next(source.words(span), None)
+    line_end = source.data.find(b"\n", first.start(), span[1]) if first else span[0]
+    has_bracket = b"(" in source.data[first.start() if first else 0 : line_end if line_end >= 0 else span[1]]
+    if kind in ("vector", "matrix") or (kind is None and has_bracket):
+        data = _read_arrays(source, frame, word == "node", kind)
+    elif kind == "flag" or (kind is None and width == 1):
+        rows = read_rows(source, span, Layout(word, "i", needs=f"{variable} is a flag: write ids only"))
+        data = _data(source, frame, rows, rows.reals[:, :0].ravel())
+    else:
+        kinds = ("ib" if word == "node" else "i") + ("b" if kind == "truth" else "r")
+        needs = f"expected {word} id, {'is_fixed, ' if word == 'node' else ''}value"
+        rows = read_rows(source, span, Layout(word, kinds, needs=needs))
+        values = rows.reals[:, 0] if kind != "truth" else rows.ints[:, -1].astype(float)
+        data = _data(source, frame, rows, values)
+        if word == "node":
+            data.fixed = rows.ints[:, 1] == 1
+    _note_missing(source, data, word, known)
+    return data
+
+
+def _data(source: Source, frame: Frame, rows: Rows, values: NDArray[np.float64]) -> Data:
+    free = np.zeros(len(rows.ints), dtype=bool)
+    return Data(frame.arguments[0], rows.ints[:, 0], free, values, source.line(frame.offset))
+
+
+def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None) -> Data:
+    """Return rows of an id, for nodes a 0, and a vector or matrix."""
+    at, end = frame.spans[0]
+    ids: list[int] = []
+    values: list[NDArray[np.float64]] = []
+    while word := WORD.search(source.data, at, end):
+        here = word.start()
+        try:
+            number = integer(word.group())
+            at = word.end()
+            if is_nodal:
+                at = _free(source, at, end)
+            start = WORD.search(source.data, at, end)
+            value, at = value_at(source, start.start() if start else end, end, kind)
+            if not isinstance(value, np.ndarray):
+                raise ValueError(f"{value!r} is not a vector like the first row; write [3] (x, y, z)")
+            if values and value.shape != values[0].shape:
+                raise ValueError(f"has size {list(value.shape)}, but the first row {list(values[0].shape)}")
+            ids.append(number)
+            values.append(value)
+        except ValueError as error:
+            source.problem(f"{frame.arguments[0]} {shown(word.group())}: {error}", here)
+            at = source.data.find(b"\n", here, end)
+            if at < 0:
+                break
+    array = np.array(values) if values else np.zeros(0)
+    free = np.zeros(len(ids), dtype=bool)
+    return Data(frame.arguments[0], np.array(ids, dtype=np.int64), free, array, source.line(frame.offset))
+
+
+def _free(source: Source, at: int, end: int) -> int:
+    """Return the end of the is_fixed word, which must say that the value is free."""
+    match = re.compile(IS_FIXED).match(source.data, at, end)
+    if match is None or match.group(1) not in TRUTH:
+        raise ValueError("expected is_fixed, 0, before the vector")
+    if TRUTH[match.group(1)]:
+        raise ValueError("a vector cannot be fixed; fix its components _X, _Y, _Z in blocks of their own")
+    return match.end()
+
+
+def _note_missing(source: Source, data: Data, word: str, known: Ints) -> None:
+    """Refuse fixed values on missing nodes; note other values that have no place or stand twice."""
+    missing = rows_of_ids(known, data.ids) < 0
+    if (missing & data.fixed).any():
+        ids = data.ids[missing & data.fixed]
+        source.problems.add(
+            f"{data.variable} is fixed on {word} {_first(ids)}, which the file does not have", data.line
+        )
+    elif missing.any():
+        text = f"{data.variable} on {word} {_first(data.ids[missing])} is ignored: the file does not have it"
+        source.notes.append(Note(data.line, text))
+    if len(without_repeats(data.ids)) < len(data.ids):
+        source.notes.append(
+            Note(data.line, f"{data.variable} stands twice for a {word}; the last value counts")
+        )
+
+
+def _first(ids: Ints) -> str:
+    return f"{ids[0]} (and {len(ids) - 1} more)" if len(ids) > 1 else str(ids[0])

@@ -1,0 +1,164 @@
+"""Nodes, elements, conditions and geometries of an `.mdpa` file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Note
+from kratos_lite.io.formats.mdpa.rows import Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.formats.mdpa.scan import Frame, Source
+from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
+from kratos_lite.mesh import Block, Mesh, distinct
+from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.typing import Ints
+
+NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
+WORDS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
+
+
+def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequence[int]) -> Mesh:
+    """Return the mesh of the file, without its parts; elements must use the given properties."""
+    before = source.problems.count
+    mesh = _read_nodes(source, frames["Nodes"])
+    if source.problems.count > before:
+        # Every element at a broken node would be one more problem without a cause of its own.
+        source.problems.raise_if_any()
+    mesh.blocks = read_blocks(source, frames["Elements"], mesh)
+    mesh.conditions = read_blocks(source, frames["Conditions"], mesh)
+    for word, blocks in (("element", mesh.blocks), ("condition", mesh.conditions)):
+        _check_properties(source, blocks, word, properties)
+    return mesh
+
+
+def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
+    tables = [read_rows(source, frame.spans[0], NODES) for frame in frames]
+    ids = np.concatenate([np.zeros(0, dtype=np.int64), *(t.ints[:, 0] for t in tables)])
+    points = np.concatenate([np.zeros((0, 3)), *(t.reals for t in tables)])
+    lines = np.concatenate([np.zeros(0, dtype=np.int32), *(t.lines for t in tables)])
+    if not len(ids) and not source.problems:
+        raise InputError(
+            f"{source.name}: there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
+        )
+    keep = np.ones(len(ids), dtype=bool)
+    for row, first in repeated(ids):
+        keep[row] = False
+        if (points[row] == points[first]).all():
+            source.notes.append(
+                Note(int(lines[row]), f"node {ids[row]} stands at line {lines[first]} already, the same")
+            )
+        else:
+            source.problems.add(
+                f"node {ids[row]} stands at line {lines[first]} already, at {_at(points[first])}; found "
+                f"{_at(points[row])}; give each node its own id",
+                int(lines[row]),
+            )
+    if not keep.all():
+        points, ids = points[keep], ids[keep]
+    return Mesh(points, node_ids=ids, source=source.name)
+
+
+def _at(point: NDArray[np.float64]) -> str:
+    return " ".join(f"{x:.12g}" for x in point)
+
+
+def repeated(ids: Ints) -> list[tuple[int, int]]:
+    """Return (row, row of the first) for every id that stands there again.
+
+    >>> repeated(np.array([4, 7, 4]))
+    [(2, 0)]
+    """
+    if len(ids) < 2 or (ids[1:] > ids[:-1]).all():
+        return []
+    order = np.argsort(ids, kind="stable")
+    starts = np.append(True, ids[order][1:] != ids[order][:-1])
+    if starts.all():
+        return []
+    first = np.empty_like(order)
+    first[order] = order[starts][np.cumsum(starts) - 1]
+    again = np.flatnonzero(first != np.arange(len(ids)))
+    return [(int(row), int(first[row])) for row in again]
+
+
+def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
+    """Return the blocks of elements, conditions or geometries; their nodes must be in the mesh.
+
+    Empty blocks, of which some programs write one for each kind they know, say nothing and are left out.
+    """
+    blocks = [block for frame in frames if len(block := _read_block(source, frame, mesh))]
+    if blocks:
+        _refuse_repeated(source, blocks, WORDS[frames[0].name])
+    return blocks
+
+
+def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
+    name, word = frame.arguments[0], WORDS[frame.name]
+    head = 1 if word == "geometry" else 2
+    width = _width(frame.name, name)
+    known = width is not None
+    if width is None:
+        width = max(width_of_first_line(source, frame.spans[0]) - head, 0)
+    needs = f"{name} needs {width}" if known else f"the first {word} of the block has {width}"
+    layout = Layout(word, "ip"[:head] + "i" * width, "nodes", head, needs, alone=not known)
+    rows = read_rows(source, frame.spans[0], layout)
+    ids = rows.ints[:, 0] if len(rows.ints) else np.zeros(0, dtype=np.int64)
+    nodes = mesh.node_rows(rows.ints[:, head:]).astype(np.int32).reshape(len(ids), width)
+    _check_nodes(source, rows, nodes, head, f"{word} {{}} ({name})")
+    properties = rows.ints[:, 1] if head == 2 and len(ids) else np.zeros(len(ids), dtype=np.int64)
+    shape = {"element": element_shape, "condition": condition_shape}.get(word, lambda _: None)(name)
+    return Block(name, nodes, ids, properties, shape, rows.lines)
+
+
+def _width(kind: str, name: str) -> int | None:
+    """Return the number of nodes that a name promises, or None if only the rows can tell."""
+    if kind == "Geometries":
+        match = re.search(r"\dD(\d{1,3})N?$", name)
+        return int(match.group(1)) if match else None
+    width = count(name)
+    known = SOLIDS if kind == "Elements" else {**FACE_SHAPES, **LINES}
+    return width if width in known else None
+
+
+def _check_nodes(source: Source, rows: Rows, nodes: NDArray[np.int32], head: int, text: str) -> None:
+    """Note cells with nodes that are missing or stand twice."""
+    if not nodes.size:
+        return
+    for row, column in np.argwhere(nodes < 0)[:1000] if nodes.min() < 0 else ():
+        name = text.format(rows.ints[row, 0])
+        source.problems.add(f"{name}: there is no node {rows.ints[row, head + column]}", int(rows.lines[row]))
+    ordered = np.sort(nodes, axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
+    for row in np.flatnonzero(twice.any(axis=1))[:1000]:
+        node = rows.ints[row, head + int(np.argmax(nodes[row] == ordered[row, 1:][twice[row]][0]))]
+        name = text.format(rows.ints[row, 0])
+        source.problems.add(f"{name} names node {node} twice; its nodes must differ", int(rows.lines[row]))
+
+
+def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
+    ids = np.concatenate([block.ids for block in blocks])
+    again = repeated(ids)
+    if again:
+        lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
+        for row, first in again:
+            source.problems.add(
+                f"{word} {ids[row]} stands at line {lines[first]} already; give each {word} its own id",
+                int(lines[row]),
+            )
+
+
+def _check_properties(source: Source, blocks: list[Block], word: str, declared: Sequence[int]) -> None:
+    for block in blocks:
+        for number in distinct(block.properties):
+            if number in declared:
+                continue
+            rows = np.flatnonzero(block.properties == number)
+            more = f" (and {len(rows) - 1} more {word}s)" if len(rows) > 1 else ""
+            source.problems.add(
+                f"{word} {block.ids[rows[0]]}{more} uses Properties {number}, which the file does not have; "
+                f"add 'Begin Properties {number}' … 'End Properties'",
+                int(block.lines[rows[0]]) if block.lines is not None else None,
+            )

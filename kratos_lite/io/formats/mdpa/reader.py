@@ -1,0 +1,147 @@
+"""Read Kratos model files, `.mdpa`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import nearest
+from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.formats.mdpa.data import read_data
+from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh, repeated
+from kratos_lite.io.formats.mdpa.parts import PartReader
+from kratos_lite.io.formats.mdpa.scan import TOP, Frame, Source, scan
+from kratos_lite.io.formats.mdpa.values import Table, read_table, read_values
+from kratos_lite.io.text import blank_comments, integer, read_bytes
+from kratos_lite.mesh import NO_ROWS, Block
+from kratos_lite.typing import Ints
+
+
+def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
+    r"""Return everything that an `.mdpa` file says; blocks may stand in any order.
+
+    Parameters
+    ----------
+    path : the file, also gzipped.
+    strict : refuse a node that shares its line with another one and rows that run over line ends.
+        With False line ends carry no meaning at all, as in Kratos.
+
+    Raises
+    ------
+    InputError
+        Up to 20 problems with file, line, column, what was expected and the cure.
+
+    Examples
+    --------
+    >>> path = getfixture("tmp_path") / "one.mdpa"
+    >>> _ = path.write_text("Begin Nodes\n 7 0.0 0.5 1.0D+00 // top\nEnd Nodes\n")
+    >>> document = read_mdpa(path)
+    >>> document.mesh.node_ids, document.mesh.points
+    (array([7]), array([[0. , 0.5, 1. ]]))
+    """
+    source = Source(str(path), blank_comments(read_bytes(path), str(path)), strict)
+    frames: dict[str, list[Frame]] = {name: [] for name in TOP}
+    for frame in scan(source).children:
+        if frame.name in frames and frame.name != "Mesh":
+            frames[frame.name].append(frame)
+        else:
+            hint = "" if frame.name in TOP else nearest(frame.name, TOP)
+            source.note(f"block {frame.name} is skipped.{hint}", frame.offset)
+    document = _read(source, frames)
+    source.problems.raise_if_any()
+    document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
+    return document
+
+
+def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
+    """Return the document; first what others refer to, whatever the order in the file."""
+    properties = _read_properties(source, frames["Properties"])
+    tables = _read_tables(source, frames["Table"])
+    mesh = read_mesh(source, frames, list(properties))
+    # References to what is broken already would only be reported as missing.
+    source.problems.raise_if_any()
+    document = Document(mesh, properties, tables=tables)
+    document.geometries = read_blocks(source, frames["Geometries"], mesh)
+    document.model_data, _ = read_values(source, [span for f in frames["ModelPartData"] for span in f.spans])
+    if frames["Constraints"]:
+        from kratos_lite.io.formats.mdpa.constraints import read_constraints
+
+        for frame in frames["Constraints"]:
+            document.constraints += read_constraints(source, frame, mesh.node_ids)
+    _refuse_repeated_constraints(source, document)
+    ids = {
+        "nodes": mesh.node_ids,
+        "elements": _ids(mesh.blocks),
+        "conditions": _ids(mesh.conditions),
+        "geometries": _ids(document.geometries),
+        "constraints": _numbers(c.id for c in document.constraints),
+        "properties": _numbers(properties),
+        "tables": _numbers(tables),
+    }
+    document.nodal_data = [read_data(source, f, ids["nodes"]) for f in frames["NodalData"]]
+    document.element_data = [read_data(source, f, ids["elements"]) for f in frames["ElementalData"]]
+    document.condition_data = [read_data(source, f, ids["conditions"]) for f in frames["ConditionalData"]]
+    mesh.parts = PartReader(source, ids).read(frames["SubModelPart"])
+    return document
+
+
+def _ids(blocks: list[Block]) -> Ints:
+    return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])
+
+
+def _numbers(numbers: Iterable[int]) -> Ints:
+    return np.array(list(numbers), dtype=np.int64)
+
+
+def _read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
+    found: dict[int, Properties] = {}
+    for frame in frames:
+        number = _number(source, frame, found, zero=True)
+        values, lines = read_values(source, frame.spans)
+        for child in frame.children:
+            key = " ".join(["Table", *child.arguments])
+            values[key], lines[key] = read_table(source, child, child.arguments), source.line(child.offset)
+            source.note(f"{key} of {frame.title[6:]} is kept, but not used", child.offset)
+        if number is not None:
+            found[number] = Properties(number, values, lines, source.line(frame.offset))
+    return found
+
+
+def _read_tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
+    found: dict[int, Table] = {}
+    for frame in frames:
+        number = _number(source, frame, found)
+        table = read_table(source, frame, frame.arguments[1:])
+        source.note(f"{frame.title[6:]} is kept, but not used", frame.offset)
+        if number is not None:
+            found[number] = table
+    return found
+
+
+def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = False) -> int | None:
+    """Return the id in the header of a block, or None where it is wrong or taken."""
+    word = frame.arguments[0]
+    try:
+        number = 0 if zero and word == "0" else integer(word.encode())
+    except ValueError as error:
+        source.problem(f"{frame.name}: {error}", frame.offset)
+        return None
+    if number in found:
+        source.problem(
+            f"{frame.name} {number} stands at line {found[number].line} already; give each its own id",
+            frame.offset,
+        )
+        return None
+    return number
+
+
+def _refuse_repeated_constraints(source: Source, document: Document) -> None:
+    all_ = document.constraints
+    for row, first in repeated(_numbers(c.id for c in all_)):
+        source.problems.add(
+            f"constraint {all_[row].id} stands at line {all_[first].line} already; give each its own id",
+            all_[row].line,
+        )

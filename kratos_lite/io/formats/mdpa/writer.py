@@ -1,0 +1,283 @@
+"""Write Kratos model files, `.mdpa`, so that both Kratos and kratos_lite read the same numbers back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Constraint, Data, Document, Note
+from kratos_lite.io.formats.mdpa.parts import PART_NAME
+from kratos_lite.io.formats.mdpa.scan import NAME
+from kratos_lite.io.formats.mdpa.values import Table, kind_of
+from kratos_lite.io.names import kratos_name
+from kratos_lite.io.output import write_whole
+from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part
+from kratos_lite.typing import Ints
+
+Lines = Iterator[str]
+
+
+def write_mdpa(path: str | Path, document: Document) -> list[Note]:
+    """Write a document, as a whole or not at all; gzipped if the name ends with ``.gz``.
+
+    Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
+    ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
+    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``.
+    A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
+    variable of each master from the word before in the header, so it reads such a constraint differently.
+
+    Returns
+    -------
+    list of Note
+        Elements and conditions that are written though Kratos does not know them.
+
+    Raises
+    ------
+    InputError
+        The document holds what the format cannot: a number that is not finite, a name with blanks.
+
+    Examples
+    --------
+    >>> path = getfixture("tmp_path") / "one.mdpa"
+    >>> _ = write_mdpa(path, Document(Mesh([[0.1, 0, 0]], node_ids=[7])))
+    >>> print(path.read_text().strip())
+    Begin Nodes
+    7 0.1 0.0 0.0
+    End Nodes
+    """
+    try:
+        data = "\n".join(_lines(document)).encode("ascii") + b"\n"
+    except (InputError, UnicodeEncodeError) as error:
+        raise InputError(f"{path}: cannot be written: {error}") from None
+    if str(path).lower().endswith(".gz"):
+        import gzip
+
+        data = gzip.compress(data, mtime=0)
+    write_whole(path, data)
+    return _unknown_to_kratos(document.mesh)
+
+
+def _unknown_to_kratos(mesh: Mesh) -> list[Note]:
+    """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
+    counts: dict[str, int] = {}
+    for block in (*mesh.blocks, *mesh.conditions):
+        name = kratos_name(block.name)
+        own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith("KinematicLinear3D")
+        if len(block) and (own or "ContactFace" in name or re.search(r"3D\d+$", name)):
+            counts[name] = counts.get(name, 0) + len(block)
+    return [
+        Note(0, f"{n} {name} are written, but Kratos 10 does not know them") for name, n in counts.items()
+    ]
+
+
+def _lines(document: Document) -> Lines:
+    """Give the lines of the file in the order that Kratos needs: what is referred to comes first."""
+    mesh = document.mesh
+    if document.model_data:
+        yield from _block("ModelPartData", _values(document.model_data))
+    for number, table in document.tables.items():
+        yield from _table(f"Table {number}", table)
+    yield from _properties(document)
+    yield from _block("Nodes", _rows(mesh.node_ids[:, None], mesh.points))
+    for kind, blocks in (
+        ("Geometries", document.geometries), ("Elements", mesh.blocks), ("Conditions", mesh.conditions),
+    ):  # fmt: skip
+        for block in blocks:
+            yield from _cells(kind, block, mesh)
+    yield from _constraints(document.constraints)
+    for kind, entries in (
+        ("NodalData", document.nodal_data),
+        ("ElementalData", document.element_data),
+        ("ConditionalData", document.condition_data),
+    ):
+        for data in entries:
+            yield from _block(f"{kind} {_name(data.variable)}", _data(data, kind == "NodalData"))
+    yield from _parts(document)
+
+
+def _block(header: str, body: Iterable[str]) -> Lines:
+    yield f"Begin {header}"
+    yield from body
+    yield f"End {header.split(maxsplit=1)[0]}\n"
+
+
+def _name(name: str) -> str:
+    if not NAME.fullmatch(name.encode()) or name in ("Begin", "End"):
+        raise InputError(f"{name!r} is no name for a .mdpa file; use letters, digits and '_'")
+    return name
+
+
+def _rows(ints: NDArray[Any], reals: ArrayLike = ()) -> Lines:
+    """Give the lines of a table of integers (m, a), followed by reals (m, b)."""
+    numbers = np.asarray(reals, dtype=float)
+    if not np.isfinite(numbers).all():
+        raise InputError("a number is not finite (nan or inf); give a finite one")
+    if numbers.size:
+        for row, more in zip(ints.tolist(), numbers.reshape(len(ints), -1).tolist(), strict=True):
+            yield " ".join([*map(str, row), *map(repr, more)])
+    else:
+        yield from (" ".join(map(str, row)) for row in ints.tolist())
+
+
+def _properties(document: Document) -> Lines:
+    """Give the Properties; those that cells use but nobody filled become empty blocks."""
+    mesh = document.mesh
+    used = {int(n) for block in (*mesh.blocks, *mesh.conditions) for n in np.unique(block.properties)}
+    for number in [*document.properties, *sorted(used - document.properties.keys())]:
+        values = document.properties[number].values if number in document.properties else {}
+        tables = {name: value for name, value in values.items() if isinstance(value, Table)}
+        body = [*_values({name: v for name, v in values.items() if name not in tables})]
+        for table in tables.values():
+            body += _table("Table", table)
+        yield from _block(f"Properties {number}", body)
+
+
+def _values(values: dict[str, Any]) -> Lines:
+    for name, value in values.items():
+        yield f" {_name(name)} {_value(name, value)}"
+
+
+def _value(name: str, value: Any) -> str:
+    """Return a value as Kratos reads it."""
+    if isinstance(value, (bool, np.bool_)):
+        return str(bool(value))
+    if isinstance(value, (int, np.integer)) and kind_of(name) != "number":
+        return str(int(value))
+    if isinstance(value, str):
+        if not value or re.search(r"[\s\[\]()]|//|/\*", value) or value in ("Begin", "End"):
+            raise InputError(f"{name}: {value!r} is not a single word")
+        return value
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.ndim > 2:
+        raise InputError(f"{name}: {value!r} is not a number, word, vector or matrix")
+    return _array(name, array)
+
+
+def _array(name: str, array: NDArray[Any]) -> str:
+    """Return a number, a vector or a matrix as Kratos reads it."""
+    if not np.isfinite(array).all():
+        raise InputError(f"{name}: a number is not finite (nan or inf); give a finite one")
+    if array.ndim == 0:
+        return repr(float(array))
+    if array.ndim == 1:
+        return f"[{len(array)}] {_listed(array)}"
+    rows, columns = array.shape
+    return f"[{rows},{columns}] ({','.join(_listed(row) for row in array)})"
+
+
+def _listed(values: NDArray[Any]) -> str:
+    return f"({','.join(repr(float(v)) for v in values)})"
+
+
+def _table(header: str, table: Any) -> Lines:
+    if not isinstance(table, Table):
+        raise InputError(f"{header}: expected a Table, got {type(table).__name__}")
+    rows = _rows(np.zeros((len(table.rows), 0)), table.rows)
+    yield from _block(f"{header} {_name(table.x)} {_name(table.y)}", rows)
+
+
+def _cells(kind: str, block: Block, mesh: Mesh) -> Lines:
+    name = _name(block.name if kind == "Geometries" else kratos_name(block.name))
+    columns = [block.ids[:, None], mesh.node_ids[block.nodes]]
+    if kind != "Geometries":
+        columns.insert(1, np.asarray(block.properties)[:, None])
+    yield from _block(f"{kind} {name}", _rows(np.hstack(columns)))
+
+
+def _constraints(constraints: list[Constraint]) -> Lines:
+    """Give the constraints, those of the same variables in one block."""
+    # Kratos misreads a block whose constraints have different numbers of masters.
+    for (_, *words), group in groupby(constraints, key=_header):
+        rows = []
+        for c in group:
+            weights = ",".join(_array(f"constraint {c.id}", np.asarray(w)) for w in c.weights)
+            constant = _array(f"constraint {c.id}", np.asarray(c.constant))
+            nodes = " ".join(str(node) for node, _ in (c.slave, *c.masters))
+            rows.append(f"{c.id} {constant} [{weights}] {nodes}")
+        yield from _block(" ".join(["Constraints", *map(_name, map(str, words))]), rows)
+
+
+def _header(constraint: Constraint) -> tuple[int | str, ...]:
+    """Return the number of masters, the name and the variables of the header.
+
+    Kratos misreads a header with more than the slave's variable where one is enough.
+    """
+    variables = [constraint.slave[1], *(variable for _, variable in constraint.masters)]
+    return (
+        len(constraint.masters),
+        constraint.name,
+        *(variables[:1] if len(set(variables)) == 1 else variables),
+    )
+
+
+def _data(data: Data, is_nodal: bool) -> Lines:
+    """Give the rows of nodal, elemental or conditional data."""
+    values = np.asarray(data.values)
+    head = [data.ids[:, None], data.fixed[:, None].astype(np.int64)] if is_nodal else [data.ids[:, None]]
+    if not values.size:
+        yield from _rows(data.ids[:, None])
+    elif values.ndim == 1 and kind_of(data.variable) == "truth":
+        yield from _rows(np.hstack([*head, values[:, None].astype(np.int64)]))
+    elif values.ndim == 1:
+        yield from _rows(np.hstack(head), values)
+    else:
+        for row, value in zip(_rows(np.hstack(head)), values, strict=True):
+            yield f"{row} {_array(data.variable, value)}"
+
+
+def _parts(document: Document) -> Lines:
+    mesh = document.mesh
+    ids = {
+        "nodes": mesh.node_ids,
+        "elements": mesh.element_ids,
+        "conditions": _ids(mesh.conditions),
+        "geometries": _ids(document.geometries),
+        "constraints": np.array([c.id for c in document.constraints], dtype=np.int64),
+    }
+    for name in mesh.parts:
+        if not PART_NAME.fullmatch(name):
+            raise InputError(f"part {name!r} has no name for a .mdpa file; use letters, digits, '_' and '-'")
+    for name in _children(mesh.parts, ""):
+        yield from _part(mesh.parts, name, "", ids)
+
+
+def _ids(blocks: Sequence[Block]) -> Ints:
+    return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])
+
+
+def _children(parts: dict[str, Part], parent: str) -> list[str]:
+    """Return the parts whose nearest ancestor that exists is `parent`."""
+
+    def nearest_ancestor(name: str) -> str:
+        while "." in name:
+            name = name.rsplit(".", 1)[0]
+            if name in parts:
+                return name
+        return ""
+
+    return [name for name in parts if name != parent and nearest_ancestor(name) == parent]
+
+
+def _part(parts: dict[str, Part], name: str, parent: str, ids: dict[str, Ints]) -> Lines:
+    part = parts[name]
+    body: list[str] = []
+    if part.data:
+        body += _block("SubModelPartData", _values(part.data))
+    for kind in ("tables", "properties"):
+        if members := getattr(part, kind):
+            body += _block(f"SubModelPart{kind.capitalize()}", map(str, members))
+    for kind, known in ids.items():
+        rows = getattr(part, kind)
+        if len(rows):
+            body += _block(f"SubModelPart{kind.capitalize()}", map(str, known[rows].tolist()))
+    for child in _children(parts, name):
+        body += _part(parts, child, name, ids)
+    yield from _block(f"SubModelPart {name.removeprefix(parent + '.')}", body)

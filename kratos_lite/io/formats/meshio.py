@@ -1,0 +1,365 @@
+"""Bridge to meshio: Gmsh, Abaqus, Nastran, MED, VTK and other mesh formats.
+
+meshio keeps cells in the node order of VTK, except that its linear wedge is that of Gmsh and Kratos.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Document, Note, Properties
+from kratos_lite.io.output import replacing
+from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
+from kratos_lite.shapes import SHAPES, Shape
+from kratos_lite.typing import Ints
+
+CELLS = {
+    "vertex": "Point1", "line": "Line2", "line3": "Line3",
+    "triangle": "Triangle3", "triangle6": "Triangle6",
+    "quad": "Quadrilateral4", "quad8": "Quadrilateral8", "quad9": "Quadrilateral9",
+    "tetra": "Tetrahedron4", "tetra10": "Tetrahedron10", "pyramid": "Pyramid5", "pyramid13": "Pyramid13",
+    "wedge": "Wedge6", "wedge15": "Wedge15",
+    "hexahedron": "Hexahedron8", "hexahedron20": "Hexahedron20", "hexahedron27": "Hexahedron27",
+}  # fmt: skip
+"""Our shape of each cell type of meshio."""
+_NAMES = ("PointCondition3D{}N", "LineCondition3D{}N", "SurfaceCondition3D{}N", "KinematicLinear3D{}N")
+_PROPERTY_KEYS = ("gmsh:physical", "nastran:ref", "medit:ref", "PROPERTIES_ID")
+_INT32 = 2**31 - 1
+_OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
+"""Endings left to others: read by ourselves, pictures, or spread over several files."""
+_OPTIONS = {
+    ".msh": {"file_format": "gmsh22"},
+    ".xdmf": {"data_format": "XML"},
+    ".xmf": {"data_format": "XML"},
+}
+"""How to write mixed cells to one file where that is not the default of meshio."""
+
+
+def read_meshio(path: str | Path) -> Document:
+    """Read the mesh of any format that meshio knows; the ending says which.
+
+    Solid cells become elements ``KinematicLinear3D…N``, triangles and quadrilaterals conditions
+    ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  Named groups,
+    cell sets and node sets become parts.  The number of the physical group (or material) of a solid cell
+    is its property id, or 1; the properties are empty.  Lengths are taken to be m.  meshio tells no ids:
+    nodes and elements are counted from 1, unless the data NODE_ID and ELEMENT_ID of our own files name them.
+
+    Parameters
+    ----------
+    path : file such as ``part.msh``, ``.inp``, ``.bdf``, ``.med``, ``.vtk`` or ``.vtu``.
+
+    Raises
+    ------
+    InputError
+        The ending is unknown, the file cannot be read, or it holds no mesh in three dimensions.
+    """
+    path = Path(path)
+    check_ending(path)
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no ordinary file; name a file")  # a pipe might never end
+    with _guarded(path, "read") as (meshio, said):
+        found = meshio.read(path)
+    _check(path, found)
+    return _Reading(path, found, said.getvalue()).document()
+
+
+def write_meshio(
+    path: str | Path,
+    mesh: Mesh,
+    point_data: Mapping[str, NDArray[Any]] | None = None,
+    cell_data: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write the elements of a mesh in the format of meshio that the ending says, as a whole or not at all.
+
+    Parameters
+    ----------
+    path : file to write, such as ``beam.vtk``, ``.msh``, ``.inp`` or ``.xdmf``.
+    mesh : points in m and element blocks; blocks of unknown kinds are left out.
+    point_data, cell_data : numbers on all nodes and on all elements by name; some formats keep none.
+
+    Raises
+    ------
+    InputError
+        The ending is unknown, or the format cannot hold this mesh, or the file cannot be written.
+    """
+    path = Path(path)
+    check_ending(path)
+    types = {shape: name for name, shape in CELLS.items()}
+    cells, slices = [], []
+    for block, at in with_rows(mesh.blocks):
+        if block.shape is not None and block.shape.__name__ in types:
+            cells.append((types[block.shape.__name__], block.nodes[:, list(block.shape.to_vtk)]))
+            slices.append(at)
+    data = _gmsh_tags(path, cell_data or {}) if path.suffix.lower() == ".msh" else cell_data or {}
+    cell_values = {name: [values[rows] for rows in slices] for name, values in data.items()}
+    with replacing(path) as temporary, _guarded(path, "written") as (meshio, _):
+        whole = meshio.Mesh(mesh.points, cells, dict(point_data or {}), cell_values)
+        meshio.write(temporary, whole, **_OPTIONS.get(path.suffix.lower(), {}))
+        # Several writers of meshio leave out what their format cannot hold, and say nothing.
+        kept, wanted = _count(meshio.read(temporary)), _count(whole)
+        if kept != wanted:
+            raise InputError(
+                f"{path}: this format keeps {_told(kept)} of {_told(wanted)}; .vtu and .vtk keep all cells"
+            )
+
+
+def _gmsh_tags(path: Path, cell_data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the property ids as the two tags of Gmsh, which takes no stresses on elements."""
+    if results := set(cell_data) - {"PROPERTIES_ID", "ELEMENT_ID"}:
+        raise InputError(f"{path}: .msh cannot hold {', '.join(sorted(results))} on elements; write .vtu")
+    properties = np.asarray(cell_data.get("PROPERTIES_ID", []))
+    if len(properties) and properties.max() > _INT32:
+        raise InputError(
+            f"{path}: .msh holds property ids up to {_INT32}; got {properties.max()}; write .vtu"
+        )
+    tags = properties.astype(np.int32)
+    return {"gmsh:physical": tags, "gmsh:geometrical": tags} if len(tags) else {}
+
+
+def _count(mesh: Any) -> dict[str, int]:
+    """Return the number of cells of each type."""
+    counts: dict[str, int] = {}
+    for cells in mesh.cells:
+        counts[cells.type] = counts.get(cells.type, 0) + len(cells.data)
+    return counts
+
+
+def _told(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "no cells"
+
+
+def _endings() -> list[str]:
+    import meshio
+
+    return sorted(set(meshio.extension_to_filetypes) - _OURS)
+
+
+def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
+    """Refuse an ending that meshio does not know, in words rather than by leaving the program."""
+    endings = _endings()
+    if not path.name.lower().endswith(tuple(endings)):
+        raise InputError(f"{path}: unknown ending {path.suffix!r}; known are {own} {' '.join(endings)}")
+
+
+@contextmanager
+def _guarded(path: Path, done: str) -> Iterator[tuple[Any, io.StringIO]]:
+    """Give meshio and what it says; meshio prints and ends the program where others raise."""
+    import meshio
+    from meshio import _mesh
+
+    for missing in ("wedge15", "pyramid13"):  # meshio 5.3.5 knows both but fails on their dimension
+        _mesh.topological_dimension.setdefault(missing, 3)
+    said, listed = io.StringIO(), io.StringIO()
+    try:
+        with redirect_stderr(said), redirect_stdout(listed):
+            yield meshio, said
+    except ImportError as error:
+        raise InputError(f"{path}: {error}; this format needs it: pip install {error.name}") from error
+    except (InputError, MemoryError):
+        raise
+    except OSError as error:
+        if done == "written":
+            raise  # the disk, not the format
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (Exception, SystemExit) as error:
+        reasons = [said.getvalue(), listed.getvalue(), "" if isinstance(error, SystemExit) else repr(error)]
+        reason = " ".join(" ".join(reasons).split())
+        cure = "is the file complete?" if done == "read" else ".vtu and .vtk hold every mesh"
+        raise InputError(f"{path}: cannot be {done} by meshio: {reason}; {cure}") from error
+
+
+def _check(path: Path, found: Any) -> None:
+    """Refuse points that are no points in space, and cells that name points that are not there."""
+    if found.points.ndim != 2 or found.points.shape[1] != 3:
+        raise InputError(
+            f"{path}: the points form {found.points.shape}; expected (n, 3); save a mesh in space"
+        )
+    if len(bad := np.flatnonzero(~np.isfinite(found.points).all(axis=1))):
+        raise InputError(
+            f"{path}: point {bad[0] + 1} has coordinates {found.points[bad[0]]}; expected numbers"
+        )
+    for cells in found.cells:
+        if cells.type in CELLS and len(cells.data):
+            low, high = cells.data.min(), cells.data.max()
+            if low < 0 or high >= len(found.points):
+                raise InputError(
+                    f"{path}: a {cells.type} names point {high + 1 if low >= 0 else low + 1}; "
+                    f"the points are 1 … {len(found.points)}; is the file complete?"
+                )
+
+
+def _ids(given: list[Any], count: int) -> Ints | None:
+    """Return ids if there are `count`, all whole, positive and different; else None."""
+    ids = np.concatenate([NO_ROWS, *map(np.ravel, given)])
+    if len(ids) != count or not count or not 1 <= ids.min() <= ids.max() < 2**62:
+        return None
+    if not np.array_equal(ids, np.round(ids)):
+        return None
+    return ids.astype(np.int64) if len(np.unique(ids)) == count else None
+
+
+class _Reading:
+    """One mesh of meshio on its way to a Document."""
+
+    def __init__(self, path: Path, found: Any, said: str) -> None:
+        self.path, self.found = path, found
+        self.notes = [Note(0, " ".join(said.split()))] if said.strip() else []
+        self.used = set(_PROPERTY_KEYS)
+        self.sets = self._sets()
+        self.kinds: list[type[Shape] | None] = [
+            SHAPES[CELLS[cells.type]] if cells.type in CELLS else None for cells in found.cells
+        ]
+        self.dims = [-1 if kind is None else kind.nodes.shape[1] for kind in self.kinds]
+        self.rows: list[Ints] = [np.full(len(cells.data), -1) for cells in found.cells]
+
+    def document(self) -> Document:
+        """Return the mesh with its parts, empty properties and notes."""
+        elements, conditions = self._blocks((3,)), self._blocks((2, 1, 0))
+        for block in elements if self.path.suffix.lower() == ".msh" else []:
+            if len(np.unique(np.sort(block.nodes, axis=1), axis=0)) < len(block):
+                # Gmsh 2 files repeat an element for every group it is in: it would be stiff twice.
+                raise InputError(f"{self.path}: {block.name} listed twice; save it from Gmsh as version 4.1")
+        used = sorted({int(i) for block in elements for i in np.unique(block.properties)} or {1})
+        for block in conditions:
+            block.properties[:] = used[0]
+        if not elements:
+            self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
+        node_ids = self._name(elements)
+        self._note_lost()
+        mesh = Mesh(
+            self.found.points,
+            elements,
+            node_ids=node_ids,
+            conditions=conditions,
+            parts=self._parts(),
+            source=self.path.name,
+        )
+        return Document(mesh, {i: Properties(i) for i in used}, notes=self.notes)
+
+    def _name(self, elements: list[Block]) -> Ints:
+        """Give the elements the ids that our own files state, and return those of the nodes."""
+        n, m = len(self.found.points), sum(map(len, elements))
+        node_ids = _ids([self.found.point_data.get("NODE_ID", [])], n)
+        solids = [b for b, dim in enumerate(self.dims) if dim == 3]
+        stated = self.found.cell_data.get("ELEMENT_ID")
+        rows = np.concatenate([NO_ROWS, *(self.rows[b] for b in solids)])
+        ids = _ids([stated[b] for b in solids] if stated else [], m)
+        if ids is not None:
+            in_order = np.empty_like(ids)
+            in_order[rows] = ids
+            for block in elements:
+                block.ids[:] = in_order[block.ids - 1]
+            self.used.add("ELEMENT_ID")
+        if node_ids is None:
+            node_ids = np.arange(1, n + 1)
+            self.notes.append(Note(0, f"nodes are numbered 1 … {n} in the order of the file"))
+        else:
+            self.used.add("NODE_ID")
+        return node_ids
+
+    def _sets(self) -> dict[str, list[Ints]]:
+        """Return the named groups of cells: rows in each block of meshio."""
+        found = self.found
+        sets = {
+            name: [NO_ROWS if rows is None else np.asarray(rows, dtype=np.int64) for rows in members]
+            for name, members in found.cell_sets.items()
+            if not name.startswith("gmsh:")
+        }
+        tags = found.cell_data.get("gmsh:physical")
+        for name, tag_and_dim in found.field_data.items():  # Gmsh 2 files
+            if tags is not None and name not in sets and len(np.ravel(tag_and_dim)) == 2:
+                tag, dim = tag_and_dim
+                sets[name] = [
+                    np.flatnonzero((values == tag) & (cells.dim == dim))
+                    for values, cells in zip(tags, found.cells, strict=True)
+                ]
+        return sets
+
+    def _blocks(self, dims: tuple[int, ...]) -> list[Block]:
+        """Return one block per cell type of these dimensions, and remember the row of each cell."""
+        blocks, start = [], 0
+        for kind in dict.fromkeys(k for k, d in zip(self.kinds, self.dims, strict=True) if d in dims):
+            assert kind is not None
+            nodes, properties, first = [], [], start
+            for b in (b for b, other in enumerate(self.kinds) if other is kind):
+                keep = self._kept(b)
+                self.rows[b][keep] = np.arange(start, start + len(keep))
+                start += len(keep)
+                nodes.append(np.asarray(self.found.cells[b].data)[keep][:, np.argsort(kind.to_vtk)])
+                properties.append(self._properties(b)[keep])
+            name = _NAMES[kind.nodes.shape[1]].format(len(kind.nodes))
+            ids = np.arange(first + 1, start + 1)
+            block = Block(name, np.vstack(nodes).astype(np.int32), ids, np.concatenate(properties), kind)
+            if len(block):
+                self._turn_wedges(block)
+                blocks.append(block)
+        return blocks
+
+    def _kept(self, b: int) -> Ints:
+        """Return the cells of block b to keep: all solids and faces, lines and points of named groups."""
+        everything: Ints = np.arange(len(self.found.cells[b].data))
+        if self.dims[b] >= 2:
+            return everything
+        return np.unique(np.concatenate([NO_ROWS, *(members[b] for members in self.sets.values())]))
+
+    def _properties(self, b: int) -> Ints:
+        """Return the property ids of block b; 1 where the file gives none to any solid."""
+        for key in _PROPERTY_KEYS:
+            values = self.found.cell_data.get(key)
+            solid = [v for v, d in zip(values or [], self.dims, strict=False) if d == 3]
+            if values is not None and any(np.any(v != 0) for v in solid):
+                return np.asarray(values[b], dtype=np.int64).copy()
+        return np.ones(len(self.found.cells[b].data), dtype=np.int64)
+
+    def _turn_wedges(self, block: Block) -> None:
+        """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects.
+
+        VTK's text turns its linear wedge inside out, VTK's formulas (and most writers) do not; the sign of
+        the volume tells which was meant.
+        """
+        if block.name != "KinematicLinear3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
+            return
+        X = self.found.points[block.nodes]
+        upward = X[:, 3:].sum(axis=1) - X[:, :3].sum(axis=1)
+        normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
+        turned = np.einsum("ij,ij->i", normal, upward) < 0
+        block.nodes[turned] = block.nodes[turned][:, [0, 2, 1, 3, 5, 4]]
+
+    def _note_lost(self) -> None:
+        """Note cells and data that are not used."""
+        lost: dict[str, int] = {}
+        for cells, rows in zip(self.found.cells, self.rows, strict=True):
+            lost[cells.type] = lost.get(cells.type, 0) + int((rows < 0).sum())
+        for name, count in lost.items():
+            if count:
+                why = "are in no named group" if name in CELLS else "are of no known type"
+                self.notes.append(Note(0, f"{count} cells {name!r} {why} and are not used"))
+        data = [*self.found.point_data, *self.found.cell_data]
+        unused = [n for n in data if not n.startswith("gmsh:") and n not in self.used]
+        if unused:
+            self.notes.append(Note(0, f"data not used: {', '.join(dict.fromkeys(unused))}"))
+
+    def _parts(self) -> dict[str, Part]:
+        """Return the named groups with the nodes of their cells, and the node sets."""
+        parts: dict[str, Part] = {}
+        for name, members in self.sets.items():
+            rows: dict[bool, list[Ints]] = {True: [NO_ROWS], False: [NO_ROWS]}
+            nodes = [NO_ROWS]
+            for b, chosen in enumerate(members):
+                if self.dims[b] >= 0:
+                    rows[self.dims[b] == 3].append(self.rows[b][chosen])
+                    nodes.append(np.asarray(self.found.cells[b].data)[chosen].ravel().astype(np.int64))
+            elements, conditions = (np.unique(np.concatenate(rows[solid])) for solid in (True, False))
+            parts[name] = Part(np.unique(np.concatenate(nodes)), elements, conditions)
+        for name, chosen in self.found.point_sets.items():
+            part = parts.setdefault(name, Part())
+            part.nodes = np.unique(np.concatenate([part.nodes, np.asarray(chosen, dtype=np.int64)]))
+        return parts

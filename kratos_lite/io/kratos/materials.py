@@ -1,0 +1,120 @@
+"""The materials file of a Kratos run: materials of parts by properties id."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError, KratosLiteError, ModelError
+from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
+from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.mesh import with_rows
+
+
+def materials_of(
+    settings: Settings, context: RunContext, document: Document, notes: list[str]
+) -> dict[int, LinearMaterial]:
+    """Return the materials by properties id, and put the properties into the document.
+
+    Elements of the parts get the properties id, and the variables join those of the mesh file.
+
+    Raises
+    ------
+    InputError
+        With the place of a part without elements, an unknown law or an impossible constant.
+    ModelError
+        If elements are left without material.
+    """
+    if not settings.sections("properties"):
+        raise settings.error("properties", "the materials file needs a list of 'properties'")
+    found: dict[int, LinearMaterial] = {}
+    for entry in settings.sections("properties"):
+        entry.check_keys(("model_part_name", "properties_id", "Material"))
+        number = entry.integer("properties_id")
+        _assign(entry, context, document, number)
+        found[number] = _material(entry, document.properties[number], notes)
+    return _used(found, document)
+
+
+def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
+    """Give the elements of the part their properties id."""
+    rows = context.part(entry).elements
+    if not len(rows):
+        have = [name for name, part in context.mesh.parts.items() if len(part.elements)]
+        raise entry.error(
+            "model_part_name",
+            f"part {entry.text('model_part_name')!r} has no elements to carry a material; "
+            f"parts with elements are {', '.join([context.root + ' (all)', *have])}",
+        )
+    mask = np.zeros(context.mesh.n_elements, dtype=bool)
+    mask[rows] = True
+    for block, at in with_rows(context.mesh.blocks):
+        block.properties = np.where(mask[at], number, block.properties)
+    document.properties.setdefault(number, Properties(number))
+
+
+def _material(entry: Settings, properties: Properties, notes: list[str]) -> LinearMaterial:
+    part = entry.text("model_part_name")
+    body = entry.section("Material", required=True)
+    law = body.section("constitutive_law", required=True)
+    name = law.text("name").rsplit(".", 1)[-1]
+    if name not in MATERIALS:
+        raise law.error(
+            "name",
+            f"part {part}: {name!r} is not a linear elastic law that kratos_lite has; "
+            "use LinearElastic3DLaw, or solve this part with Kratos",
+        )
+    variables = body.section("Variables")
+    values: dict[str, Any] = {key.rsplit(".", 1)[-1]: _number(variables, key) for key in variables.values}
+    if body.section("Tables").values:
+        notes.append(f"material of {part}: Tables are not used by {name}")
+    for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):
+        if body.values[key]:
+            raise body.error(key, f"part {part}: {key!r} in a material is not supported; leave it out")
+    properties.values |= values
+    try:
+        material = material_from({**properties.values, "CONSTITUTIVE_LAW": name})
+    except KratosLiteError as error:
+        named = [key for key in variables.values if key in str(error)]
+        raise variables.error(named[0] if named else "", f"part {part}: {error}") from None
+    assert material is not None
+    return material
+
+
+def _number(variables: Settings, key: str) -> Any:
+    """Return a variable: a number for elastic constants, else whatever it is."""
+    value = variables.values[key]
+    if key.rsplit(".", 1)[-1] in ELASTIC | {"DENSITY"}:
+        return variables.number(key)
+    if key in USED and not (is_number(value) or (isinstance(value, list) and all(map(is_number, value)))):
+        raise variables.error(key, f"{key} must be a number or a list of numbers; got {shown(value)}")
+    return value
+
+
+def _used(found: dict[int, LinearMaterial], document: Document) -> dict[int, LinearMaterial]:
+    """Return the materials that elements have, those of the mesh file too; name elements without any."""
+    mesh, used = document.mesh, {}
+    for block in mesh.blocks:
+        for number in map(int, np.unique(block.properties)):
+            material = found.get(number) or _of_mesh_file(document, number)
+            if material is None:
+                cells = np.flatnonzero(block.properties == number)
+                raise ModelError(
+                    f"{mesh.place(block, int(cells[0]))} has no material (property {number}, {len(cells)} "
+                    f"elements of this kind); name its part in the materials file"
+                )
+            used[number] = material
+    return used
+
+
+def _of_mesh_file(document: Document, number: int) -> LinearMaterial | None:
+    given = document.properties.get(number)
+    try:
+        return material_from(given.values) if given else None
+    except KratosLiteError as error:
+        line = given.line if given else 0
+        raise InputError(f"{document.mesh.source}:{line}: Properties {number}: {error}") from None

@@ -1,0 +1,306 @@
+"""Processes of a Kratos run file: what they set and fix on nodes and conditions, and when.
+
+Kratos runs all processes before every time step, in order, and takes their supports back after
+it; values stay.  A static linear solution depends on the last step alone, so each process acts
+here once, at the last time at which Kratos would run it, in the order of those times.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
+from kratos_lite.io.kratos.expressions import evaluate
+from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
+from kratos_lite.io.names import nearest_variable
+from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
+
+Value = float | str
+IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACCELERATION", "REACTION")
+"""Vector variables that files set although a static solution of solids does not use them."""
+KNOWN_VECTORS = (*VECTORS, *IDLE)
+KNOWN_SCALARS = (*(f"{v}_{a}" for v in KNOWN_VECTORS for a in "XYZ"), *PRESSURES, "TEMPERATURE")
+COMMON = ("help", "mesh_id", "model_part_name", "variable_name", "interval", "local_axes")
+NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
+
+
+@dataclass(eq=False)
+class Action:
+    """One component that a process sets, fixes or both.
+
+    Attributes
+    ----------
+    settings : the parameters it came from, for messages.
+    rows : node or condition rows.
+    component : scalar variable, such as ``DISPLACEMENT_X``.
+    factors : the value is their product, each a number or an expression; empty to leave it as it is.
+    interval : when it acts.
+    on_conditions : set conditions, not nodes.
+    fixed : hold the component in the steps in which it acts.
+    """
+
+    settings: Settings
+    rows: NDArray[np.int64]
+    component: str
+    factors: tuple[Value, ...]
+    interval: Interval
+    on_conditions: bool = False
+    fixed: bool = False
+
+    def active(self, times: Sequence[float]) -> list[int]:
+        """Return the steps in which it acts; step 0 is the start, before the first solution."""
+        first = 1 if self.on_conditions or not self.factors else 0
+        return [k for k in range(first, len(times)) if times[k] in self.interval]
+
+    def depends_on_place(self) -> bool:
+        """Whether an expression holds the place x, y or z of the moved mesh."""
+        return self.mentions("xyz")
+
+    def depends_on_time(self) -> bool:
+        """Whether an expression holds the time t."""
+        return self.mentions("t")
+
+    def mentions(self, names: str) -> bool:
+        """Whether an expression holds one of some names of one letter."""
+        return any(isinstance(f, str) and re.search(rf"(?<!\w)[{names}](?!\w)", f) for f in self.factors)
+
+    def value(self, points: Array, time: float) -> Array | float:
+        """Return the value at points (m, 3) in m and a time in s."""
+        x, y, z = points.T
+        X, Y, Z = 0.0 * points.T if self.on_conditions else points.T  # measured against Kratos 10.4.4
+        variables = {"x": x, "y": y, "z": z, "t": time, "X": X, "Y": Y, "Z": Z}
+        product: Any = 1.0
+        try:
+            for factor in self.factors:
+                with np.errstate(over="ignore"):
+                    product = product * (evaluate(factor, variables) if isinstance(factor, str) else factor)
+            if not np.isfinite(product).all():
+                raise ValueError("modulus × direction is too large for a number")
+        except ValueError as error:
+            key = "value" if "value" in self.settings else "modulus"
+            raise self.settings.error(key, f"{self.component}: {error}") from None
+        return product  # type: ignore[no-any-return]
+
+    def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
+        """Set the values that they are at a time in s; places are those of nodes and conditions."""
+        value = self.value(places[self.on_conditions][self.rows], time)
+        setter = values.set_conditions if self.on_conditions else values.set_nodes
+        setter(self.component, self.rows, value)
+
+
+def _value(settings: Settings, value: Any, what: str) -> Value:
+    if isinstance(value, str) or is_number(value):
+        return value if isinstance(value, str) else float(value)
+    raise settings.error(what, f"{what} must be a number or an expression in x, y, z, t; got {shown(value)}")
+
+
+def _three(settings: Settings, key: str) -> list[Any]:
+    value = settings.get(key)
+    if not isinstance(value, list) or len(value) != 3:
+        raise settings.error(key, f"{key} must be a list of three entries; got {shown(value)}")
+    return value
+
+
+def _variable(settings: Settings, known: Sequence[str], kind: str) -> str:
+    name = settings.text("variable_name").rsplit(".", 1)[-1]
+    if name not in known:
+        raise settings.error(
+            "variable_name",
+            f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)} "
+            f"Known are {', '.join(known[:5])} …",
+        )
+    return name
+
+
+def _constrained(settings: Settings) -> list[bool]:
+    """Return ``constrained`` for the three axes; one word stands for all."""
+    value = settings.get("constrained", True)
+    flags = [value] * 3 if isinstance(value, bool) else value
+    if not isinstance(flags, list) or len(flags) != 3 or not all(isinstance(f, bool) for f in flags):
+        raise settings.error(
+            "constrained", f"constrained must be true, false or a list of three of them; got {shown(value)}"
+        )
+    return flags
+
+
+def _rows(settings: Settings, context: RunContext, on_conditions: bool) -> NDArray[np.int64]:
+    part = context.part(settings)
+    return part.conditions if on_conditions else part.nodes
+
+
+def vector_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
+    """Return the actions of assign_vector_variable_process (to nodes or conditions)."""
+    settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
+    name = _variable(settings, KNOWN_VECTORS, "vector")
+    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
+    fixed = [False] * 3 if on_conditions else _constrained(settings)
+    return [
+        Action(
+            settings,
+            rows,
+            f"{name}_{axis}",
+            (_value(settings, value, "value"),),
+            interval,
+            on_conditions,
+            fix,
+        )
+        for axis, value, fix in zip("XYZ", _three(settings, "value"), fixed, strict=True)
+        if value is not None
+    ]
+
+
+def scalar_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
+    """Return the action of assign_scalar_variable_process (to nodes or conditions)."""
+    settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
+    name = _variable(settings, KNOWN_SCALARS, "scalar")
+    rows = _rows(settings, context, on_conditions)
+    value = _value(settings, settings.get("value", 0.0), "value")
+    fix = not on_conditions and settings.flag("constrained", True)
+    return [Action(settings, rows, name, (value,), interval_of(settings), on_conditions, fix)]
+
+
+def vector_by_direction(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
+    """Return the actions of assign_vector_by_direction_process: modulus × direction.
+
+    A direction of numbers is brought to length 1; one with expressions is taken as it is.
+    """
+    settings.check_keys(
+        [*COMMON, "modulus", "direction", *(["entities"] if on_conditions else ["constrained"])]
+    )
+    name = _variable(settings, KNOWN_VECTORS, "vector")
+    if settings.get("direction") in NORMALS:
+        raise settings.error("direction", "automatic normals are not supported; give three numbers")
+    direction = [_value(settings, d, "direction") for d in _three(settings, "direction")]
+    if not any(isinstance(d, str) for d in direction):
+        length = hypot(*map(float, direction))
+        if length < 1e-12:
+            raise settings.error("direction", "direction is zero; give a vector of any other length")
+        direction = [float(d) / length for d in direction]
+    modulus = _value(settings, settings.get("modulus"), "modulus")
+    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
+    fix = not on_conditions and settings.flag("constrained", True)
+    return [
+        Action(settings, rows, f"{name}_{axis}", (d, modulus), interval, on_conditions, fix)
+        for axis, d in zip("XYZ", direction, strict=True)
+    ]
+
+
+def fix_vector(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
+    """Return the actions of fix_vector_variable_process: hold the values that are there."""
+    settings.check_keys([*COMMON, "constrained"])
+    name = _variable(settings, KNOWN_VECTORS, "vector")
+    rows, interval = _rows(settings, context, False), interval_of(settings)
+    return [
+        Action(settings, rows, f"{name}_{axis}", (), interval, fixed=True)
+        for axis, fix in zip("XYZ", _constrained(settings), strict=True)
+        if fix
+    ]
+
+
+def fix_scalar(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
+    """Return the action of fix_scalar_variable_process: hold the value that is there."""
+    settings.check_keys([*COMMON, "constrained"])
+    name = _variable(settings, KNOWN_SCALARS, "scalar")
+    rows, interval = _rows(settings, context, False), interval_of(settings)
+    return (
+        [Action(settings, rows, name, (), interval, fixed=True)] if settings.flag("constrained", True) else []
+    )
+
+
+PROCESSES: dict[str, tuple[Callable[[Settings, RunContext, bool], list[Action]], bool]] = {
+    "assign_vector_variable_process": (vector_variable, False),
+    "assign_scalar_variable_process": (scalar_variable, False),
+    "assign_vector_by_direction_process": (vector_by_direction, False),
+    "fix_vector_variable_process": (fix_vector, False),
+    "fix_scalar_variable_process": (fix_scalar, False),
+    "assign_vector_variable_to_conditions_process": (vector_variable, True),
+    "assign_scalar_variable_to_conditions_process": (scalar_variable, True),
+    "assign_vector_by_direction_to_condition_process": (vector_by_direction, True),
+}
+"""Processes that set or fix values, by Kratos' module name; True: they act on conditions."""
+
+
+def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action]:
+    """Return what a process of the table `PROCESSES` does."""
+    make, on_conditions = PROCESSES[module]
+    settings = entry.section("Parameters", required=True)
+    if settings.section("local_axes").values:
+        raise settings.error("local_axes", "local_axes are not supported; give the values along x, y, z")
+    return make(settings, context, on_conditions)
+
+
+def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
+    """Bring the values and supports to what they are at the last step; return notes."""
+    times = context.times
+    steps = [action.active(times) for action in actions]
+    set_values(actions, steps, times, values)
+    _hold(actions, steps, len(times) - 1, values)
+    return notes_of(actions, steps, context)
+
+
+def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], context: RunContext) -> list[str]:
+    """Return notes on actions that never act, and on those that Kratos evaluates on a moved mesh."""
+    times, notes = context.times, []
+    for action, active in zip(actions, steps, strict=True):
+        where = action.settings.path.removesuffix(".Parameters")
+        if not active or not len(action.rows):
+            why = "its interval holds no step" if not active else "its part has none to act on"
+            notes.append(f"{where}: {action.component} is never set: {why}")
+        elif context.moved and active[-1] > 1 and action.depends_on_place():
+            # Before the first step nothing has moved yet.
+            cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
+            notes.append(
+                f"{where}: Kratos evaluates x, y, z at time {times[active[-1]]:g} s on the mesh as the steps "
+                f"before moved it, kratos_lite on the undeformed one; {cure} to mean the same"
+            )
+        if action.on_conditions and action.mentions("XYZ"):
+            notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
+    return list(dict.fromkeys(notes))
+
+
+def places_of(mesh: Mesh) -> tuple[Array, Array]:
+    """Return where values are evaluated: nodes (n, 3) and centers of conditions (c, 3)."""
+    centers = [mesh.points[block.nodes].mean(axis=1) for block in mesh.conditions]
+    return mesh.points, np.concatenate([np.zeros((0, 3)), *centers])
+
+
+def set_values(
+    actions: Sequence[Action], steps: Sequence[list[int]], times: Sequence[float], values: Variables
+) -> None:
+    """Set what actions set, each at its last active step."""
+    places = places_of(values.mesh)
+    order = sorted((active[-1], i) for i, active in enumerate(steps) if active and actions[i].factors)
+    for k, i in order:
+        actions[i].put(values, places, times[k])
+
+
+def _hold(actions: Sequence[Action], steps: Sequence[list[int]], last: int, values: Variables) -> None:
+    """Fix what is fixed in the last step; a support of an earlier step is taken back after it."""
+    supports = [(a, active) for a, active in zip(actions, steps, strict=True) if a.fixed and active]
+    for action, active in supports:
+        if active[0] < last:
+            values.fix(action.component, action.rows, False)
+    for action, active in supports:
+        # What is fixed at the start, before the first step, stays so through that step.
+        if active[-1] == last or (active == [0] and last == 1):
+            _check_history(action, active, last)
+            values.fix(action.component, action.rows)
+
+
+def _check_history(action: Action, active: list[int], last: int) -> None:
+    """Refuse a support whose value is the solution of an earlier step."""
+    if not action.factors and len(active) < last and action.component.startswith("DISPLACEMENT"):
+        raise action.settings.error(
+            "interval",
+            f"{action.component} is held only from a later step, at the value solved before; "
+            'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value',
+        )

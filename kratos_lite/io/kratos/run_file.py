@@ -1,0 +1,194 @@
+"""Kratos run files: ``ProjectParameters.json`` with its materials file and its mesh.
+
+Linear solids at rest or in time, in the style of 2019 and in the present one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kratos_lite.errors import Problems, nearest
+from kratos_lite.io.document import Document
+from kratos_lite.io.documents import read_document
+from kratos_lite.io.kratos.context import RunContext, module_of, times_of
+from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
+from kratos_lite.io.kratos.materials import materials_of
+from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
+from kratos_lite.io.kratos.time_dependent import ProcessesInTime
+from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
+from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
+from kratos_lite.io.kratos.variables import Variables
+from kratos_lite.io.project.ale import add_motion
+from kratos_lite.io.project.settings import Settings, find_file, read_settings
+from kratos_lite.io.scene import Scene
+from kratos_lite.materials import LinearMaterial
+
+ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
+HARMLESS = frozenset(
+    "solver_type model_part_name domain_size echo_level buffer_size analysis_type model_import_settings "
+    "material_import_settings time_stepping rotation_dofs reform_dofs_at_each_step compute_reactions "
+    "use_old_stiffness_in_first_iteration solving_strategy_settings builder_and_solver_settings "
+    "clear_storage move_mesh_flag multi_point_constraints_used convergence_criterion max_iteration "
+    "displacement_relative_tolerance displacement_absolute_tolerance residual_relative_tolerance "
+    "residual_absolute_tolerance linear_solver_settings line_search block_builder "
+    "problem_domain_sub_model_part_list processes_sub_model_part_list "
+    "auxiliary_variables_list auxiliary_dofs_list auxiliary_reaction_list".split()
+)
+"""Solver settings that are used here, or that cannot change a static linear solution."""
+OTHER_PHYSICS = (
+    "displacement_control", "volumetric_strain_dofs", "strain_dofs", "pressure_dofs",
+    "use_orthogonal_subscales", "contact_settings", "mpc_contact_settings", "computing_sub_model_part_name",
+)  # fmt: skip
+"""Solver settings that, unless false or empty, ask for equations that kratos_lite does not have."""
+OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
+
+
+def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Scene:
+    """Return what a Kratos run file says.
+
+    Parameters
+    ----------
+    settings : the run file.
+    folder : its folder.
+    allow_outside : let it name files outside the folder.
+
+    Raises
+    ------
+    InputError, ModelError
+        With the place of what is wrong, or of what is not a linear solid.
+    """
+    solver = settings.section("solver_settings", required=True)
+    times = times_of(settings.section("problem_data", required=True), solver)
+    dynamic = solver.text("solver_type") in DYNAMIC
+    notes = _check_solver(solver) + _check_root(settings)
+    if not dynamic:
+        notes.append(
+            f"{len(times) - 1} time step(s): supports, loads, motion are those at t = {times[-1]:g} s"
+        )
+    document = _read_mesh(solver, folder, allow_outside, notes)
+    root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
+    context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
+    materials = _read_materials(solver, context, document, notes)
+    actions, checks = _read_processes(settings, context, notes)
+    in_time = ProcessesInTime(actions, context) if dynamic else None
+
+    def process(values: Variables) -> None:
+        if in_time is None:
+            notes.extend(run(actions, context, values))
+        else:
+            in_time.prepare(values)
+
+    model = model_from(document, materials=materials is None, processes=process)
+    for number, material in (materials or {}).items():
+        model.assign(material, number)
+    add_motion(model, settings, None if dynamic else times[-1])
+    model.notes += notes
+    if in_time is None:
+        return Scene(model, checks=checks)
+    model.notes = [note for note in model.notes if STATIC_ONLY not in note]
+    in_time.finish(model)
+    return Scene(model, checks=checks, march=march_in_kratos(settings, in_time))
+
+
+def _check_root(settings: Settings) -> list[str]:
+    for key in ("modelers", "stages", "orchestrator", "restart_load_file_label"):
+        if settings.values.get(key):
+            raise settings.error(key, f"{key!r} is not supported; name the mesh in model_import_settings")
+    unknown = settings.unknown(ROOT_KEYS)
+    for key in unknown:
+        if key.endswith("_process_list"):
+            raise settings.error(key, f"{key!r} belongs into the object 'processes'; Kratos ignores it here")
+    return [f"key {key!r} is not used" for key in unknown if not key.startswith("_")]
+
+
+def _check_solver(solver: Settings) -> list[str]:
+    """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
+    kind = solver.text("solver_type")
+    if kind not in ("Static", "static", *DYNAMIC):
+        raise solver.error(
+            "solver_type",
+            f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', "
+            "then --modes for frequencies",
+        )
+    if solver.integer("domain_size") != 3:
+        raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
+    analysis = solver.text("analysis_type", "non_linear")
+    if analysis not in ("linear", "non_linear"):
+        raise solver.error(
+            "analysis_type", f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+        )
+    for key in OTHER_PHYSICS:
+        if solver.values.get(key):
+            raise solver.error(
+                key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
+            )
+    known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
+    notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
+    if analysis == "non_linear":
+        notes.append(
+            "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"
+        )
+    chosen = solver.section("linear_solver_settings").text("solver_type", "")
+    if chosen:
+        notes.append(f"linear solver {chosen}: kratos_lite chooses its own")
+    return notes
+
+
+def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) -> Document:
+    source = solver.section("model_import_settings", required=True)
+    kind = source.text("input_type", "mdpa")
+    if kind != "mdpa":
+        raise source.error("input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
+    path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+    document = read_document(path)
+    check_elements(document)
+    notes += [note] if note else []
+    if not solver.flag("multi_point_constraints_used", True) and document.constraints:
+        notes.append(
+            f"multi_point_constraints_used is false: {len(document.constraints)} constraints left out"
+        )
+        document.constraints = []
+    return document
+
+
+def _read_materials(
+    solver: Settings, context: RunContext, document: Document, notes: list[str]
+) -> dict[int, LinearMaterial] | None:
+    """Return the materials of the materials file, or None if there is none."""
+    source = solver.section("material_import_settings")
+    if not source.text("materials_filename", ""):
+        return None
+    path, note = find_file(source, "materials_filename", context.folder, outside=context.outside)
+    notes += [note] if note else []
+    return materials_of(read_settings(path), context, document, notes)
+
+
+def _read_processes(
+    settings: Settings, context: RunContext, notes: list[str]
+) -> tuple[list[Action], list[Comparison]]:
+    """Return what the processes do and check; all that are unknown are reported together."""
+    actions: list[Action] = []
+    checks: list[Comparison] = []
+    problems = Problems(settings.source)
+    for section in (settings.section("processes"), settings.section("output_processes")):
+        # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
+        for key in sorted(section.values):
+            for entry in section.sections(key):
+                module = module_of(entry)
+                if module in PROCESSES:
+                    actions += actions_of(entry, module, context)
+                elif module in COMPARISONS:
+                    checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
+                elif module.endswith("_output_process") or module in OUTPUTS:
+                    notes.append(
+                        f"{entry.path}: {module} is not run; ask kratos_lite for files with --output"
+                    )
+                else:
+                    place = entry.values.places.get("python_module") or entry.values.places["name"]
+                    known = [*PROCESSES, *COMPARISONS]
+                    problems.add(
+                        f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}",
+                        *place,
+                    )
+    problems.raise_if_any()
+    return actions, checks

@@ -1,0 +1,210 @@
+"""Processes of a Kratos run file in time: what they hold, set and load while a model moves.
+
+Kratos runs all processes before every time step, in order; values stay until they are set again.  It starts
+with the acceleration 0, as if nothing acted at the start: so loads act here from the first step on.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.errors import InputError
+from kratos_lite.io.kratos.context import RunContext
+from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
+from kratos_lite.io.kratos.variables import LOADING, Variables
+from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.typing import Array
+
+GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
+SURFACE = frozenset(name for name in LOADING - GRAVITY if not name.startswith("DISPLACEMENT"))
+HELD = ("VELOCITY", "ACCELERATION")
+"""Variables that cannot be prescribed here."""
+
+
+class ProcessesInTime:
+    """The processes of a run file as supports, loads and start of a march.
+
+    Parameters
+    ----------
+    actions : what the processes do.
+    context : mesh and times.
+
+    Attributes
+    ----------
+    displacement, velocity : (n, 3) at the start, or None at rest; known after `prepare`.
+    """
+
+    def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
+        self.context = context
+        self.steps = [action.active(context.times) for action in actions]
+        self.notes = notes_of(actions, self.steps, context)
+        self.actions = [a for a, steps in zip(actions, self.steps, strict=True) if steps and len(a.rows)]
+        self.steps = [a.active(context.times) for a in self.actions]
+        self.displacement: Array | None = None
+        self.velocity: Array | None = None
+        self._later: list[Load] = []
+        self._moving: list[tuple[NDArray[np.int64], str, Callable[[float], float]]] = []
+
+    def prepare(self, values: Variables) -> None:
+        """Bring values and supports to what stays in time, and keep what changes for `finish`.
+
+        Raises
+        ------
+        InputError
+            A support begins or ends within the run, or velocities or accelerations are prescribed.
+        """
+        self._check(values)
+        self._begin(values)
+        base, times = values.copy(), self.context.times
+        set_values(self.actions, self.steps, times, values)
+        for action in self.actions:
+            if action.fixed:
+                values.fix(action.component, action.rows)
+        for i, action in enumerate(self.actions):
+            if action.component.startswith("DISPLACEMENT") and action.factors:
+                self._move(i, action, values)
+        for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
+            mine = [i for i, action in enumerate(self.actions) if action.component in group]
+            if all(self._is_steady(i) for i in mine):
+                continue
+            values.note_idle(self.notes, group)
+            values.drop(group)
+            self._later.append(Timed(_LoadInTime(self, mine, base.only(group), load_of)))
+        values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
+
+    def finish(self, model: Model) -> None:
+        """Give a model the loads and supports that change, and let all loads begin with the first step."""
+        loads: list[Load] = [Varying(load, _begun) for load in model.loads]
+        model.loads[:] = [*loads, *self._later]
+        for rows, axis, course in self._moving:
+            model.fix(rows, axis, course, override=True)
+        if model.loads:
+            model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
+        if self._moving:
+            model.notes.append(
+                "supports that move have the velocity of their function; Kratos takes Newmark's formulas"
+            )
+        model.notes += self.notes
+
+    def at(self, i: int, time: float) -> float | None:
+        """Return the last time, up to the one given, at which an action acts; None if there is none."""
+        action, times = self.actions[i], self.context.times
+        if float(time) in action.interval:
+            return float(time)
+        step = bisect_right(times, time) - 1
+        count = bisect_right(self.steps[i], step)
+        return times[self.steps[i][count - 1]] if count else None
+
+    # ---- supports and start ----------------------------------------------------------------------------
+
+    def _check(self, values: Variables) -> None:
+        for i, action in enumerate(self.actions):
+            if action.fixed and action.component.startswith(HELD):
+                raise action.settings.error(
+                    "variable_name",
+                    f"{action.component} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
+                    '"constrained": false and "interval": [0.0, 0.0] for an initial value',
+                )
+            if action.fixed and action.component.startswith("DISPLACEMENT") and not self._acts_always(i):
+                raise action.settings.error(
+                    "interval",
+                    f"{action.component} is held in a part of the run only; hold it from start to end, "
+                    '"interval": [0.0, "End"], or give "constrained": false for an initial value',
+                )
+        for name, fixed in values.fixed.items():
+            if name.startswith(HELD) and fixed.any():
+                raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
+
+    def _begin(self, values: Variables) -> None:
+        """Find displacement and velocity at the start."""
+        start, points = values.copy(), values.mesh.points
+        for action, steps in zip(self.actions, self.steps, strict=True):
+            if steps[0] == 0 and action.factors:
+                value = action.value(points[action.rows], self.context.times[0])
+                start.set_nodes(action.component, action.rows, value)
+                if action.component.startswith("ACCELERATION") and np.any(value):
+                    raise action.settings.error(
+                        "variable_name",
+                        f"{action.component} cannot be given; the acceleration at the start is 0",
+                    )
+            if action.fixed and action.component.startswith("DISPLACEMENT"):
+                start.fix(action.component, action.rows)
+        u, v = start.vector("DISPLACEMENT"), start.vector("VELOCITY")
+        held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
+        if v[np.transpose(held)].any():
+            self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
+        self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
+
+    def _move(self, i: int, action: Action, values: Variables) -> None:
+        """Keep the movement of the supports that an action gives; refuse one of a part of the run."""
+        fixed = values.fixed.get(action.component, np.zeros(values.mesh.n_nodes, dtype=bool))
+        rows = action.rows[fixed[action.rows]]
+        if not len(rows) or self._acts(i) == 0:
+            return
+        if not self._acts_always(i):
+            raise action.settings.error(
+                "interval",
+                f"{action.component} of a support changes in a part of the run only; give it as one function "
+                'of t with the interval [0.0, "End"]',
+            )
+        for k, later in enumerate(self.actions[i + 1 :], start=i + 1):
+            if later.component == action.component and later.factors and self._acts_always(k):
+                rows = np.setdiff1d(rows, later.rows)
+        if not action.depends_on_time() or not len(rows):
+            return
+        if action.mentions("xyzXYZ"):
+            raise action.settings.error(
+                "value",
+                f"{action.component}: a support may move with x, y, z or with t, not with both; give each "
+                "part a process of its own",
+            )
+        point = np.zeros((1, 3))
+        self._moving.append((rows, action.component[-1].lower(), lambda t: float(action.value(point, t))))
+
+    def _acts(self, i: int) -> int:
+        """Return the number of steps, without the start, in which an action acts."""
+        return len(self.steps[i]) - (self.steps[i][0] == 0)
+
+    def _acts_always(self, i: int) -> bool:
+        return self._acts(i) == len(self.context.times) - 1
+
+    def _is_steady(self, i: int) -> bool:
+        """Whether an action does the same in all steps."""
+        return not self.actions[i].depends_on_time() and self._acts_always(i)
+
+
+def _begun(time: float) -> float:
+    return float(time > 0)
+
+
+class _LoadInTime:
+    """The load of some actions as a function of the time; the same object while nothing changes."""
+
+    def __init__(
+        self,
+        processes: ProcessesInTime,
+        mine: list[int],
+        base: Variables,
+        load_of: Callable[[Variables], Load | None],
+    ) -> None:
+        self.processes, self.mine, self.base, self.load_of = processes, mine, base, load_of
+        self.last: tuple[object, Load | None] = (None, None)
+
+    def __call__(self, time: float) -> Load | None:
+        if not time > 0:
+            return None
+        p = self.processes
+        found = sorted((when, i) for i in self.mine if (when := p.at(i, time)) is not None)
+        key = [(i, when if p.actions[i].depends_on_time() else None) for when, i in found]
+        if key != self.last[0]:
+            values = self.base.copy()
+            points = places_of(values.mesh)
+            for when, i in found:
+                p.actions[i].put(values, points, when)
+            self.last = (key, self.load_of(values))
+        return self.last[1]

@@ -1,0 +1,70 @@
+"""How a Kratos run file marches: its scheme, damping, steps and start."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.kratos.context import times_of
+from kratos_lite.io.kratos.time_dependent import ProcessesInTime
+from kratos_lite.io.project.settings import Settings
+from kratos_lite.io.scene import March
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.schemes import Implicit
+
+DYNAMIC = ("Dynamic", "dynamic")
+"""Kratos' solver_type of what moves."""
+DYNAMIC_KEYS = (
+    "time_integration_method", "scheme_type", "damp_factor_m", "newmark_beta",
+    "rayleigh_alpha", "rayleigh_beta",
+)  # fmt: skip
+
+
+def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
+    """Return the march of a dynamic run file of Kratos; InputError with the place of what is wrong."""
+    solver, problem = settings.section("solver_settings"), settings.section("problem_data")
+    times = times_of(problem, solver)
+    if times[0] != 0:
+        raise problem.error(
+            "start_time", f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
+        )
+    rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
+    for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
+        if value < 0:
+            raise solver.error(key, f"{key} must be ≥ 0; got {value:g}")
+    return March(
+        solver.section("time_stepping").number("time_step"),
+        len(times) - 1,
+        scheme=_scheme(solver),
+        rayleigh=(rayleigh[0], rayleigh[1]),
+        displacement=processes.displacement,
+        velocity=processes.velocity,
+        balanced=False,
+    )
+
+
+def _scheme(solver: Settings) -> Implicit:
+    """Return the scheme that Kratos would take."""
+    from kratos_lite.analysis import bossak, newmark
+
+    method = solver.text("time_integration_method", "implicit")
+    if method != "implicit":
+        raise solver.error(
+            "time_integration_method",
+            f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
+            "the option --scheme central_difference then marches explicitly",
+        )
+    kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
+    if beta != 0.25:
+        raise solver.error("newmark_beta", f"newmark_beta must be 0.25, which is stable; got {beta:g}")
+    try:
+        if kind == "newmark":
+            return newmark()
+        if kind == "bossak":
+            return bossak(solver.number("damp_factor_m", -0.3))
+    except InputError as error:
+        raise solver.error("damp_factor_m", f"{solver.name('damp_factor_m')}: {error}") from None
+    raise solver.error(
+        "scheme_type", f"scheme_type {kind!r} is not supported; take 'newmark' or 'bossak' (Kratos' default)"
+    )

@@ -1,0 +1,160 @@
+"""Results to files: `.vtu` for ParaView, `.vtk`, `.json` and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import voigt
+from kratos_lite.errors import InputError, SolveError
+from kratos_lite.io.output import write_whole
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.result import Result
+    from kratos_lite.mesh import Mesh
+
+Array = NDArray[Any]
+RESULT_ENDINGS = (".vtu", ".vtk", ".json")
+"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
+NAMES = {"VON_MISES_STRESS": "von Mises stress"}
+"""Titles of pictures where the words of the variable do not do."""
+
+
+def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return the point and cell data that every file carries: ids of nodes, elements and properties."""
+    none = np.zeros(0, dtype=np.int64)
+    properties = np.concatenate([none, *(block.properties for block in mesh.blocks)])
+    return {"NODE_ID": mesh.node_ids}, {"ELEMENT_ID": mesh.element_ids, "PROPERTIES_ID": properties}
+
+
+def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return point data and cell data of a result under their Kratos names."""
+    points, cells = mesh_fields(result.mesh)
+    nodal, mean = result.stress_at_nodes_and_elements()
+    points = {
+        "DISPLACEMENT": result.displacement(),
+        "REACTION": result.reaction(),
+        "CAUCHY_STRESS_VECTOR": nodal,
+        "VON_MISES_STRESS": voigt.von_mises(nodal),
+        **points,
+    }
+    return points, {"CAUCHY_STRESS_VECTOR": mean, "VON_MISES_STRESS": voigt.von_mises(mean), **cells}
+
+
+def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
+    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk or .json."""
+    check_result_ending(path, mode)
+    ending = Path(path).suffix.lower()
+    if ending == ".json":
+        write_json(path, result)
+        return
+    points, cells = fields(result)
+    if ending == ".vtu":
+        from kratos_lite.io.formats.vtu import write_vtu
+
+        write_vtu(path, result.mesh, points, cells, mode or "binary")
+    else:
+        from kratos_lite.io.formats.meshio import write_meshio
+
+        write_meshio(path, result.mesh, points, cells)
+
+
+def check_result_ending(path: str | Path, mode: str | None = None) -> None:
+    """Raise InputError, before any work, for a format that cannot hold a result or has no such mode."""
+    ending = Path(path).suffix.lower()
+    if not ending:
+        raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
+    if ending not in RESULT_ENDINGS:
+        raise InputError(
+            f"{path}: results cannot be written as {ending!r}; {' '.join(RESULT_ENDINGS)} hold all fields"
+        )
+    if mode is not None:
+        from kratos_lite.io.formats.vtu import check_mode
+
+        check_mode(mode)
+        if ending != ".vtu":
+            raise InputError(
+                f"{path}: only .vtu files are written as {mode}; leave the mode out, or write .vtu"
+            )
+
+
+def check_picture(path: str | Path) -> None:
+    """Raise KratosLiteError, before any work is done, if a picture of this name cannot be made."""
+    from kratos_lite.view import check_picture_target
+
+    check_picture_target(Path(path))
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Return the numbers of the table, for programs."""
+    report, mesh = result.report, result.mesh
+    length = np.linalg.norm(result.u, axis=1)
+    top = int(length.argmax())
+    energy, mises, row = result.totals()
+    return {
+        "nodes": mesh.n_nodes,
+        "elements": {block.name: len(block) for block in mesh.blocks if len(block)},
+        "unknowns": report.unknowns,
+        "total_load": report.total_load.tolist(),
+        "total_reaction": report.total_reaction.tolist(),
+        "largest_displacement": {"value": float(length[top]), "node": int(mesh.node_ids[top])},
+        "strain_energy": energy,
+        "largest_von_mises_stress": {"value": mises, "element": int(mesh.element_ids[row])},
+        "solver": report.solver,
+        "reason": report.reason,
+        "iterations": report.iterations,
+        "backward_error": report.backward_error,
+        "force_error": report.force_error,
+        "moment_error": report.moment_error,
+        "seconds": report.seconds,
+        "peak_memory": report.peak_memory,
+        "kernels": report.kernels,
+        **({"motion": report.motion} if report.motion else {}),
+        "skipped": report.skipped,
+        "warnings": report.warnings,
+        "notes": report.notes,
+    }
+
+
+def write_json(path: str | Path, result: Result) -> None:
+    """Write the table, and displacements and reactions (m, N) by node id."""
+    import json
+
+    from kratos_lite import __version__
+
+    ids = list(map(str, result.mesh.node_ids.tolist()))
+    held = np.flatnonzero((result.reactions != 0).any(axis=1))
+    content = {
+        "kratos_lite": __version__,
+        "units": "SI",
+        **summary(result),
+        "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
+        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
+    }
+    try:
+        text = json.dumps(content, ensure_ascii=False, allow_nan=False)
+    except ValueError:
+        raise SolveError(
+            f"{path}: not written: some results exceed the numbers that a computer holds (1.8e308); "
+            "look for loads, supports or constants in wrong units"
+        ) from None
+    write_whole(path, text.encode())
+
+
+def plot_result(path: str | Path, result: Result, values: str = "VON_MISES_STRESS") -> None:
+    """Write a picture of the deformed body colored by a nodal field of `fields`."""
+    from kratos_lite.view import picture
+
+    points, _ = fields(result)
+    if values not in points:
+        raise InputError(f"there is no nodal field {values!r}; have {', '.join(points)}")
+    field = points[values]
+    if values == "CAUCHY_STRESS_VECTOR":
+        field, values = voigt.von_mises(field), "VON_MISES_STRESS"
+    elif field.ndim == 2:
+        field = np.linalg.norm(field, axis=1)
+    title = NAMES.get(values, values.replace("_", " ").lower())
+    picture(path, result.mesh, result.u, field, title=title)

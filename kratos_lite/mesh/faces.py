@@ -1,0 +1,152 @@
+"""Connections: sets of nodes that occur more than once, such as shared faces, and what hangs together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
+from kratos_lite.native import kernels
+from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.typing import Ints
+
+Sets: TypeAlias = "tuple[NDArray[Any], Sequence[Sequence[int]]]"
+"""Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
+
+
+def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
+    """Return pairs of sets of nodes that are equal in whatever order, as two arrays of set numbers.
+
+    Sets count through the groups, then the tuples of columns, then the cells.  Each set is paired
+    with the next one that is equal.
+
+    >>> one, other = equal_sets([(np.array([[0, 1, 2], [5, 2, 1]]), [(0, 1), (1, 2)])])
+    >>> one.tolist(), other.tolist()
+    ([2], [3])
+    """
+    compiled = kernels("mesh")
+    if compiled is None:
+        return _equal_keys(set_keys(groups))
+    nodes = [np.ascontiguousarray(cells, dtype=np.int32) for cells, _ in groups]
+    one, other = compiled.equal_sets(nodes, [_table(columns) for _, columns in groups])
+    return one, other
+
+
+def _table(columns: Sequence[Sequence[int]]) -> NDArray[np.int32]:
+    """Return tuples of columns as rows, filled up with -1."""
+    table = np.full((len(columns), max(map(len, columns), default=0)), -1, dtype=np.int32)
+    for row, picked in zip(table, columns, strict=True):
+        row[: len(picked)] = picked
+    return table
+
+
+def set_keys(groups: Sequence[Sets]) -> NDArray[np.uint64]:
+    """Return a number for each set: the sum of random numbers of its nodes, equal for equal sets."""
+    highest = max((int(cells.max(initial=-1)) for cells, _ in groups), default=-1)
+    key = np.random.default_rng(1).integers(0, 2**64, highest + 1, dtype=np.uint64)
+    sums = [key[cells[:, list(picked)]].sum(axis=1) for cells, columns in groups for picked in columns]
+    return np.concatenate([np.zeros(0, np.uint64), *sums])
+
+
+def _equal_keys(keys: NDArray[np.uint64]) -> tuple[Ints, Ints]:
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    one, other = order[same], order[same + 1]
+    in_order = np.argsort(one)
+    return one[in_order], other[in_order]
+
+
+def components(n: int, pairs: Ints) -> Ints:
+    """Return the smallest member of the connected part of each of n members; pairs (p, 2) connect them.
+
+    >>> components(5, np.array([[3, 1], [4, 3]])).tolist()
+    [0, 1, 2, 1, 1]
+    """
+    compiled = kernels("mesh")
+    if compiled is not None:
+        return np.asarray(compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64)))
+    labels = np.arange(n)
+    while True:
+        before = labels.copy()
+        smallest = labels[pairs].min(axis=1)
+        np.minimum.at(labels, pairs.ravel(), np.repeat(smallest, 2))
+        # what a root has learnt reaches all that point to it
+        np.minimum.at(labels, before, labels.copy())
+        labels = labels[labels]
+        if (labels == before).all():
+            return labels
+
+
+class Faces:
+    """All faces of all elements, and which of them coincide.
+
+    Faces count through the blocks, then the faces of the cell, then the cells.
+
+    Parameters
+    ----------
+    blocks : blocks of elements; one without a shape has no faces.
+
+    Attributes
+    ----------
+    one, other : pairs of faces that have the same corners.
+    """
+
+    def __init__(self, blocks: Sequence[Block]) -> None:
+        self.blocks = list(blocks)
+        self.one, self.other = equal_sets([(b.nodes, [corners(f) for f in faces_of(b)]) for b in blocks])
+
+    @cached_property
+    def element(self) -> Ints:
+        """Row of the element of each face."""
+        rows = [np.tile(np.arange(at.start, at.stop), len(faces_of(b))) for b, at in with_rows(self.blocks)]
+        return np.concatenate([NO_ROWS, *rows])
+
+    def gaping(self) -> tuple[Ints, Ints]:
+        """Return the pairs that have the same corners but not the same nodes."""
+        if all(len(face) == len(corners(face)) for block in self.blocks for face in faces_of(block)):
+            return NO_ROWS, NO_ROWS
+        keys = set_keys([(block.nodes, faces_of(block)) for block in self.blocks])
+        open_ = keys[self.one] != keys[self.other]
+        return self.one[open_], self.other[open_]
+
+    @cached_property
+    def boundary(self) -> list[Block]:
+        """Faces that belong to one element only, outward, one block per face shape.
+
+        ``ids`` holds the row of the parent element.
+        """
+        alone = np.ones(sum(len(block) * len(faces_of(block)) for block in self.blocks), dtype=bool)
+        alone[self.one] = alone[self.other] = False
+        by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
+        start = 0
+        for block, at in with_rows(self.blocks):
+            for face in faces_of(block):
+                cells = np.flatnonzero(alone[start : start + len(block)])
+                start += len(block)
+                chosen = block.nodes[cells][:, list(face)]
+                by_size.setdefault(len(face), []).append((chosen, at.start + cells))
+        faces = []
+        for size, groups in by_size.items():
+            nodes, parents = np.vstack([f for f, _ in groups]), np.concatenate([p for _, p in groups])
+            shape = FACE_SHAPES[size]
+            if len(parents):
+                faces.append(Block(shape.__name__, nodes, parents, 0 * parents, shape))
+        return faces
+
+
+def faces_of(block: Block) -> tuple[tuple[int, ...], ...]:
+    """Return the faces of the cells of a block as columns of its nodes."""
+    return () if block.shape is None else block.shape.faces
+
+
+def corners(face: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the corners of a face: the first three of a triangle, the first four of a quadrilateral.
+
+    >>> corners((0, 2, 1, 6, 5, 4))
+    (0, 2, 1)
+    """
+    return face[: 3 if len(face) in (3, 6) else 4]

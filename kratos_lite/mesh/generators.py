@@ -1,0 +1,194 @@
+"""Meshes of simple bodies: a box and a hollow cylinder, of any element of the library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Block, Mesh, Part
+from kratos_lite.shapes import Hexahedron8, Shape
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import finite
+
+
+def _kuhn() -> list[list[int]]:
+    """Return the six tetrahedra of a cube, one per order of the axes along its diagonal."""
+    number = {tuple(c): i for i, c in enumerate((Hexahedron8.nodes > 0).astype(int).tolist())}
+    cells = []
+    for order in permutations(range(3)):
+        corner, path = [0, 0, 0], [0]
+        for axis in order:
+            corner[axis] = 1
+            path.append(number[tuple(corner)])
+        odd = sum(a > b for i, a in enumerate(order) for b in order[i + 1 :]) % 2
+        cells.append([path[0], path[2], path[1], path[3]] if odd else path)
+    return cells
+
+
+SPLITS: dict[str, list[list[int]]] = {
+    "hexahedron": [list(range(8))],
+    "wedge": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
+    "tetrahedron": _kuhn(),
+    "pyramid": [[*reversed(face), 8] for face in Hexahedron8.faces],
+}
+"""Cells of one brick by family; corner 8 is the center of the brick."""
+
+
+def _grid(cells: tuple[int, int, int], with_centers: bool) -> tuple[Array, Ints]:
+    """Return points of the unit cube and bricks (m, 8 or 9)."""
+    axes = [np.arange(n + 1) / n for n in cells]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape([n + 1 for n in cells])
+    ends = [(slice(0, -1), slice(1, None))[i] for i in (0, 1)]
+    corners = [number[ends[i], ends[j], ends[k]].ravel() for i, j, k in (Hexahedron8.nodes > 0).astype(int)]
+    bricks = np.stack(corners, axis=1)
+    if with_centers:
+        centers = np.arange(len(bricks)) + len(points)
+        points = np.vstack([points, points[bricks].mean(axis=1)])
+        bricks = np.column_stack([bricks, centers])
+    return points, bricks
+
+
+def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
+    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
+
+    Parameters
+    ----------
+    points : (n, 3) float.
+    corners : (m, c) int, corner nodes of each cell in Kratos order.
+    shape : the shape wanted.
+
+    Returns
+    -------
+    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
+    """
+    parents = _parents(shape)
+    if not parents:
+        return points, corners
+    nodes = [corners]
+    for size in sorted({len(p) for p in parents}):
+        group = [p for p in parents if len(p) == size]
+        keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)
+        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
+        nodes.append(len(points) + inverse.reshape(len(corners), len(group)))
+        points = np.vstack([points, points[unique].mean(axis=1)])
+    return points, np.hstack(nodes)
+
+
+def _parents(shape: type[Shape]) -> list[tuple[int, ...]]:
+    """Return the corners whose middle each further node is: edges, then faces, then the cell."""
+    corner = shape.nodes[: shape.corners]
+    groups = [*shape.edges, *(f[: 4 if len(f) > 6 else 3] for f in shape.faces), tuple(range(shape.corners))]
+    middles = [corner[list(g)].mean(axis=0) for g in groups]
+    found = []
+    for node in shape.nodes[shape.corners :]:
+        distance = [np.abs(node - middle).max() for middle in middles]
+        found.append(tuple(groups[int(np.argmin(distance))]))
+    return found
+
+
+def _cells(cells: Sequence[int]) -> tuple[int, int, int]:
+    counts = finite(cells, "cells")
+    if counts.shape != (3,) or (counts < 1).any() or (counts != counts.round()).any():
+        raise InputError(f"cells must be three whole numbers ≥ 1; got {cells}")
+    i, j, k = counts.astype(int).tolist()
+    return i, j, k
+
+
+def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, type[Shape]]:
+    if not isinstance(element, str):
+        raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
+    kind = ELEMENTS[element]
+    shape = kind.shape
+    if shape.cell not in SPLITS:
+        raise InputError(f"{element} has cell {shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
+    points, bricks = _grid(_cells(cells), shape.cell == "pyramid")
+    split = np.array(SPLITS[shape.cell])
+    corners = bricks[:, split].reshape(-1, split.shape[1])
+    points, nodes = raise_order(points, corners, shape)
+    return points, nodes, kind.__name__, shape
+
+
+def _mesh(points: Array, nodes: Ints, name: str, shape: type[Shape], parts: dict[str, Part]) -> Mesh:
+    m = len(nodes)
+    block = Block(name, nodes.astype(np.int32), np.arange(1, m + 1), np.ones(m, dtype=np.int64), shape)
+    return Mesh(points, [block], parts=parts)
+
+
+def box(
+    size: Sequence[float] = (1.0, 1.0, 1.0),
+    cells: Sequence[int] = (1, 1, 1),
+    element: str = "KinematicLinear3D8N",
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Mesh:
+    """Return a box with parts ``x- x+ y- y+ z- z+``, the nodes of its six sides.
+
+    Parameters
+    ----------
+    size : edge lengths in m, > 0.
+    cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
+    element : name of the element.
+    origin : the corner with the smallest coordinates, m.
+
+    Examples
+    --------
+    >>> mesh = box((1, 1, 1), cells=(2, 2, 2), element="KinematicLinear3D20N")
+    >>> mesh.n_nodes, mesh.n_elements, len(mesh.nodes("z+"))
+    (81, 8, 21)
+    """
+    lengths, corner = finite(size, "size"), finite(origin, "origin")
+    if lengths.shape != (3,) or corner.shape != (3,) or (lengths <= 0).any():
+        raise InputError(f"size must be three lengths > 0 m and origin three numbers; got {size}, {origin}")
+    unit, nodes, name, shape = _unit_mesh(cells, element)
+    parts = {}
+    for axis, letter in enumerate("xyz"):
+        for end, sign in ((0.0, "-"), (1.0, "+")):
+            parts[letter + sign] = Part(nodes=np.flatnonzero(unit[:, axis] == end))
+    return _mesh(corner + unit * lengths, nodes, name, shape, parts)
+
+
+def annulus(
+    inner: float,
+    outer: float,
+    width: float,
+    cells: Sequence[int] = (2, 16, 1),
+    element: str = "KinematicLinear3D20N",
+) -> Mesh:
+    """Return a hollow cylinder about z with parts ``inner outer z- z+``.
+
+    Parameters
+    ----------
+    inner, outer : radii in m, 0 < inner < outer.
+    width : length along z in m; z runs from 0 to `width`.
+    cells : bricks along the radius, around (≥ 3) and along z.
+    element : name of the element; mid-edge nodes lie on the circles.
+
+    Examples
+    --------
+    >>> wheel = annulus(0.1, 0.45, 0.1, cells=(2, 12, 1))
+    >>> wheel.n_elements, sorted(wheel.parts)
+    (24, ['inner', 'outer', 'z+', 'z-'])
+    """
+    sizes = finite([inner, outer, width], "inner, outer and width")
+    if sizes.shape != (3,) or not (0 < sizes[0] < sizes[1] and sizes[2] > 0):
+        raise InputError(f"an annulus needs 0 < inner < outer and width > 0; got {inner}, {outer}, {width}")
+    if _cells(cells)[1] < 3:
+        raise InputError(f"an annulus needs at least 3 cells around; got {cells[1]}")
+    unit, nodes, name, shape = _unit_mesh(cells, element)
+    seam, start = np.flatnonzero(unit[:, 1] == 1), np.flatnonzero(unit[:, 1] == 0)
+    seam = seam[np.lexsort((unit[seam, 0], unit[seam, 2]))]
+    start = start[np.lexsort((unit[start, 0], unit[start, 2]))]
+    target = np.arange(len(unit))
+    target[seam] = start
+    kept, renumbered = np.unique(target, return_inverse=True)
+    unit, nodes = unit[kept], renumbered[nodes]
+    r = inner + (outer - inner) * unit[:, 0]
+    angle = 2 * np.pi * unit[:, 1]
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), width * unit[:, 2]])
+    sides = {"inner": (0, 0.0), "outer": (0, 1.0), "z-": (2, 0.0), "z+": (2, 1.0)}
+    parts = {side: Part(nodes=np.flatnonzero(unit[:, axis] == end)) for side, (axis, end) in sides.items()}
+    return _mesh(points, nodes, name, shape, parts)

@@ -1,0 +1,1 @@
+"""What is analyzed: loads, supports, checks and mass properties of a structure."""

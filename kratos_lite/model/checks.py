@@ -1,0 +1,267 @@
+"""Checks of a model before it is solved: geometry, rules, numbers.
+
+Each check either raises one clear error or returns warnings for the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.assembly import fields
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.errors import MAX_PROBLEMS, MeshError, SolveError
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
+from kratos_lite.solvers.supports import Supports
+from kratos_lite.typing import Array
+
+SLOWEST, QUICKEST = 1.0, 2e4
+"""Speeds of waves in m/s: jelly is above the one, diamond below the other."""
+FOLD = 0.2
+"""Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
+
+
+def check_points(mesh: Mesh) -> None:
+    """Raise MeshError if a coordinate is not finite."""
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        raise MeshError(
+            f"node {mesh.node_ids[bad[0]]} has coordinates {mesh.points[bad[0]]}; they must be finite"
+        )
+
+
+def check_blocks(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> None:
+    """Raise MeshError if a block is not shaped as its kind needs or names a node that is not there."""
+    for block, kind in zip(mesh.blocks, kinds, strict=True):
+        nodes, m, k = np.asarray(block.nodes), len(block.ids), len(kind.nodes)
+        if nodes.shape != (m, k) or nodes.dtype.kind not in "iu" or np.shape(block.properties) != (m,):
+            raise MeshError(
+                f"block {block.name}: nodes must be whole numbers of shape ({m}, {k}) and properties of "
+                f"shape ({m},), as there are {m} ids; "
+                f"got {nodes.dtype} {nodes.shape} and {np.shape(block.properties)}"
+            )
+        bad = np.flatnonzero(((nodes < 0) | (nodes >= mesh.n_nodes)).any(axis=1))
+        if len(bad):
+            row = nodes[bad[0]]
+            raise MeshError(
+                f"{mesh.place(block, int(bad[0]))} uses node rows {row.tolist()}; "
+                f"rows are 0 … {mesh.n_nodes - 1}"
+            )
+
+
+def check_repeated_nodes(mesh: Mesh) -> None:
+    """Raise MeshError if an element uses a node twice."""
+    for block in mesh.blocks:
+        ordered = np.sort(block.nodes, axis=1)
+        bad = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+        if len(bad):
+            cell = int(bad[0])
+            row = ordered[cell]
+            node = mesh.node_ids[row[1:][np.diff(row) == 0][0]]
+            raise MeshError(
+                f"{mesh.place(block, cell)} uses node {node} more than once; "
+                f"give it {block.nodes.shape[1]} different nodes or use an element with fewer"
+            )
+
+
+def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[str]:
+    """Raise MeshError for elements with det J ≤ 0 at a Gauss point or clearly < 0 at a node.
+
+    `kinds` holds the element class of each block.  det J = 0 at a corner node alone (quarter-point
+    elements) is allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J,
+    which badly shaped but useful elements have.
+    """
+    problems: list[str] = []
+    count, flat, folded = 0, 0, 0
+    for block, kind in zip(mesh.blocks, kinds, strict=True):
+        shape, g = kind.shape, len(kind.rule)
+        _, dN = tabulate(shape, kind.rule)
+        dN = np.concatenate([dN, [shape.dN(xi) for xi in shape.nodes]])
+        limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
+        doubtful = np.flatnonzero(~fields.clearly_positive(mesh.points, block.nodes, kind, dN, g))
+        step = max(1, 4_000_000 // (72 * len(dN)))
+        for start in range(0, len(doubtful), step):
+            cells = doubtful[start : start + step]
+            det = kind(mesh.points[block.nodes[cells]]).determinants(dN)
+            scale = np.abs(det[:, :g]).mean(axis=1, keepdims=True)
+            bad = np.where(np.arange(len(dN)) < g, det <= limit * scale, det < limit * scale)
+            flat += int((np.abs(det[:, g:]) <= 1e-10 * scale).any(axis=1).sum())
+            folded += int((det[:, g:] < -1e-10 * scale).any(axis=1).sum())
+            for e in np.flatnonzero(bad.any(axis=1)):
+                count += 1
+                if len(problems) < MAX_PROBLEMS:
+                    problems.append(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
+    if problems:
+        more = f"\n… and {count - len(problems)} more" if count > len(problems) else ""
+        raise MeshError("\n".join(problems) + more)
+    notes = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
+    if folded:
+        notes.append(f"{folded} elements have det J slightly < 0 at a node: badly shaped, so less accurate")
+    return notes
+
+
+def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
+    worst = int(np.argmin(det))
+    where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
+    nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
+    if (det < 0).all():
+        cure = "the element is turned inside out; mesh.reoriented() mends the node order"
+    elif (det == 0).all():
+        cure = "the element has no volume; two of its nodes may coincide"
+    else:
+        cure = "two of its nodes look swapped or one lies too far off"
+    return (
+        f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
+    )
+
+
+@remembered
+def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
+    """Return how many zero-energy modes beyond the six rigid ones a rule leaves to the reference cell."""
+    cell = element(element.nodes, rule)
+    B = np.vstack([cell.B(xi) for xi in rule.points])
+    values = np.linalg.svd(B, compute_uv=False)
+    rank = int((values > 1e-9 * values[0]).sum())
+    return 3 * len(element.nodes) - 6 - rank
+
+
+def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+    """Check rules that replace an element's own: det J > 0 at their points; warn of spurious modes."""
+    replaced = [group for group in groups if group.rule is not group.element.rule]
+    for group in replaced:
+        _, dN = tabulate(group.element.shape, group.rule)
+        part = group.take(~fields.clearly_positive(mesh.points, group.nodes, group.element, dN, len(dN)))
+        for chunk in part.chunks():
+            bad = (part.at(mesh.points, chunk).determinants(dN) <= 0).any(axis=1)
+            if bad.any():
+                element = mesh.element_ids[part.rows[chunk][int(np.argmax(bad))]]
+                raise MeshError(
+                    f"element {element} ({group.element.__name__}): det J must be > 0 at all points of "
+                    f"{group.rule}; the element's own rule, or a better shape, avoids this"
+                )
+    found = dict.fromkeys((group.element, group.rule) for group in replaced)
+    said = [
+        f"{element.__name__} with {len(rule)} Gauss points has {n} spurious zero-energy modes; "
+        f"its own rule has {len(element.rule)} points and none"
+        for element, rule in found
+        if (n := spurious_modes(element, rule)) > 0
+    ]
+    return list(dict.fromkeys(said))
+
+
+def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
+    """Warn of different nodes at the same place (1e-8 of the mean spacing apart or less)."""
+    rows = np.flatnonzero(used)
+    if len(rows) < 2:
+        return []
+    X = mesh.points[rows]
+    extent = max(float(np.ptp(x)) for x in X.T)
+    spacing = extent / len(rows) ** (1 / 3)
+    along = X @ np.array([0.5257311, 0.6180340, 0.5844215])  # no plane of a usual mesh is normal to it
+    order = np.argsort(along, kind="stable")
+    X, along, rows = X[order], along[order], rows[order]
+    pairs: list[tuple[int, int]] = []
+    tolerance = 1e-8 * spacing
+    for step in range(1, min(len(rows), 64)):
+        close = np.flatnonzero(along[step:] - along[:-step] <= 2 * tolerance)
+        if not len(close):
+            break
+        near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1)]
+        pairs += [(int(rows[i]), int(rows[i + step])) for i in near]
+    if not pairs:
+        return []
+    ids = mesh.node_ids
+    shown = ", ".join(f"{min(ids[a], ids[b])} and {max(ids[a], ids[b])}" for a, b in pairs[:3])
+    return [
+        f"{len(pairs)} pairs of nodes coincide ({shown}{' …' if len(pairs) > 3 else ''}); they are not joined"
+    ]
+
+
+def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+    """Warn where the numbers themselves cost accuracy: far from the origin, or very unlike stiffnesses."""
+    warnings = []
+    extent = max(float(np.ptp(x)) for x in mesh.points.T)
+    spacing = extent / max(1.0, mesh.n_elements ** (1 / 3))
+    loss = float(np.finfo(float).eps * np.abs(mesh.points).max() / spacing) if spacing > 0 else 0.0
+    if loss > 1e-9:
+        warnings.append(
+            f"the body lies so far from the origin that coordinates carry an error of {loss:.1e} of an "
+            "element; move it to the origin"
+        )
+    stiff = [float(np.abs(group.material.C).max()) for group in groups]
+    lock = {b.element.__name__ for b in groups if _is_near_half(b.material.C)} - {"KinematicLinear3D10N"}
+    if lock:
+        names = ", ".join(sorted(lock))
+        warnings.append(
+            f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); "
+            "KinematicLinear3D10N is least affected"
+        )
+    if stiff and max(stiff) > 1e10 * min(stiff):
+        warnings.append(
+            f"stiffnesses differ by a factor of {max(stiff) / min(stiff):.1e}; expect fewer digits"
+        )
+    return warnings + check_wave_speeds(group.material for group in groups)
+
+
+def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
+    """Warn where the speed of waves sqrt(E/ρ) says that E and ρ can hardly both be in SI units."""
+    warnings = []
+    for material in materials:
+        if not material.density > 0:
+            continue
+        E = 1 / float(np.linalg.inv(material.C).diagonal()[:3].min())
+        speed = float(np.sqrt(E / material.density))
+        if not SLOWEST <= speed <= QUICKEST:
+            warnings.append(
+                f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "
+                f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
+            )
+    return list(dict.fromkeys(warnings))
+
+
+def _is_near_half(C: Array) -> bool:
+    """Return whether the bulk modulus is above 50 shear moduli (ν > 0.49 if isotropic)."""
+    return bool(C[:3, :3].sum() / 9 > 50 * C[[3, 4, 5], [3, 4, 5]].mean())
+
+
+def check_rounding(
+    noise: float, loads: Array, initial: Array, reactions: Array, supports: Supports
+) -> list[str]:
+    """Warn where rounding of the internal forces, `noise` in N per node, is not small beside the loads.
+
+    Raises SolveError where it is as large as the loads, to two digits: the solution means nothing.
+    """
+    size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
+    if supports.values.any() or noise <= 1e-6 * size:
+        return []
+    text = (
+        f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
+        "look for nearly free parts, spurious modes or very unlike stiffnesses"
+    )
+    if noise > 1e-2 * size:
+        raise SolveError(text)
+    return [text]
+
+
+def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:
+    """Return |sum of forces| and |sum of moments| of loads and reactions, relative to their sizes.
+
+    Forces that are together below `noise` in N are rounding, and in balance.
+    """
+    total = loads + reactions
+    X = points - points.mean(axis=0)
+    size = float(np.abs(loads).sum() + np.abs(reactions).sum())
+    arm = float(np.abs(X).max(initial=0.0))
+    if size <= noise:
+        return 0.0, 0.0
+    force = float(np.abs(total.sum(axis=0)).max() / size)
+    M = X.T @ total
+    moment = float(np.abs(M - M.T).max() / (size * arm)) if arm > 0 else 0.0
+    return force, moment

@@ -1,0 +1,319 @@
+"""MassProperties: mass, volume, mass center and second moments of bodies.
+
+Source: Solfec-1.0 theory, shape mass_properties; Goldstein, Classical Mechanics, ch. 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.quadrature import Rule, rule_for
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+SYMMETRIC = 1e-10
+"""How far, relative to its largest entry, a tensor may be from symmetric, or two values from each other."""
+SINGULAR = 1e-15
+"""Ratio of the smallest to the largest eigenvalue down to which a tensor counts as positive definite."""
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class MassProperties:
+    """Mass properties of one body, or of many through leading axes (...) that broadcast.
+
+    Attributes
+    ----------
+    mass : (...) float, kg, > 0.
+    inertia : (..., 3, 3) float, kg m²; J = tr(E0) 1 - E0, symmetric positive definite.
+    volume : (...) float, m³, > 0; nan where it was not given.
+    center : (..., 3) float, m; the mass center, at the origin if not given.
+    euler : (..., 3, 3) float, kg m²; E0 = ∫ ρ (X - X̄)(X - X̄)^T dV about the mass center.
+
+    Raises
+    ------
+    InputError
+        A value is not finite or has the wrong shape; neither or only contradicting tensors are given.
+    ModelError
+        A mass or volume is not positive, or an inertia not symmetric positive definite.
+
+    Notes
+    -----
+    One of `inertia` and `euler` gives the other, E0 = tr(J)/2 1 - J.  An inertia that violates
+    the triangle inequality (J_xx > J_yy + J_zz) belongs to no distribution of mass, but a rigid body may
+    have it; `check_deformable` refuses it.
+
+    Examples
+    --------
+    >>> top = MassProperties(mass=1.0, inertia=np.diag([5.0, 10.0, 1.0]))
+    >>> top.euler.diagonal().tolist(), top.center.tolist()
+    ([3.0, -2.0, 7.0], [0.0, 0.0, 0.0])
+    """
+
+    mass: Array
+    inertia: Array
+    volume: Array
+    center: Array
+    euler: Array
+
+    def __init__(
+        self,
+        mass: ArrayLike,
+        inertia: ArrayLike | None = None,
+        volume: ArrayLike = np.nan,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        euler: ArrayLike | None = None,
+    ) -> None:
+        J, E = _tensors(inertia, euler)
+        values = {
+            "mass": (_check_positive(finite(mass, "the mass of a body"), "mass", "kg"), 0),
+            "inertia": (J, 2),
+            "volume": (_volume(volume), 0),
+            "center": (_with_tail(center, (3,), "the center of a body"), 1),
+            "euler": (E, 2),
+        }
+        try:
+            many = np.broadcast_shapes(*(v.shape[: v.ndim - tail] for v, tail in values.values()))
+        except ValueError:
+            shapes = ", ".join(f"{name} {value.shape}" for name, (value, _) in values.items())
+            raise InputError(f"the leading axes of a body's values must agree; got {shapes}") from None
+        for name, (value, tail) in values.items():
+            full = np.broadcast_to(value, (*many, *(3,) * tail)).copy()
+            full.setflags(write=False)
+            object.__setattr__(self, name, full[()])
+
+    def with_(self, **changes: ArrayLike) -> MassProperties:
+        """Return the body with single values replaced; all others stay as they are.
+
+        A new mass alone leaves the inertia as it is; a new `inertia` brings its own `euler`, and the
+        other way round.
+
+        >>> body = MassProperties.box((1.0, 1.0, 1.0), density=6.0).with_(mass=2.0)
+        >>> float(body.mass), body.inertia.diagonal().tolist()
+        (2.0, [1.0, 1.0, 1.0])
+        """
+        values: dict[str, Any] = dict(vars(self))
+        if unknown := changes.keys() - values.keys():
+            raise InputError(f"a body has no {sorted(unknown)[0]!r}; its values are {', '.join(values)}")
+        if "inertia" in changes or "euler" in changes:
+            values["inertia"] = values["euler"] = None
+        return MassProperties(**{**values, **changes})
+
+    def check_deformable(self) -> None:
+        """Raise ModelError unless the volume is known and E0 positive definite, as deformation needs."""
+        if np.isnan(self.volume).any():
+            raise ModelError("a body that deforms needs its volume in m³; give volume=…")
+        smallest, bad = _smallest(self.euler)
+        if bad.any():
+            raise ModelError(
+                f"a body that deforms needs a positive definite Euler tensor; its smallest eigenvalue is "
+                f"{smallest[bad][0]:.3g} kg m²: the body is flat, or its inertia violates the triangle "
+                "inequality, as that of no distribution of mass does"
+            )
+
+    # ---- where they come from ------------------------------------------------------------------
+
+    @classmethod
+    def stack(cls, bodies: Sequence[MassProperties]) -> MassProperties:
+        """Return many bodies as one, along a new first axis."""
+        if not bodies or len({body.mass.shape for body in bodies}) > 1:
+            shapes = [body.mass.shape for body in bodies]
+            raise InputError(f"bodies to stack must have the same leading axes; got {shapes or 'none'}")
+        return cls(**{name: np.stack([getattr(b, name) for b in bodies]) for name in vars(bodies[0])})
+
+    @classmethod
+    def box(cls, sides: ArrayLike, density: ArrayLike) -> MassProperties:
+        """Return boxes centerd at the origin; sides (..., 3) in m, density (...) in kg/m³.
+
+        >>> MassProperties.box((0.4, 0.6, 1.0), 1000.0).inertia.diagonal().round(9).tolist()
+        [27.2, 23.2, 10.4]
+        """
+        sides = _with_tail(sides, (3,), "the sides of a box")
+        rho = _check_positive(finite(density, "a density"), "density", "kg/m³")
+        volume = _check_positive(sides, "side", "m").prod(axis=-1)
+        mass = np.asarray(rho * volume)
+        return cls(mass, volume=volume, euler=(mass[..., None] * sides**2 / 12)[..., None] * np.eye(3))
+
+    @classmethod
+    def ball(cls, radius: ArrayLike, density: ArrayLike) -> MassProperties:
+        """Return balls centerd at the origin; radius (...) in m, density (...) in kg/m³."""
+        r = _check_positive(finite(radius, "a radius"), "radius", "m")
+        volume = 4 * np.pi / 3 * r**3
+        mass = np.asarray(_check_positive(finite(density, "a density"), "density", "kg/m³") * volume)
+        return cls(mass, volume=volume, euler=(mass * r**2 / 5)[..., None, None] * np.eye(3))
+
+    @classmethod
+    def of(cls, points: ArrayLike, groups: Sequence[ElementGroup]) -> MassProperties:
+        """Return the mass properties of a mesh; points (n, 3) in m.
+
+        They are exact for every shape, also for warped faces and curved quadratic cells, and lose no
+        digits far from the origin beyond those that the coordinates have lost.
+
+        Raises
+        ------
+        MeshError
+            There are no elements, or one has no positive volume.
+        ModelError
+            A material has no density.
+
+        Examples
+        --------
+        >>> from kratos_lite import Isotropic3D, Model, box
+        >>> model = Model(box((0.4, 0.6, 1.0)), Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+        >>> body = MassProperties.of(model.mesh.points, model.element_groups())
+        >>> round(float(body.mass), 9), body.center.round(9).tolist()
+        (240.0, [0.2, 0.3, 0.5])
+        """
+        X = _with_tail(points, (3,), "the points of a mesh")
+        groups = [group for group in groups if len(group)]
+        if not groups:
+            raise MeshError("the mesh has no elements, so no volume; a body needs at least one")
+        for group in groups:
+            if not group.material.density > 0:
+                raise ModelError(
+                    f"{type(group.material).__name__} has density {group.material.density:g}, but what "
+                    "moves needs mass; give each material a density > 0 kg/m³"
+                )
+        center, mass, volume = X[groups[0].nodes[0, 0]], 0.0, 0.0
+        second = np.zeros((3, 3))
+        for _ in range(2):  # about a node, then about the center
+            mass, volume, first, second = _moments(X - center, groups)
+            center = center + first / mass
+        return cls(mass, volume=volume, center=center, euler=(second + second.T) / 2)
+
+
+# ---- integrals over a mesh -------------------------------------------------------------------------
+
+
+def exact_rule(shape: type[Shape]) -> Rule:
+    """Return the rule that integrates X X^T over any cell of a shape, det J included.
+
+    In each direction of a product X has the degree p of the shape, det J 3p - 1 and X X^T 2p; over a
+    tetrahedron det J has 3(p - 1).  A pyramid is a product in its collapsed coordinates.
+    """
+    return rule_for(shape.cell, 5 * shape.degree - (3 if shape.cell == "tetrahedron" else 1))
+
+
+def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Array, Array]:
+    """Return ∫ρ, ∫1, ∫ρX (3,) and ∫ρXX^T (3, 3) over the elements."""
+    mass, volume = 0.0, 0.0
+    first, second = np.zeros(3), np.zeros((3, 3))
+    for group in groups:
+        rule = exact_rule(group.element.shape)
+        N, dN = tabulate(group.element.shape, rule)
+        rho = group.material.density
+        for chunk in replace(group, rule=rule).chunks():
+            element = group.at(X, chunk)
+            dV = element.determinants(dN) * rule.weights
+            _check_volumes(dV.sum(axis=1), group, chunk)
+            x, w = (N @ element.X).reshape(-1, 3), dV.ravel()
+            wx = w[:, None] * x
+            mass, volume = mass + rho * float(w.sum()), volume + float(w.sum())
+            first += rho * wx.sum(axis=0)
+            second += rho * (wx.T @ x)
+    return mass, volume, first, second
+
+
+def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
+    bad = np.flatnonzero(~(volumes > 0))
+    if len(bad):
+        raise MeshError(
+            f"the element in row {group.rows[chunk][bad[0]]} ({group.element.__name__}) has volume "
+            f"{volumes[bad[0]]:.3g} m³; it must be > 0; mesh.reoriented() mends elements turned inside out"
+        )
+
+
+# ---- values from the caller ------------------------------------------------------------------------
+
+
+def _volume(value: ArrayLike) -> Array:
+    """Return volumes; nan stands for one that is not known."""
+    try:
+        unknown = np.isnan(np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        unknown = np.False_
+    known = finite(np.where(unknown, 1.0, value) if unknown.any() else value, "the volume of a body")
+    return np.where(unknown, np.nan, _check_positive(known, "volume", "m³"))
+
+
+def _with_tail(value: ArrayLike, tail: tuple[int, ...], what: str) -> Array:
+    """Return finite floats of shape (..., *tail)."""
+    array = finite(value, what)
+    if array.shape[-len(tail) :] != tail:
+        raise InputError(f"{what} must have shape (..., {', '.join(map(str, tail))}); got {array.shape}")
+    return array
+
+
+def _check_positive(value: Array, what: str, unit: str) -> Array:
+    if (value <= 0).any():
+        raise ModelError(f"the {what} of a body must be > 0 {unit}; got {value.min():g}")
+    return value
+
+
+def _tensors(inertia: ArrayLike | None, euler: ArrayLike | None) -> tuple[Array, Array]:
+    """Return inertia and Euler tensor, one from the other where only one is given, both checked."""
+    if inertia is None and euler is None:
+        raise InputError("a body needs its inertia=… or its Euler tensor euler=…, (3, 3) in kg m²")
+    tensor = partial(_with_tail, tail=(3, 3))
+    E = _symmetric(tensor(euler, what="the Euler tensor"), "Euler tensor") if euler is not None else None
+    J = _symmetric(tensor(inertia, what="the inertia"), "inertia") if inertia is not None else None
+    if E is None:
+        assert J is not None
+        E = _trace(J) / 2 - J
+    elif J is None:
+        J = _from_euler(E)
+    elif J.shape != E.shape or _differ(J, _from_euler(E)):
+        raise InputError(
+            "the inertia and the Euler tensor contradict each other: J must be tr(E0) 1 - E0; "
+            "give one of them, or replace one by with_(inertia=…) or with_(euler=…)"
+        )
+    smallest, bad = _smallest(J)
+    if bad.any():
+        raise ModelError(
+            f"the inertia of a body must be positive definite; its smallest eigenvalue is "
+            f"{smallest[bad][0]:.3g} kg m²; a body that is not a straight line has three positive ones"
+        )
+    return J, E
+
+
+def _trace(A: Array) -> Array:
+    """Return tr(A) 1."""
+    return np.asarray(np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3))
+
+
+def _from_euler(E: Array) -> Array:
+    """Return tr(E) 1 - E with each diagonal entry as a sum of two, so that none cancels."""
+    x, y, z = np.moveaxis(np.diagonal(E, axis1=-2, axis2=-1), -1, 0)
+    J = -E
+    for i, entry in enumerate((y + z, z + x, x + y)):
+        J[..., i, i] = entry
+    return J
+
+
+def _differ(A: Array, B: Array) -> bool:
+    """Return whether two tensors (..., 3, 3) differ by more than rounding of given figures."""
+    size = np.abs(A).max(axis=(-2, -1), keepdims=True)
+    return bool((np.abs(A - B) > SYMMETRIC * size).any())
+
+
+def _symmetric(A: Array, what: str) -> Array:
+    if _differ(A, np.swapaxes(A, -1, -2)):
+        error = np.abs(A - np.swapaxes(A, -1, -2)).max()
+        raise ModelError(f"the {what} of a body must be symmetric; entries differ by {error:.3g} kg m²")
+    return (A + np.swapaxes(A, -1, -2)) / 2
+
+
+def _smallest(A: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the smallest eigenvalues (...) and a mask of those that are not positive."""
+    values = np.linalg.eigvalsh(A)
+    smallest = np.asarray(values[..., 0])
+    return smallest, np.asarray(~(smallest > SINGULAR * np.abs(values).max(axis=-1)))

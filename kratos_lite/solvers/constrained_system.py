@@ -1,0 +1,201 @@
+"""ConstrainedSystem: the equations of elements and their supports, made once and solved for many forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite import solvers
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.fields import internal_load
+from kratos_lite.assembly.stiffness import Pattern, PatternCache, assemble_dense, assemble_stiffness
+from kratos_lite.errors import InputError
+from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.common import DENSE_MAX
+from kratos_lite.solvers.supports import Links, Supports, reduction
+from kratos_lite.typing import Array, Ints, Progress
+
+
+class ConstrainedSystem:
+    """K u = f + reactions on the nodes of some elements, with u as the supports prescribe it.
+
+    Pattern, matrix and whatever the solver prepares (factors, multigrid) are made when they are first
+    needed and kept.  Nodes that no element uses carry no equations.
+
+    Parameters
+    ----------
+    points : (n, 3) m.
+    groups : the elements, by rows of the points.
+    supports : prescribed displacements and constraints.
+    links : the constraints of `supports` if they are resolved already.
+    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
+    tolerance : relative residual at which the iterative solver stops.
+    patterns : where sparsity patterns are kept from one system to the next.
+    progress : called with the phase and the share done, 0 … 1.
+
+    Attributes
+    ----------
+    points, groups : the nodes that carry equations, and the elements by rows of these.
+    nodes : (a,) int, rows of these nodes among all n.
+    reduced : the supports as a map from free degrees of freedom to all 3a.
+    method, reason : which solver is used, and why.
+    skipped : what assembly left out, in words.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
+    >>> model.fix("z-")
+    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports)
+    >>> f = np.zeros((8, 3))
+    >>> f[model.mesh.nodes("z+"), 2] = 1.0
+    >>> u, solution = system.solve(f)
+    >>> print(f"{u[:, 2].max():.3e} m, {solution.method}")
+    4.000e-09 m, dense
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        supports: Supports,
+        links: Links | None = None,
+        *,
+        solver: str = "auto",
+        tolerance: float = 1e-10,
+        patterns: PatternCache | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.n_nodes = len(points)
+        self.nodes, self.groups = renumber(self.n_nodes, groups)
+        self.points = points[self.nodes]
+        self.supports = supports
+        self.reduced = reduction(supports, self.nodes, links)
+        self.tolerance, self.progress = tolerance, progress
+        self.skipped: list[str] = []
+        self._patterns = patterns or PatternCache()
+        dofs = 3 * len(self.nodes)
+        self.method, self.reason = solvers.choose(solver, len(self.reduced.free), dofs)
+        if self.method == "dense" and dofs > DENSE_MAX:
+            raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """The sparsity of matrices on these nodes."""
+        return self._patterns.get(len(self.nodes), [group.nodes for group in self.groups])
+
+    @cached_property
+    def K(self) -> Any:
+        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
+        if self.method == "dense":
+            return assemble_dense(self.points, self.groups)
+        skipped: set[str] = set()
+        K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
+        self.skipped += sorted(skipped)
+        return K
+
+    @cached_property
+    def norm(self) -> float:
+        """The largest row sum of |K|."""
+        return solvers.matrix_norm(self.K)
+
+    @cached_property
+    def _equations(self) -> solvers.LinearSolver:
+        return solvers.LinearSolver(
+            self.K,
+            self.reduced,
+            self.points,
+            self.method,
+            self.reason,
+            lambda: linear_level(self.points, self.groups),
+        )
+
+    def prescribe(self, links: Links | None = None) -> None:
+        """Take over new values of the prescribed displacements and of the constants of constraints."""
+        self.reduced.c = reduction(self.supports, self.nodes, links).c
+
+    def solve(self, forces: Array) -> tuple[Array, solvers.Solution]:
+        """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
+
+        Raises
+        ------
+        SolveError
+            If the matrix is singular or the accuracy asked for cannot be reached.
+        """
+        solution = self._equations.solve(self.local(forces), self.tolerance, self.progress)
+        return self.whole(solution.x), solution
+
+    def internal_load(self, u: Array) -> Array:
+        """Return ∫ B^T σ dV of displacements (n, 3) as nodal forces (n, 3) in N."""
+        return self.whole(internal_load(self.points, self.groups, u[self.nodes]).ravel())
+
+    def residual(self, u: Array, forces: Array) -> Array:
+        """Return K u - f as nodal forces (n, 3) in N: reactions where something is prescribed."""
+        out = 0.0 - forces
+        out[self.nodes] = (self.K @ self.local(u) - self.local(forces)).reshape(-1, 3)
+        return out
+
+    def reduce(self, forces: Array) -> Array:
+        """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
+        return self.reduced.reduce(self.local(forces))
+
+    def expand(self, q: Array) -> Array:
+        """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
+        return self.whole(self.reduced.expand(q))
+
+    def local(self, values: Array) -> Array:
+        """Return nodal values (n, 3) as those of the equations, (3a,)."""
+        return values.ravel() if len(self.nodes) == self.n_nodes else values[self.nodes].ravel()
+
+    def whole(self, values: Array) -> Array:
+        """Return values of the equations (3a,) as nodal values (n, 3), 0 on nodes without equations."""
+        if len(self.nodes) == self.n_nodes:
+            return values.reshape(-1, 3)
+        out = np.zeros((self.n_nodes, 3))
+        out[self.nodes] = values.reshape(-1, 3)
+        return out
+
+
+def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[ElementGroup]]:
+    """Return the rows of the nodes that elements use, and the groups numbered by them."""
+    used = np.zeros(n_nodes, dtype=bool)
+    for group in groups:
+        used[group.nodes] = True
+    nodes = np.flatnonzero(used)
+    if len(nodes) == n_nodes:
+        return nodes, list(groups)
+    local = (np.cumsum(used) - 1).astype(np.int32)
+    return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
+
+
+def among(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
+    """Return the elements that have a node in `moving` (n,), group by group."""
+    if moving.all():
+        return list(groups)
+    chosen = []
+    for group in groups:
+        still = _without(group.nodes, moving)
+        if not len(still):
+            chosen.append(group)
+        elif len(still) < len(group):
+            keep = np.ones(len(group), dtype=bool)
+            keep[still] = False
+            stress = None if group.prestress is None else group.prestress[keep]
+            chosen.append(replace(group, nodes=group.nodes[keep], rows=group.rows[keep], prestress=stress))
+    return chosen
+
+
+def _without(nodes: NDArray[np.int32], moving: NDArray[np.bool_]) -> Ints:
+    """Return the cells (m, k) with no node in `moving`; most are ruled out by their first nodes."""
+    still = np.flatnonzero(~moving[nodes[:, 0]])
+    for column in range(1, nodes.shape[1]):
+        if not len(still):
+            break
+        still = still[~moving[nodes[still, column]]]
+    return still

@@ -1,0 +1,100 @@
+"""Mass: the mass matrix of a mesh, one number for each pair of nodes, as it is the same for x, y and z."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.assembly import fields
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.quadrature import Rule
+from kratos_lite.solvers import direct
+from kratos_lite.solvers.banded import add_scalar
+from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+
+class Mass:
+    """The mass matrix of elements: consistent, or lumped at the nodes.
+
+    It is built when it is first asked for: a body at rest needs none.
+
+    Attributes
+    ----------
+    lumped : whether the mass stands in the nodes.
+    rule_of : gives the rule of an element class; its own `mass_rule` if not given.
+    pattern : the sparsity of matrices on the nodes.
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        pattern: Pattern,
+        lumped: bool,
+        rule_of: Callable[[type[KinematicLinear]], Rule] = lambda element: element.mass_rule,
+    ) -> None:
+        self._points, self._batches = points, groups
+        self.lumped, self.pattern, self.rule_of = lumped, pattern, rule_of
+
+    @cached_property
+    def scalar(self) -> csr_array[Any, Any]:
+        """Mass for each pair of nodes, (n, n) sparse in kg; a diagonal for lumped mass."""
+        from scipy.sparse import csr_array, diags_array
+
+        if self.lumped:
+            return diags_array(self.nodal, format="csr")
+        made = inertia_matrices(self._points, self._batches, self.pattern, "M", self.rule_of)
+        n = self.pattern.n_nodes
+        return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
+
+    @cached_property
+    def nodal(self) -> Array:
+        """Row sums (n,) in kg."""
+        if self.lumped:
+            return fields.lumped_mass(self._points, self._batches)
+        return np.asarray(self.scalar @ np.ones(len(self._points)))
+
+    def times(self, v: Array) -> Array:
+        """Return M v of nodal vectors (3n,)."""
+        nodal = v.reshape(-1, 3)
+        return np.asarray(self.nodal[:, None] * nodal if self.lumped else self.scalar @ nodal).ravel()
+
+    def solve(self, b: Array) -> Array:
+        """Return M^-1 b of nodal vectors (3n,) or columns of them (3n, k)."""
+        nodal = b.reshape(len(self.nodal), -1)
+        x = nodal / self.nodal[:, None] if self.lumped else self._factors.solve(nodal)
+        return np.asarray(x).reshape(b.shape)
+
+    def add_to(self, A: BlockMatrix) -> None:
+        """Add the mass matrix to a matrix of blocks on the same pattern."""
+        if self.lumped:
+            add_scalar(A, self.nodal, self._diagonal)
+        else:
+            add_scalar(A, self.scalar.data)
+
+    @cached_property
+    def _diagonal(self) -> NDArray[np.int64]:
+        """Places of the diagonal blocks in the pattern."""
+        rows = np.repeat(np.arange(self.pattern.n_nodes), np.diff(self.pattern.indptr))
+        return np.flatnonzero(rows == self.pattern.indices)
+
+    def matrix(self) -> csr_array[Any, Any]:
+        """Return the mass matrix of all components, (3n, 3n) in kg."""
+        from scipy.sparse import csr_array, eye_array, kron
+
+        return csr_array(kron(self.scalar, eye_array(3), format="csr"))
+
+    @cached_property
+    def _factors(self) -> direct.Factorization:
+        return direct.factorize(self.scalar)

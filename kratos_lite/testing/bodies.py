@@ -1,0 +1,216 @@
+"""Checks of a kind of body: what every kind must do, whatever its vectors look like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.marching import march
+from kratos_lite.bodies.rotations import exp
+from kratos_lite.errors import InputError
+from kratos_lite.materials import Isotropic3D
+from kratos_lite.mesh.generators import box
+from kratos_lite.testing.report import Finding, Measured, difference, run
+from kratos_lite.typing import Array
+
+Make: TypeAlias = Callable[[], Body]
+
+SIDES = (0.4, 0.6, 1.0)
+MASS = 240.0
+FLIGHT, SPIN = np.array([1.0, 2.0, 3.0]), np.array([0.5, 8.0, -0.3])
+TURN = exp([0.4, -1.1, 0.7])
+
+
+def check_body(kind: type[Body]) -> list[Finding]:
+    """Check a kind of body on a box: mass, momenta, forces, and its load of deformation if it has any.
+
+    Parameters
+    ----------
+    kind : a class that is made of a mesh and a material.
+
+    Returns
+    -------
+    list of Finding
+
+    Raises
+    ------
+    InputError
+        If it is no class of bodies.
+
+    Examples
+    --------
+    >>> from kratos_lite import PseudoRigidBody
+    >>> all(finding.passed for finding in check_body(PseudoRigidBody))
+    True
+    """
+    if not (isinstance(kind, type) and issubclass(kind, Body)):
+        raise InputError(f"check a class of bodies, such as RigidBody; got {kind!r}")
+
+    def make() -> Body:
+        mesh = box(SIDES, (1, 1, 2))
+        return kind(mesh, Isotropic3D(E=1e6, nu=0.3, density=1000.0))  # type: ignore[call-arg]
+
+    return run(CHECKS + (DEFORMABLE if issubclass(kind, Deformable) else ()), make)
+
+
+def _moving(make: Make) -> Body:
+    body = make()
+    body.turn(TURN)
+    body.set_velocity(FLIGHT, SPIN)
+    return body
+
+
+def _stirred(make: Make) -> Body:
+    """Return a body with a velocity without symmetry, and so a configuration if it deforms."""
+    body, rng = _moving(make), np.random.default_rng(0)
+    if isinstance(body, Deformable):
+        body.place(body.q + 0.01 * rng.uniform(-1, 1, body.q.shape))
+    body.u[...] = rng.uniform(-1, 1, body.u.shape)
+    return body
+
+
+def _points(body: Body) -> Array:
+    return np.asarray(body.center + np.random.default_rng(1).uniform(-0.5, 0.5, (5, 3)) * SIDES)
+
+
+# ---- every kind ------------------------------------------------------------------------------------
+
+
+def rigid_velocity(make: Make) -> Measured:
+    """Check that `set_velocity` gives v + ω × (x - x̄)."""
+    body = _moving(make)
+    X = _points(body)
+    expected = FLIGHT + np.cross(SPIN, body.position(X) - body.mass_center())
+    return Measured(difference(body.velocity(X), expected), 1e-12, "velocity(X) after turn and set_velocity")
+
+
+def momenta(make: Make) -> Measured:
+    """Check energy and momenta of a rigid motion against those of a box."""
+    body = _moving(make)
+    J = TURN @ np.diag([27.2, 23.2, 10.4]) @ TURN.T
+    errors = {
+        "linear_momentum": difference(body.linear_momentum(), MASS * FLIGHT),
+        "angular_momentum": difference(body.angular_momentum(), J @ SPIN),
+        "kinetic_energy": difference(body.kinetic_energy(), (MASS * FLIGHT @ FLIGHT + SPIN @ J @ SPIN) / 2),
+    }
+    name = max(errors, key=lambda key: errors[key])
+    return Measured(errors[name], 1e-11, f"{name} of a box that flies and spins")
+
+
+def mass_matrix(make: Make) -> Measured:
+    """Check that the mass is symmetric and positive definite."""
+    body = make()
+    M = np.stack([body.times_mass(unit) for unit in np.eye(body.dofs)])
+    if not np.linalg.eigvalsh((M + M.T) / 2)[0] > 0:
+        return Measured(np.inf, 0.0, "some velocity has no kinetic energy: M is not positive definite")
+    return Measured(difference(M, M.T), 1e-14, "M differs from its transpose")
+
+
+def conjugacy(make: Make) -> Measured:
+    """Check that the power of a force is the force times the velocity of its point."""
+    body, error = _stirred(make), 0.0
+    forces = np.random.default_rng(2).uniform(-1, 1, (5, 3))
+    for X, f in zip(_points(body), forces, strict=True):
+        dofs, H = body.rows(X, body.q)
+        v = body.velocity(X)
+        power = float(body.push(X, f, body.q) @ body.u)
+        error = max(error, abs(power - f @ v) / np.linalg.norm(v), difference(H @ body.u[dofs], v))
+    return Measured(error, 1e-12, "push(X, f) · u, or rows(X) u, is not what velocity(X) says")
+
+
+def free_flight(make: Make) -> Measured:
+    """Check that the mass center flies straight and linear momentum stays."""
+    body = _moving(make)
+    start, p = body.mass_center(), body.linear_momentum()
+    for _ in march(body, 1e-3, 10, every=10):
+        pass
+    error = difference(body.mass_center() - start, 0.01 * FLIGHT)
+    return Measured(max(error, difference(body.linear_momentum(), p)), 1e-11, "after ten steps without loads")
+
+
+# ---- kinds that deform -----------------------------------------------------------------------------
+
+
+def rigid_motions(make: Make) -> Measured:
+    """Check that a rotation needs no load and stores no energy."""
+    body = make()
+    body.turn(TURN)
+    moved = _stirred(make)
+    scale = float(np.abs(moved.internal_load()).max())
+    load = float(np.abs(body.internal_load()).max()) / scale
+    return Measured(
+        max(load, float(body.internal_energy()) / float(moved.internal_energy())),
+        1e-12,
+        "internal_load or internal_energy of a turned body",
+    )
+
+
+def balance_of_moments(make: Make) -> Measured:
+    """Check that the internal load does no work on rigid motions."""
+    body = _stirred(make)
+    error: float = 0.0
+    load = body.internal_load()
+    for axis in np.eye(3):
+        body.set_velocity(axis)
+        error = max(error, abs(float(load @ body.u)))
+        body.set_velocity(angular=axis)
+        error = max(error, abs(float(load @ body.u)))
+    return Measured(
+        error / float(np.abs(load).max()), 1e-12, "internal_load · u of a translation or rotation"
+    )
+
+
+def energy(make: Make) -> Measured:
+    """Check that the internal load is the slope of the internal energy."""
+    body = _stirred(make)
+    q, v, h = body.q.copy(), body.u.copy(), 1e-5
+    slope, energies = float(body.internal_load() @ v), []
+    for side in (1, -1):
+        body.place(q + side * h * v)
+        energies.append(float(body.internal_energy()))
+    numeric = (energies[0] - energies[1]) / (2 * h)
+    return Measured(
+        abs(numeric - slope) / abs(slope), 1e-7, f"load · v {slope:.8g}, differences {numeric:.8g}"
+    )
+
+
+def tangent(make: Make) -> Measured:
+    """Check that `solver` solves with M + c K, K by differences of the internal load."""
+    body = _stirred(make)
+    assert isinstance(body, Deformable)
+    c, h = 1e-4, 1e-6
+    x = body.solver(body.q, c)(body.times_mass(body.u))
+    slope = (body.internal_load(body.q + h * x) - body.internal_load(body.q - h * x)) / (2 * h)
+    found = body.times_mass(x) + c * slope
+    return Measured(difference(found, body.times_mass(body.u)), 1e-7, "(M + c K) x differs from b")
+
+
+def conservation(make: Make) -> Measured:
+    """Check that ENERGY_MOMENTUM keeps the energy and both momenta over ten steps."""
+    body = _moving(make)
+    body.scheme = "ENERGY_MOMENTUM"
+    E, L = float(body.energy()), body.angular_momentum()
+    for _ in march(body, 5e-3, 10, every=10):
+        pass
+    change = abs(float(body.energy()) / E - 1)
+    return Measured(max(change, difference(body.angular_momentum(), L)), 1e-10, "energy or angular momentum")
+
+
+CHECKS: tuple[Callable[[Make], Measured | str], ...] = (
+    rigid_velocity,
+    momenta,
+    mass_matrix,
+    conjugacy,
+    free_flight,
+)
+DEFORMABLE: tuple[Callable[[Make], Measured | str], ...] = (
+    rigid_motions,
+    balance_of_moments,
+    energy,
+    tangent,
+    conservation,
+)

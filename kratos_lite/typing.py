@@ -1,0 +1,20 @@
+"""Names of the types that many modules use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""Numbers."""
+Complexes: TypeAlias = NDArray[np.complex128]
+"""Complex numbers."""
+Ints: TypeAlias = NDArray[np.int64]
+"""Rows, ids and counts."""
+Mask: TypeAlias = NDArray[np.bool_]
+"""Which of many."""
+Progress: TypeAlias = Callable[[str, float], None]
+"""Called with the phase and the share done, 0 … 1."""

@@ -1,0 +1,300 @@
+"""What is refused, and what is doubtful, with its figures."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.ale import Rotation, Translation
+from kratos_lite.ale.checks import rayleigh_speed
+from kratos_lite.ale.symmetry import leak
+from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.modal import critical_rates_beside
+from kratos_lite.errors import InputError, ModelError
+
+
+def spun(model, **options):
+    model.add(Rotation("z", **options))
+    return model.solve().report.warnings
+
+
+def test_a_box_is_no_body_of_revolution(wheels):
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2), origin=(-0.5, -0.5, 0)), wheels.steel)
+    with pytest.raises(ModelError, match=r"not one of revolution about the axis \[0.0, 0.0, 1.0\]: \d+% of"):
+        model.add(Rotation("z", rate=1.0))
+    assert model.motion is None
+
+
+@pytest.mark.parametrize("options", [{"axis": "x"}, {"center": (0.5, 0.0, 0.0)}])
+def test_the_wrong_axis(options, wheels):
+    with pytest.raises(ModelError, match="give the axis of the body and a point of it, center="):
+        wheels.disk("8N", 2, 32).add(Rotation(rate=1.0, **options))
+
+
+def test_a_wheel_that_stands_elsewhere(wheels):
+    model = wheels.disk("8N", 2, 48)
+    model.mesh.points[:] = model.mesh.points[:, [2, 0, 1]] + (5.0, -3.0, 8.0)
+    model.add(Rotation("x", rate=1.0, center=(0.0, -3.0, 8.0)))
+    assert leak(model.motion, model.mesh) < 0.06
+
+
+def test_polygonal_rim(wheels):
+    coarse = spun(wheels.disk("8N", 2, 16), rate=10.0)
+    assert any("of the velocity passes through the polygonal rim" in text for text in coarse)
+    assert not any("rim" in text for text in spun(wheels.disk("20N", 2, 24), rate=10.0))
+
+
+def test_rates_near_the_critical_one(wheels):
+    said = {rate: " ".join(spun(wheels.disk("20N", 2, 24), rate=rate)) for rate in (80.0, 92.0, 99.0, -99.0)}
+    assert "critical" not in said[80.0]
+    assert "the rate 92 rad/s is near the critical one, 98.21 rad/s on this mesh" in said[92.0]
+    assert "the rate 99 rad/s is above the critical one" in said[99.0]
+    assert "above" in said[-99.0]
+    free = wheels.disk("20N", 2, 24, hub="free")
+    free.add(Rotation("z", rate=87.0, stiffening=True))
+    (warning,) = free.transient().equations.warnings
+    assert "near the critical one, about 95.48 rad/s by wave speeds" in warning
+    assert rayleigh_speed(wheels.c_p, wheels.c_s) == pytest.approx(95.481345662, rel=1e-10)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [
+        (35.0, ""),
+        (41.0, "the rate 41 rad/s is near the critical one, 43.6 rad/s on this mesh"),
+        (-43.7, "the rate 43.7 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (1e6, "the rate 1e+06 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+        (64.0, "the rate 64 rad/s is above the critical one, 43.6 rad/s on this mesh"),
+    ],
+)
+def test_a_thick_wheel_bends_at_less_than_half_the_rate_of_waves(rate, words, damping, wheels):
+    mesh = kl.annulus(0.3, 1.0, 0.25, (3, 32, 1), "KinematicLinear3D20N")
+    model = kl.Model(mesh, wheels.steel)
+    model.fix("inner")
+    model.add(Rotation("z", rate=rate, damping=damping))
+    result = model.solve()
+    for warnings in (result.report.warnings, model.transient().equations.warnings):
+        said = [text for text in warnings if "critical" in text]
+        assert (len(said) == 1 and said[0].startswith(words)) if words else not said
+    assert (result.report.motion["margin"] < 0) == ("above" in words)
+
+
+def test_critical_rates_beside_a_rate_are_those_of_the_mesh(wheels):
+    for cells, element in (((1, 12, 1), "20N"), ((2, 24, 1), "20N"), ((1, 12, 1), "8N")):
+        model = wheels.disk(element, *cells[:2])
+        all_rates = kl.critical_rate(wheels_with(model, 50.0), 12)
+        widest = int(np.diff(all_rates).argmax())
+        low, high = all_rates[widest : widest + 2]
+        between = (low + high) / 2
+        model.motion = None
+        e = EquationsOfMotion(wheels_with(model, between), free=False)
+        assert critical_rates_beside(e, between) == pytest.approx((low, high), rel=1e-2)
+        assert critical_rates_beside(e, 0.5 * all_rates[0]) == (0.0, pytest.approx(all_rates[0], rel=1e-2))
+
+
+def wheels_with(model, rate):
+    model.add(Rotation("z", rate=rate))
+    return model
+
+
+@pytest.mark.parametrize(("ends", "share"), [("natural", 0.742), ("absorbing", 0.742), ("periodic", 0.9)])
+def test_windows_near_their_critical_speed(ends, share, wheels):
+    """With free surfaces it lies below c_s, and further below with free ends; in one dimension it is c_p."""
+    bedded = kl.Model(kl.box((10, 1, 1), (20, 1, 1), "KinematicLinear3D20N"), wheels.steel)
+    bedded.fix("z-")
+    bedded.add(Translation("x", rate=0.95 * share * wheels.c_s, ends=ends))
+    words = f"is near the critical one, {share * wheels.c_s:.4g}"[:-2]
+    for warnings in (bedded.transient().equations.warnings, bedded.solve().report.warnings):
+        assert sum(words in text for text in warnings) == 1
+    model = wheels.bar("8N", 10)
+    model.fix("x-", "x")
+    model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1.0, 0, 0)))
+    model.add(Translation("x", rate=0.95 * wheels.c_p, ends="natural"))
+    assert any("m/s is near the critical one, 192.6 m/s on" in t for t in model.solve().report.warnings)
+
+
+def test_free_rotor(wheels):
+    model = wheels.disk("20N", 2, 24, hub="free")
+    rim = model.mesh.nodes("inner")
+    x = model.mesh.points[rim]
+    model.fix(rim[np.abs(x[:, 1]) < 1e-9], "x")  # works along the radius alone
+    model.fix(rim[np.abs(x[:, 0]) < 1e-9], "y")
+    with pytest.raises(ModelError, match="rotat"):
+        spun(model, rate=5.0)
+    warned = "nothing holds the rotation about the axis"
+    assert not any(warned in text for text in spun(wheels.disk("20N", 2, 24), rate=5.0))
+
+
+def test_anisotropic_materials(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.assign(kl.Orthotropic3D(2e8, 1e8, 1e8, 0.2, 0.2, 0.2, 4e7, 4e7, 4e7, 7620.0))
+    said = spun(model, rate=5.0)
+    assert any("an anisotropic material is not axisymmetric" in text for text in said)
+
+
+def test_no_density():
+    mesh = kl.annulus(0.3, 1.0, 0.2, (2, 24, 1))
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+    model.fix("inner")
+    model.add(Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="density 0, but what moves needs mass"):
+        model.solve()
+
+
+@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 5, 6, 7, 8])
+@pytest.mark.parametrize(
+    ("other", "what"),
+    [(kl.Isotropic3D(210e6, 0.3, 3 * 7620.0), "density"), (kl.Isotropic3D(21e6, 0.3, 7620.0), "stiffness")],
+)
+def test_sectors_of_another_material_are_no_body_of_revolution(other, what, sectors, wheels):
+    model = wheels.disk("8N", 2, 60)
+    centers = np.mean(model.mesh.points[model.mesh.blocks[0].nodes], axis=1)
+    angle = np.arctan2(centers[:, 1], centers[:, 0]) % (2 * np.pi)
+    model.assign(other, np.flatnonzero(angle * sectors % (2 * np.pi) < np.pi))
+    with pytest.raises(
+        ModelError, match=rf"the {what} of the body is not spread evenly about its axis \(harmonic"
+    ):
+        spun(model, rate=5.0)
+
+
+def test_rings_of_another_material_are_one(wheels):
+    for element, cells in (("8N", (3, 12)), ("20N", (3, 16))):
+        model = wheels.disk(element, *cells)
+        centers = np.mean(model.mesh.points[model.mesh.blocks[0].nodes], axis=1)
+        ring = np.flatnonzero(np.hypot(centers[:, 0], centers[:, 1]) > 0.6)
+        model.assign(kl.Isotropic3D(21e6, 0.3, 3 * 7620.0), ring)
+        spun(model, rate=5.0)
+
+
+def test_a_window_must_be_alike_along_its_way(wheels):
+    tapered = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
+    tapered.fix("z-")
+    tapered.mesh.points[:, 1:] *= 1 + 0.03 * tapered.mesh.points[:, :1]
+    tapered.add(Translation("x", rate=5.0))
+    assert any("through the sides of the window" in text for text in tapered.solve().report.warnings)
+    cone = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
+    cone.mesh.points[:, 1:] *= 1 + 0.3 * cone.mesh.points[:, :1]
+    with pytest.raises(ModelError, match=r"not straight along the axis \[1\.0, 0\.0, 0\.0\]"):
+        cone.add(Translation("x", rate=5.0))
+    series = wheels.bar("8N", 10)
+    series.fix("x-", "x")
+    series.assign(kl.Isotropic3D(21e6, 0.3, 7620.0), np.arange(4))
+    series.add(Translation("x", rate=5.0))
+    with pytest.raises(ModelError, match="the stiffness of the body is not spread evenly along the window"):
+        series.solve()
+    layered = kl.Model(kl.box((10, 1, 1), (10, 1, 2)), wheels.steel)
+    layered.fix("z-")
+    low = layered.mesh.points[layered.mesh.blocks[0].nodes].mean(axis=1)[:, 2] < 0.5
+    layered.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
+    layered.add(Translation("x", rate=5.0))
+    layered.solve()
+    graded = kl.Model(kl.box((10, 1, 1), (8, 1, 2)), wheels.steel)
+    graded.mesh.points[:, 0] = (graded.mesh.points[:, 0] / 10) ** 3 * 10
+    graded.fix("z-")
+    low = graded.mesh.points[graded.mesh.blocks[0].nodes].mean(axis=1)[:, 2] < 0.5
+    graded.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
+    graded.add(Translation("x", rate=5.0))
+    graded.solve()
+
+
+def test_rayleigh_damping_by_stiffness_is_doubtful(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.add(Rotation("z", rate=1.0))
+    (warning,) = model.transient(rayleigh=(0.0, 1e-4)).equations.warnings
+    assert warning.startswith("Rayleigh's β K u' damps in fixed axes")
+    assert not model.transient(rayleigh=(1.0, 0.0)).equations.warnings
+
+
+def test_one_motion_to_a_model(wheels):
+    model = wheels.disk("20N", 2, 24)
+    model.add(Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="has a motion already"):
+        model.add(Rotation("z", rate=2.0))
+
+
+@pytest.mark.parametrize("end", ["x-", "x+"])
+def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels):
+    found = []
+    for before in (True, False):
+        model = wheels.bar("8N", 4)
+        if before:
+            model.fix(end, "x", 1e-3)
+        model.add(Translation("x", rate=1.0, ends="periodic"))
+        if not before:
+            model.fix(end, "x", 1e-3)
+        model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1e3, 0.0, 0.0)))
+        found.append(model.solve().u)
+        for side in ("x-", "x+"):
+            np.testing.assert_array_equal(found[-1][model.mesh.nodes(side), 0], 1e-3)
+    np.testing.assert_array_equal(*found)
+    pulled = 4e3 * 10 / (2 * wheels.steel.C[0, 0])
+    assert found[0][:, 0].max() == pytest.approx(1e-3 + pulled, rel=1e-5)
+
+
+def test_joined_ends_move_by_one_function(wheels):
+    model = wheels.bar("8N", 4)
+    model.add(Translation("x", rate=1.0, ends="periodic"))
+    way = kl.TimeSeries([0.0, 1.0], [0.0, 1e-3])
+    model.fix("x-", "x", way)
+    *_, one = model.transient().march(1e-2, 5)
+    model.fix("x+", "x", way)
+    *_, both = model.transient().march(1e-2, 5)
+    np.testing.assert_allclose(both.u, one.u, atol=1e-16)
+    for other in (0.0, kl.TimeSeries([0.0, 1.0], [0.0, 2e-3])):
+        model.fix("x+", "x", other, override=True)
+        with pytest.raises(ModelError, match="are joined, but moved otherwise"):
+            model.transient()
+
+
+def test_joined_ends_cannot_be_held_in_two_places(wheels):
+    model = wheels.bar("8N", 4)
+    model.add(Translation("x", rate=1.0, ends="periodic"))
+    model.fix("x-", "x", 0.0)
+    model.fix("x+", "x", 1e-3)
+    with pytest.raises(ModelError, match=r"are joined, but prescribed as 0\.001 m and 0 m"):
+        model.solve()
+
+
+def test_periodic_ends_need_opposite_nodes(wheels):
+    model = wheels.bar("8N", 4)
+    end = model.mesh.nodes("x+")
+    model.mesh.points[end[0], 1] += 0.2
+    with pytest.raises(ModelError, match="nodes that lie opposite one another; there are 4 and 4"):
+        model.add(Translation("x", rate=1.0, ends="periodic"))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Rotation("w"), "an axis is 'x', 'y', 'z' or a vector; got 'w'"),
+        (lambda: Rotation((0, 0, 0)), "not all 0"),
+        (lambda: Rotation((1, 0)), "three components"),
+        (lambda: Rotation("z", rate=np.nan), "rate"),
+        (lambda: Rotation("z", rate=[1, 2]), "a rate must be a number"),
+        (lambda: Rotation("z", center=(1, 2)), r"center of a rotation must have shape \(3,\)"),
+        (lambda: Rotation("z", stiffening="no"), "stiffening must be True or False; got 'no'"),
+        (lambda: Rotation("z", skew=1), "skew must be True or False; got 1"),
+        (lambda: Rotation("z", damping=(1, 2)), "a damping must be one number"),
+        (lambda: Rotation("z", damping=-1.0), "a damping must be one number in 1/s, ≥ 0; got -1.0"),
+        (lambda: Translation("x", ends="open"), "ends must be one of absorbing, periodic, fixed, natural"),
+    ],
+)
+def test_arguments(make, text):
+    with pytest.raises(InputError, match=text):
+        make()
+
+
+def test_density_must_be_axisymmetric():
+    mesh = kl.annulus(inner=0.3, outer=1.0, width=0.2, cells=(2, 12, 1), element="KinematicLinear3D8N")
+    light, heavy = (kl.Isotropic3D(E=210e6, nu=0.3, density=rho) for rho in (7000.0, 8000.0))
+    model = kl.Model(mesh, light)
+    model.fix("inner")
+    middles = np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
+    ring = np.hypot(middles[:, 0], middles[:, 1]) > 0.65
+    model.assign(heavy, np.flatnonzero(ring))
+    model.add(kl.ale.Rotation("z", rate=10.0))
+    model.solve()  # a heavy ring is one of revolution
+    model.assign(light)
+    model.assign(heavy, np.flatnonzero(middles[:, 0] > 0))
+    with pytest.raises(kl.ModelError, match="not spread evenly about its axis"):
+        model.solve()

@@ -1,0 +1,132 @@
+"""Loads that a function of the time gives, and Bossak's method."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.model.loads import Load
+
+STEEL = kl.Isotropic3D(E=2e8, nu=0.3, density=7800.0)
+
+
+def beam(*loads):
+    model = kl.Model(kl.box((4.0, 0.4, 0.4), cells=(8, 1, 1)), STEEL)
+    model.fix("x-")
+    for load in loads:
+        model.add(load)
+    return model
+
+
+def end(model, **options):
+    *_, last = model.transient(**options).march(dt=1e-3, steps=40)
+    return last
+
+
+@pytest.mark.parametrize("scheme", [kl.newmark(), kl.hht(-0.1), kl.generalized_alpha(0.5), kl.bossak()])
+def test_a_timed_load_is_the_varying_one_that_it_repeats(scheme):
+    ramp = kl.TimeSeries([0.0, 0.03], [0.0, 2.0])
+    timed = kl.Timed(lambda t: kl.Traction("x+", (0.0, 0.0, 1e4 * ramp(t))))
+    found = end(beam(timed), scheme=scheme)
+    expected = end(beam(kl.Varying(kl.Traction("x+", (0.0, 0.0, 1e4)), ramp)), scheme=scheme)
+    for name in ("u", "v", "a", "reactions"):
+        one, other = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
+class Counted(Load):
+    """A load that counts how often its forces are asked for."""
+
+    def __init__(self, load):
+        self.load, self.count = load, 0
+
+    def forces(self, mesh, groups):
+        self.count += 1
+        return self.load.forces(mesh, groups)
+
+
+def test_forces_are_kept_while_the_load_is_the_same():
+    first, second = (Counted(kl.Gravity((0.0, 0.0, g))) for g in (-9.81, 5.0))
+    last = end(beam(kl.Timed(lambda t: first if t < 0.02 else second)))
+    assert (first.count, second.count) == (1, 1)
+    assert np.abs(last.u).max() > 0
+    times = []
+    end(beam(kl.Timed(times.append)))
+    assert len(times) == len(set(times)) == 41  # once for each time
+
+
+def test_a_load_that_comes_late_finds_all_at_rest_before():
+    push = kl.PointLoad("x+", (0.0, 0.0, 10.0))
+    transient = beam(kl.Timed(lambda t: push if t > 0.0105 else None)).transient()
+    sizes = [np.abs(moment.u).max() for moment in transient.march(dt=1e-3, steps=20)]
+    assert max(sizes[:10]) == 0 < min(sizes[10:])
+
+
+def test_the_impulse_of_a_moving_load_stays_whatever_its_way():
+    """Free body: momentum is the force times the time."""
+    rows = np.flatnonzero(np.isclose(beam().mesh.points[:, 1:], 0.0).all(axis=1))
+
+    def load(t):
+        return kl.PointLoad(rows[[min(int(t / 5e-3), 8)]], (0.0, 0.0, -1e3))
+
+    model = kl.Model(beam().mesh, STEEL)
+    model.add(kl.Timed(load))
+    transient = model.transient()
+    *_, last = transient.march(dt=1e-3, steps=40)
+    e = transient.equations
+    momentum = e.times_mass(e.system.local(last.v)).reshape(-1, 3).sum(axis=0)
+    assert momentum == pytest.approx([0.0, 0.0, -40.0], abs=1e-9)
+
+
+def test_at_rest_it_is_that_of_the_time_0():
+    timed = kl.Timed(lambda t: kl.Traction("x+", (0.0, 0.0, 1e4 * (1 + t))))
+    found, expected = (beam(load).solve().u for load in (timed, kl.Traction("x+", (0.0, 0.0, 1e4))))
+    assert np.array_equal(found, expected)
+    assert not beam(kl.Timed(lambda t: None)).solve().u.any()
+
+
+@pytest.mark.parametrize("wrong", [3.0, kl.Traction("x+", (0, 0, 1.0)), None])
+def test_what_is_no_function_is_refused(wrong):
+    with pytest.raises(kl.InputError, match="a function of the time that returns a load"):
+        kl.Timed(wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong", [3.0, kl.Varying(kl.Gravity((0, 0, 1.0)), 1.0), kl.Timed(lambda t: None), [None]]
+)
+def test_what_is_no_load_is_refused(wrong):
+    with pytest.raises(kl.InputError, match=r"the load at t = 0 s must be a PointLoad or another, or None"):
+        beam(kl.Timed(lambda t: wrong)).transient()
+    with pytest.raises(kl.InputError, match="a load such as Gravity or Traction is needed"):
+        kl.Varying(kl.Timed(lambda t: None), 1.0)
+
+
+# ---- Bossak ----------------------------------------------------------------------------------------
+
+
+def test_bossak_with_0_is_the_trapezoidal_rule():
+    load = kl.Traction("x+", (0.0, 0.0, 1e4))
+    found, expected = end(beam(load), scheme=kl.bossak(0.0)), end(beam(load))
+    assert np.array_equal(found.u, expected.u)
+
+
+def test_bossak_has_order_2():
+    """A free oscillation of a cube on rollers, against its exact period."""
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
+    model.fix("z-")
+    model.fix(range(8), "xy")
+    omega = model.modes(1)[0][0]
+    u0 = np.zeros((8, 3))
+    u0[model.mesh.nodes("z+"), 2] = 1e-3
+    errors = []
+    for steps in (100, 200, 400):
+        transient = model.transient(scheme=kl.bossak(-0.2), displacement=u0)
+        *_, last = transient.march(dt=5.0 / omega / steps, steps=steps)
+        errors.append(abs(last.u[:, 2].max() - 1e-3 * np.cos(5.0)))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx([2.0, 2.0], abs=0.1)
+
+
+@pytest.mark.parametrize("alpha", [-0.4, 0.1, np.nan, "a", [1]])
+def test_a_wrong_number_of_bossak_is_refused(alpha):
+    with pytest.raises(kl.InputError, match="the α of Bossak"):
+        kl.bossak(alpha)

@@ -1,0 +1,421 @@
+"""Transients of models: orders, dissipation, energy, supports that move, restart, and what is refused."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.ale import Rotation
+from kratos_lite.analysis import CentralDifference, Moment, generalized_alpha, hht, newmark
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.model.loads import Varying
+from kratos_lite.time_series import TimeSeries
+
+E, RHO, LENGTH = 1e6, 1000.0, 1.0
+SCHEMES = {
+    "trapezoidal": newmark(),
+    "hht": hht(-0.1),
+    "alpha": generalized_alpha(0.6),
+    "central": CentralDifference(),
+}
+
+
+def bar(n: int = 4, density: float = RHO) -> kl.Model:
+    """Return a bar of unit section along z, clamped below, that strains along z alone."""
+    mesh = kl.box((1, 1, LENGTH), (1, 1, n))
+    model = kl.Model(mesh, kl.Isotropic3D(E=E, nu=0.0, density=density))
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
+    model.fix("z-", "z")
+    return model
+
+
+def wave(n: int, lumped: bool) -> float:
+    """Return the lowest frequency in rad/s of n equal cells: lumped or consistent mass."""
+    h, c = LENGTH / n, np.sqrt(E / RHO)
+    angle = np.pi / (2 * n)
+    if lumped:
+        return float(2 * c / h * np.sin(angle / 2))
+    return float(c / h * np.sqrt(6 * (1 - np.cos(angle)) / (2 + np.cos(angle))))
+
+
+def shape(model: kl.Model) -> np.ndarray:
+    out = np.zeros_like(model.mesh.points)
+    out[:, 2] = np.sin(np.pi * model.mesh.points[:, 2] / (2 * LENGTH))
+    return out
+
+
+def last(march, dt: float, steps: int) -> Moment:
+    *_, moment = march.march(dt, steps, every=steps)
+    return moment
+
+
+# ---- one frequency: a closed form --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_order_two(name):
+    """The lowest mode alone is cos ωt and sin ωt; halved steps give a quarter of the error."""
+    model, scheme = bar(), SCHEMES[name]
+    omega, mode = wave(4, lumped=name == "central"), shape(bar())
+    errors = []
+    for steps in (64, 128, 256):
+        march = model.transient(scheme=scheme, displacement=mode, velocity=0.5 * omega * mode)
+        end = last(march, 1.3 / omega / steps * 4, steps)
+        t = omega * end.time
+        u = (np.cos(t) + 0.5 * np.sin(t)) * mode
+        v = omega * (-np.sin(t) + 0.5 * np.cos(t)) * mode
+        errors.append(np.hypot(np.abs(end.u - u).max(), np.abs(end.v - v).max() / omega))
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert (np.abs(rates - 2) < 0.15).all()
+    assert errors[-1] < 2e-3
+
+
+@pytest.mark.parametrize("share", [0.3, 3.0])
+def test_trapezoidal_rule_step_by_step(share):
+    """A mode is turned by 2 atan(ωh/2) each step, at any step, without loss."""
+    model, omega = bar(), wave(4, lumped=False)
+    mode = shape(model)
+    march = model.transient(displacement=mode)
+    for k, moment in enumerate(march.march(share / omega, 10), start=1):
+        turned = np.cos(2 * k * np.arctan(share / 2))
+        np.testing.assert_allclose(moment.u, turned * mode, atol=1e-12)
+
+
+def amplification(scheme, omega: float, h: float) -> np.ndarray:
+    """Return the spectral radius of a step of one mode, from three steps of a bar of one cell."""
+    model = bar(1)
+    mode = shape(model)
+    columns = []
+    for start in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):
+        march = model.transient(scheme=scheme)
+        march.u, march.v, march.a = (
+            march.equations.system.local(x * s).copy()
+            for x, s in zip((mode, mode * omega, mode * omega**2), start, strict=True)
+        )
+        end = last(march, h, 1)
+        top = np.argmax(mode[:, 2])
+        columns.append([end.u[top, 2], end.v[top, 2] / omega, end.a[top, 2] / omega**2])
+    return np.abs(np.linalg.eigvals(np.array(columns).T)).max()
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 1.0])
+def test_the_highest_frequencies_shrink_by_rho_inf(rho):
+    omega = wave(1, lumped=False)
+    scheme = generalized_alpha(rho)
+    assert amplification(scheme, omega, 1e5 / omega) == pytest.approx(rho, abs=2e-2 if rho == 0 else 1e-3)
+    assert amplification(scheme, omega, 1e-2 / omega) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_spectral_radii_of_hht_and_newmark():
+    """The trapezoidal rule loses nothing; HHT's limit for ωh → ∞ with α = -0.1 is 0.9 / 1.1."""
+    omega = wave(1, lumped=False)
+    for h in (0.1, 1.0, 10.0, 100.0):
+        assert amplification(newmark(), omega, h / omega) == pytest.approx(1.0, abs=2e-6)
+        assert amplification(hht(-0.3), omega, h / omega) < 1.0
+        assert amplification(newmark(0.3025, 0.6), omega, h / omega) < 1.0
+    assert amplification(hht(-0.1), omega, 1e5 / omega) == pytest.approx(0.9 / 1.1, rel=1e-2)
+    assert amplification(hht(0.0), omega, 3.0 / omega) == pytest.approx(1.0, abs=2e-6)
+
+
+def test_central_difference_turns_by_its_own_angle():
+    """cos(θ) = 1 - (ωh)²/2 each step."""
+    model, omega = bar(), wave(4, lumped=True)
+    mode, h = shape(bar()), 0.2 / wave(4, lumped=True)
+    march = model.transient(scheme=CentralDifference(), displacement=mode)
+    theta = np.arccos(1 - (omega * h) ** 2 / 2)
+    for k, moment in enumerate(march.march(h, 20), start=1):
+        np.testing.assert_allclose(moment.u, np.cos(k * theta) * mode, atol=1e-12)
+
+
+def test_critical_step():
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    model.fix("z-")
+    omega = model.modes(54, lumped=True)[0].max()
+    march = model.transient(scheme=CentralDifference())
+    with pytest.raises(InputError, match=r"not stable with steps of .* critical step is [\d.e-]+ s"):
+        march.march(2 / omega * 1.3, 10)
+    v = np.random.default_rng(0).standard_normal(model.mesh.points.shape)
+    safe = model.transient(scheme=CentralDifference(), velocity=v)
+    assert np.abs(last(safe, 0.5 / omega, 2000).u).max() < 1.0
+
+
+# ---- energy and damping --------------------------------------------------------------------------------
+
+
+def test_energy_of_the_trapezoidal_rule():
+    model = kl.Model(kl.box((1, 1, 2), (2, 2, 4)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    model.fix("z-")
+    x, y, z = model.mesh.points.T
+    march = model.transient(velocity=np.column_stack([z * z, x * z, y * z]))
+    start = march.energy()
+    energies = [march.energy() for _ in march.march(2.0**-9, 1000, every=100)]
+    assert np.abs(np.array(energies) / start - 1).max() < 1e-12
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(4.0, 0.0), (0.0, 2e-3), (2.0, 1e-3)])
+@pytest.mark.parametrize("name", ["trapezoidal", "central"])
+def test_rayleigh_damping(alpha, beta, name):
+    """A mode fades as exp(-ξωt), ξ = α/(2ω) + βω/2, and swings with ω sqrt(1 - ξ²)."""
+    model = bar()
+    omega, mode = wave(4, lumped=name == "central"), shape(model)
+    xi = alpha / (2 * omega) + beta * omega / 2
+    damped = omega * np.sqrt(1 - xi * xi)
+    march = model.transient(
+        scheme=SCHEMES[name], displacement=mode, velocity=-xi * omega * mode, rayleigh=(alpha, beta)
+    )
+    period = 2 * np.pi / damped
+    n = 400 if name == "trapezoidal" else 2000
+    end = last(march, 2 * period / n, n)
+    exact = np.exp(-xi * omega * 2 * period)
+    np.testing.assert_allclose(
+        end.u, exact * mode, atol=2e-3 * exact if name == "trapezoidal" else 1e-2 * exact
+    )
+
+
+# ---- loads and supports in time ------------------------------------------------------------------------
+
+
+def pulled(factor) -> kl.Model:
+    model = bar(1)
+    load = kl.Traction("z+", (0.0, 0.0, 1e3))
+    model.add(load if factor is None else Varying(load, factor))
+    return model
+
+
+def test_load_at_once():
+    """A load put on at rest swings about the static answer: u = (F / k)(1 - cos ωt) of one cell."""
+    model, omega = pulled(None), wave(1, lumped=False)
+    for moment in model.transient().march(0.01 / omega, 600, every=60):
+        exact = 1e3 / E * (1 - np.cos(omega * moment.time))
+        assert moment.u[:, 2].max() == pytest.approx(exact, abs=2e-7)
+
+
+def test_harmonic_load():
+    """u = F/(k - m Ω²) (sin Ωt - Ω/ω sin ωt)."""
+    omega = wave(1, lumped=False)
+    drive = 0.6 * omega
+    model = pulled(lambda t: np.sin(drive * t))
+    end = last(model.transient(), 0.005 / omega, 1500)
+    t = end.time
+    exact = 1e3 / E / (1 - 0.36) * (np.sin(drive * t) - 0.6 * np.sin(omega * t))
+    assert end.u[model.mesh.nodes("z+"), 2] == pytest.approx(exact, abs=3e-8)
+
+
+def test_ramp_by_a_table():
+    """A load t / T up to T: u = (F/k)(t/T - sin(ωt)/(ωT)); statics take it at the time 0."""
+    omega = wave(1, lumped=False)
+    T = 10 / omega
+    model = pulled(TimeSeries([0.0, T], [0.0, 1.0]))
+    end = last(model.transient(), T / 1000, 1000)
+    assert end.u[:, 2].max() == pytest.approx(1e-3 * (1 - np.sin(10.0) / 10), abs=1e-7)
+    shifted = pulled(TimeSeries([0.0, T], [0.25, 1.0]))
+    assert shifted.solve().u[:, 2].max() == pytest.approx(0.25e-3, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_support_that_moves(name):
+    """A base that moves by s(t): the bar of one cell answers m u'' + k u = k s - (m / 2) s''."""
+    lumped = name == "central"
+    omega = wave(1, lumped)
+    drive, amplitude = 0.5 * omega, 1e-3
+    model = kl.Model(kl.box((1, 1, LENGTH)), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
+    model.fix("z-", "z", lambda t: amplitude * np.sin(drive * t))
+    h = 0.004 / omega
+    end = last(model.transient(scheme=SCHEMES[name]), h, 2000)
+    t, m = end.time, RHO / (2 if lumped else 3)
+    push = E + (0 if lumped else RHO / 6 * drive**2)
+    A = amplitude * push / (E - m * drive**2)
+    exact = A * (np.sin(drive * t) - drive / omega * np.sin(omega * t))
+    assert end.u[:, 2].max() == pytest.approx(max(exact, amplitude * np.sin(drive * t)), abs=2e-7)
+    bottom = model.mesh.nodes("z-")
+    np.testing.assert_allclose(end.u[bottom, 2], amplitude * np.sin(drive * t), atol=1e-15)
+    velocity = amplitude * drive * np.cos(drive * t)
+    np.testing.assert_allclose(end.v[bottom, 2], velocity, atol=2e-2 * amplitude * drive)
+
+
+def test_all_that_is_held_moves_as_one():
+    """A body carried by z(t) = g t²/2 at all its nodes has the reactions m g."""
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "z", lambda t: 0.5 * 9.81 * t * t)
+    *_, end = model.transient(scheme=generalized_alpha(0.5)).march(1e-3, 400)
+    assert end.u[:, 2] == pytest.approx(0.5 * 9.81 * end.time**2)
+    assert end.reactions[:, 2].sum() == pytest.approx(9.81 * RHO, rel=2e-2)
+
+
+def test_free_fall():
+    """No support at all: z = -g t²/2, exact for the trapezoidal rule."""
+    model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    model.add(kl.Gravity((0, 0, -9.81)))
+    end = last(model.transient(), 1e-2, 50)
+    np.testing.assert_allclose(end.u, np.full_like(end.u, 1.0) * (0, 0, -0.5 * 9.81 * 0.25), atol=1e-9)
+    np.testing.assert_allclose(end.v[:, 2], -9.81 * 0.5, rtol=1e-9)
+    assert not end.reactions.any()
+
+
+def test_constraints():
+    """Two bars whose tops are tied are one of the mass and stiffness of both."""
+    alone = pulled(None)
+    mesh = kl.box((2, 1, LENGTH), (2, 1, 1))
+    model = kl.Model(mesh, kl.Isotropic3D(E=E, nu=0.0, density=RHO))
+    model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
+    model.fix("z-", "z")
+    first, *others = mesh.nodes("z+").tolist()
+    for node in others:
+        model.constrain((node, "z"), {(first, "z"): 1.0})
+    model.add(kl.PointLoad(np.array([first]), (0, 0, 2e3)))
+    for a, b in zip(alone.transient().march(1e-3, 50), model.transient().march(1e-3, 50), strict=True):
+        np.testing.assert_allclose(b.u[mesh.nodes("z+"), 2], a.u[:, 2].max(), atol=1e-14)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_reactions_balance_load_and_inertia(tied):
+    model = bar(4)
+    if tied:  # a point of the top follows one of the middle
+        middle, top = (model.mesh.nodes(lambda X, z=z: X[:, 2] == z)[0] for z in (LENGTH / 2, LENGTH))
+        model.constrain((top, "z"), {(middle, "z"): 1.0})
+    model.add(kl.Gravity((0, 0, -9.81)))
+    e = model.transient()
+    for moment in e.march(1e-3, 20):
+        inertia = e.equations.mass.times(e.a).reshape(-1, 3).sum(axis=0)
+        total = moment.reactions.sum(axis=0) + RHO * np.array([0, 0, -9.81])
+        np.testing.assert_allclose(total, inertia, atol=1e-8 * RHO)
+
+
+def test_first_acceleration():
+    model = bar(3)
+    model.add(kl.Gravity((0, 0, -9.81)))
+    start = model.transient()
+    held = model.supports.fixed.ravel()[: len(start.a)]
+    assert not start.a[held].any()
+    residual = start.equations.times_mass(start.a) - start.equations.load(0.0)
+    assert np.abs(residual[~held]).max() < 1e-9
+
+
+# ---- marches that go on --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_restart_is_the_same_bit_by_bit(name, tmp_path):
+    def made():
+        model = bar(3)
+        model.add(Varying(kl.Traction("z+", (0, 0, 1e3)), lambda t: np.sin(40 * t)))
+        model.fix("z-", "z", lambda t: 1e-4 * np.sin(30 * t), override=True)
+        return model.transient(scheme=SCHEMES[name], rayleigh=(1.0, 1e-4))
+
+    whole = last(made(), 1e-3, 60)
+    first = last(made(), 1e-3, 25)
+    first.save(tmp_path / "moment.npz")
+    again = made()
+    again.put(Moment.load(tmp_path / "moment.npz"))
+    second = last(again, 1e-3, 35)
+    for field in ("u", "v", "a", "reactions"):
+        assert (getattr(second, field) == getattr(whole, field)).all()
+    assert (second.time, second.step) == (whole.time, 60)
+
+
+def test_moments_and_the_end():
+    seen: list[float] = []
+    model = pulled(None)
+    march = model.transient(progress=lambda phase, share: seen.append(share) if phase == "march" else None)
+    moments = list(march.march(1e-3, 10, every=4))
+    assert [m.step for m in moments] == [4, 8, 10]
+    assert seen == [0.4, 0.8, 1.0]
+    stopped = list(pulled(None).transient().march(1e-3, 100, until=lambda m: m.time > 0.0045))
+    assert stopped[-1].step == 5
+
+
+def test_lumped_mass_is_another_frequency():
+    mode = shape(bar())
+    for lumped in (False, True):
+        omega = wave(4, lumped)
+        end = last(bar().transient(displacement=mode, lumped=lumped), 2 * np.pi / omega / 1000, 1000)
+        np.testing.assert_allclose(end.u, mode, atol=1e-4)
+
+
+# ---- what is refused -------------------------------------------------------------------------------------
+
+
+def test_no_density():
+    with pytest.raises(ModelError, match="has density 0, but what moves needs mass"):
+        bar(density=0.0).transient()
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"scheme": "newmark"}, "a scheme such as newmark"),
+        ({"displacement": np.zeros((3, 3))}, r"initial displacement needs shape \(20, 3\); got \(3, 3\)"),
+        ({"velocity": np.full((20, 3), np.nan)}, "initial velocity"),
+        ({"rayleigh": (-1.0, 0.0)}, "Rayleigh damping is α ≥ 0"),
+        ({"rayleigh": (1.0,)}, "Rayleigh damping is α ≥ 0"),
+        ({"lumped": "no"}, "lumped must be True or False; got 'no'"),
+    ],
+)
+def test_wrong_options(options, text):
+    with pytest.raises(InputError, match=text):
+        bar().transient(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"dt": 0.0, "steps": 1}, "seconds > 0; got 0.0"),
+        ({"dt": np.nan, "steps": 1}, "a step"),
+        ({"dt": 1e-3, "steps": 0}, "steps must be a whole number ≥ 1; got 0"),
+        ({"dt": 1e-3, "steps": 2.5}, "steps must be a whole number"),
+        ({"dt": 1e-3, "steps": 2, "every": 0}, "every must be a whole number"),
+        ({"dt": 1e-300, "steps": 2}, "a step of 1e-300 s is too short to compute with"),
+        ({"dt": "1 ms", "steps": 2}, "a step must be made of real numbers; got '1 ms'"),
+    ],
+)
+def test_wrong_marches(options, text):
+    with pytest.raises(InputError, match=text):
+        bar().transient().march(**options)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: newmark(0.0, 0.5),
+        lambda: newmark(0.2, 0.5),
+        lambda: newmark(0.25, 0.4),
+        lambda: newmark("a"),
+        lambda: newmark(0.25, [0.5]),
+        lambda: hht(0.1),
+        lambda: hht(None),
+        lambda: hht(np.nan),
+        lambda: generalized_alpha("0.8"),
+    ],
+)
+def test_wrong_schemes(make):
+    with pytest.raises(InputError, match=r"Newmark|HHT|generalized-α"):
+        make()
+
+
+def test_rho_inf_out_of_range():
+    with pytest.raises(InputError, match=r"ρ∞ of the generalized-α method lies in 0 … 1; got 1\.5"):
+        generalized_alpha(1.5)
+
+
+def test_central_differences_take_neither_motion_nor_constraints():
+    wheel = kl.Model(kl.annulus(0.3, 1.0, 0.2, (1, 24, 1)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
+    wheel.add(Rotation("z", rate=1.0))
+    with pytest.raises(ModelError, match="central differences do not take a motion"):
+        wheel.transient(scheme=CentralDifference())
+    tied = bar()
+    top = tied.mesh.nodes("z+").tolist()
+    tied.constrain((top[1], "z"), {(top[0], "z"): 1.0})
+    with pytest.raises(ModelError, match="central differences do not take constraints"):
+        tied.transient(scheme=CentralDifference())
+
+
+def test_files_that_are_no_moments(tmp_path):
+    with pytest.raises(InputError, match="there is no such file"):
+        Moment.load(tmp_path / "none.npz")
+    (tmp_path / "text.npz").write_text("no moment")
+    with pytest.raises(InputError, match=r"not a moment that Moment\.save wrote"):
+        Moment.load(tmp_path / "text.npz")
+    other = bar(2).transient().moment()
+    with pytest.raises(InputError, match="u of a moment needs shape"):
+        bar(4).transient().put(other)

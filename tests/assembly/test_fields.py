@@ -1,0 +1,387 @@
+"""Fields at Gauss points: the compiled way and the element's own methods give the same."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.assembly import fields
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements import ELEMENTS, KinematicLinear3D4N, KinematicLinear3D8N, KinematicLinear3D20N
+from kratos_lite.errors import MeshError
+from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.model import checks
+from kratos_lite.native import kernels, threads
+from kratos_lite.quadrature import hexahedron
+
+NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+WOOD = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.7e9, 450.0)
+SOIL = Isotropic3D(210e6, 0.3, 7620.0)
+compiled = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
+
+
+@pytest.fixture
+def numpy_only(monkeypatch):
+    """Leave the kernels aside from the moment that the returned function is called."""
+    return lambda: monkeypatch.setattr(fields, "kernels", lambda name: None)
+
+
+def distorted(name, cells=(3, 2, 2)):
+    """Return a box of elements whose nodes are moved by a tenth of a cell at most."""
+    mesh = kl.box(size=(3.0, 2.0, 2.0), cells=cells, element=name)
+    shift = np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
+    mesh.points += shift * (3.0 / cells[0])
+    return mesh
+
+
+def joined(*meshes):
+    """Return one mesh of several, with their nodes kept apart."""
+    points, blocks, rows, ids = [], [], 0, 1
+    for mesh in meshes:
+        points.append(mesh.points)
+        for b in mesh.blocks:
+            at = np.arange(ids, ids + len(b))
+            blocks.append(Block(b.name, b.nodes + np.int32(rows), at, b.properties, b.shape))
+            ids += len(b)
+        rows += len(mesh.points)
+    return Mesh(np.vstack(points), blocks)
+
+
+def strained(mesh, seed=3):
+    """Return groups with two materials and prestress, and displacements of a size of 1e-3."""
+    rng = np.random.default_rng(seed)
+    model = kl.Model(mesh, SOIL)
+    model.assign(WOOD, np.arange(0, mesh.n_elements, 3))
+    model.add_prestress(rng.standard_normal((mesh.n_elements, 6)) * 1e6)
+    return model.element_groups(), 1e-3 * rng.standard_normal(mesh.points.shape)
+
+
+def everything(mesh):
+    """Return all that the module computes of a mesh, by name."""
+    P, (groups, u) = mesh.points, strained(mesh)
+    found = {f"volumes {i}": fields.volumes(P, b) for i, b in enumerate(groups)}
+    found |= {f"stress {i}": fields.at_gauss(P, b, u) for i, b in enumerate(groups)}
+    found |= {f"strain {i}": fields.at_gauss(P, b, u, stress=False) for i, b in enumerate(groups)}
+    found["internal load"] = fields.internal_load(P, groups, u)
+    for what in (True, False):
+        found[f"means {what}"], found[f"nodal {what}"] = fields.averages(
+            P, groups, u, mesh.n_elements, stress=what
+        )
+    energy, mises, row = fields.totals(P, groups, u)
+    found |= {"energy": np.array(energy), "mises": np.array(mises), "row": np.array(row)}
+    some = np.arange(1, mesh.n_elements, 2)
+    for label, force in (("constant", (1.0, -2.0, 3.0)), ("nodal", u)):
+        found[f"{label} force"] = kl.BodyForce(force).forces(mesh, groups)
+        found[f"{label} force of some"] = kl.BodyForce(force, some).forces(mesh, groups)
+    found["weight"] = kl.Gravity((0, 0, -9.81)).forces(mesh, groups)
+    found["lumped mass"] = fields.lumped_mass(P, groups)
+    return found
+
+
+def assert_close(found, wanted):
+    assert found.keys() == wanted.keys()
+    for name, value in wanted.items():
+        np.testing.assert_allclose(found[name], value, rtol=0, atol=1e-11 * np.abs(value).max(), err_msg=name)
+
+
+@compiled
+@pytest.mark.parametrize("name", NAMES)
+def test_kernels_give_what_the_elements_own_methods_give(name, numpy_only):
+    mesh = distorted(name)
+    found = everything(mesh)
+    numpy_only()
+    assert_close(found, everything(mesh))
+
+
+@compiled
+def test_mixed_meshes_give_the_same(numpy_only):
+    mesh = joined(*(distorted(name) for name in NAMES))
+    found = everything(mesh)
+    numpy_only()
+    assert_close(found, everything(mesh))
+
+
+@compiled
+def test_results_do_not_depend_on_the_number_of_threads():
+    mesh, module = distorted("KinematicLinear3D4N", (14, 14, 14)), kernels("gauss")
+    assert mesh.n_elements > 16384  # more than are added together
+    results = []
+    for count in (1, 2, 3, 5):
+        module.set_threads(count)
+        results.append(everything(mesh))
+    module.set_threads(threads())
+    for other in results[1:]:
+        for name, value in results[0].items():
+            np.testing.assert_array_equal(other[name], value, err_msg=name)
+
+
+SCRIPT = """
+import json, numpy as np, kratos_lite as kl
+model = kl.Model(kl.box(cells=(3, 3, 3), element="KinematicLinear3D10N"), kl.Isotropic3D(1e9, 0.3, 2000.0))
+model.mesh.points += 0.02 * np.sin(9 * model.mesh.points[:, [1, 2, 0]])
+model.fix("z-")
+model.add(kl.Gravity((1.0, 2.0, -9.81)))
+result = model.solve()
+print(json.dumps([*result.totals(), *result.stress("node").sum(axis=0), *result.stress("element")[5]]))
+"""
+
+
+@compiled
+@pytest.mark.parametrize(
+    "variable", ["KRATOS_LITE_ISA=base", "KRATOS_LITE_ISA=avx2", "KRATOS_LITE_KERNELS=numpy"]
+)
+def test_other_instruction_sets_and_numpy_give_the_same_solution(variable):
+    name, value = variable.split("=")
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, env=os.environ | more
+        )
+        for more in ({}, {name: value})
+    ]
+    best, other = (np.array(json.loads(run.stdout)) for run in runs)
+    np.testing.assert_allclose(other, best, rtol=1e-9, atol=1e-9 * np.abs(best).max())
+
+
+# ---- who is computed by the kernels ----------------------------------------------------------------
+
+
+def batch_of(element, material=SOIL):
+    mesh = distorted("KinematicLinear3D8N")
+    nodes = mesh.blocks[0].nodes
+    return mesh.points, ElementGroup(element, element.rule, material, nodes, np.arange(len(nodes)))
+
+
+@compiled
+def test_elements_of_others_are_computed_by_the_kernels(monkeypatch):
+    with ELEMENTS.temporary():
+
+        class Fine8N(KinematicLinear3D8N):
+            rule = hexahedron(degree=5)
+
+    def refuse(self, points, chunk=None):
+        raise AssertionError("computed by the element's own methods")
+
+    points, group = batch_of(Fine8N)
+    monkeypatch.setattr(ElementGroup, "at", refuse)
+    assert fields.volumes(points, group).shape == (12, 27)
+    assert fields.at_gauss(points, group, points).shape == (12, 27, 6)
+
+
+def test_an_element_with_its_own_strain_takes_it():
+    with ELEMENTS.temporary():
+
+        class Doubled8N(KinematicLinear3D8N):
+            def strain(self, u):
+                return 2 * super().strain(u)
+
+    points, group = batch_of(Doubled8N)
+    _, usual = batch_of(KinematicLinear3D8N)
+    u = 1e-3 * points**2
+    for stress in (True, False):
+        twice = fields.at_gauss(points, group, u, stress=stress)
+        once = fields.at_gauss(points, usual, u, stress=stress)
+        np.testing.assert_allclose(twice, 2 * once, rtol=0, atol=1e-13 * np.abs(once).max())
+        for a, b in zip(
+            fields.averages(points, [group], u, 12, stress=stress),
+            fields.averages(points, [usual], u, 12, stress=stress),
+            strict=True,
+        ):
+            np.testing.assert_allclose(a, 2 * b, rtol=0, atol=1e-13 * np.abs(b).max())
+    assert fields.totals(points, [group], u)[0] == pytest.approx(4 * fields.totals(points, [usual], u)[0])
+    np.testing.assert_allclose(
+        fields.internal_load(points, [group], u), 2 * fields.internal_load(points, [usual], u), atol=1e-5
+    )
+
+
+def test_an_element_with_its_own_volume_takes_it():
+    with ELEMENTS.temporary():
+
+        class Half8N(KinematicLinear3D8N):
+            @property
+            def dV(self):
+                return super().dV / 2
+
+    points, group = batch_of(Half8N)
+    _, usual = batch_of(KinematicLinear3D8N)
+    u = 1e-3 * points**2
+    np.testing.assert_allclose(fields.volumes(points, group), fields.volumes(points, usual) / 2, rtol=1e-13)
+    assert fields.totals(points, [group], u)[0] == pytest.approx(fields.totals(points, [usual], u)[0] / 2)
+    force = np.array([0.0, 0.0, -1.0])
+    np.testing.assert_allclose(
+        fields.body_force(points, group, force), fields.body_force(points, usual, force) / 2, atol=1e-14
+    )
+
+
+def test_an_element_with_its_own_loads_and_masses_takes_them():
+    with ELEMENTS.temporary():
+
+        class Odd8N(KinematicLinear3D8N):
+            def body_force(self, b):
+                return 3 * super().body_force(b)
+
+            def internal_load(self, stress):
+                return 5 * super().internal_load(stress)
+
+            def lumped_mass(self, density):
+                return 7 * super().lumped_mass(density)
+
+    points, group = batch_of(Odd8N)
+    _, usual = batch_of(KinematicLinear3D8N)
+    for b in (np.array([1.0, 2.0, 3.0]), points):
+        np.testing.assert_allclose(
+            fields.body_force(points, group, b), 3 * fields.body_force(points, usual, b), rtol=1e-12
+        )
+    np.testing.assert_allclose(
+        fields.lumped_mass(points, [group]), 7 * fields.lumped_mass(points, [usual]), rtol=1e-12
+    )
+    once = fields.internal_load(points, [usual], 1e-3 * points**2)
+    np.testing.assert_allclose(
+        fields.internal_load(points, [group], 1e-3 * points**2), 5 * once, atol=1e-12 * np.abs(once).max()
+    )
+
+
+def test_a_material_with_its_own_stress_takes_it():
+    with MATERIALS.temporary():
+
+        class Hardened(Isotropic3D):
+            def stress(self, strain):
+                return 2 * super().stress(strain)
+
+    points, group = batch_of(KinematicLinear3D8N, Hardened(210e6, 0.3))
+    _, usual = batch_of(KinematicLinear3D8N)
+    u = 1e-3 * points**2
+    once = fields.at_gauss(points, usual, u)
+    np.testing.assert_allclose(
+        fields.at_gauss(points, group, u), 2 * once, rtol=0, atol=1e-13 * np.abs(once).max()
+    )
+    np.testing.assert_allclose(
+        fields.at_gauss(points, group, u, stress=False),
+        fields.at_gauss(points, usual, u, stress=False),
+        rtol=0,
+        atol=1e-16,
+    )
+
+
+# ---- exact values ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_volume_weight_and_mass_of_a_box(name):
+    mesh = kl.box(size=(3.0, 2.0, 2.0), cells=(3, 2, 2), element=name)
+    groups = kl.Model(mesh, SOIL).element_groups()
+    total = sum(fields.volumes(mesh.points, group).sum() for group in groups)
+    assert total == pytest.approx(12.0, rel=1e-14)
+    assert fields.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
+    weight = kl.Gravity((0.0, 0.0, -9.81)).forces(mesh, groups)
+    np.testing.assert_allclose(weight.sum(axis=0), [0, 0, -12 * 7620.0 * 9.81], rtol=1e-13, atol=1e-9)
+
+
+@compiled
+def test_far_from_the_origin_no_digits_of_the_shape_are_lost():
+    mesh = kl.box(cells=(4, 4, 4))
+    group = kl.Model(mesh, SOIL).element_groups()[0]
+    np.testing.assert_allclose(fields.volumes(mesh.points + 2.0**30, group), 1 / 512, rtol=1e-14)
+
+
+@compiled
+def test_wrong_arguments_are_refused():
+    points, group = batch_of(KinematicLinear3D8N)
+    with pytest.raises(ValueError, match="nodes must be rows of points"):
+        fields.volumes(points[:-1], group)
+    with pytest.raises(ValueError, match="a nodal field must be"):
+        fields.at_gauss(points, group, points[:-1])
+
+
+# ---- det J ---------------------------------------------------------------------------------------
+
+
+def verdict(mesh, kind):
+    """Return the notes of check_jacobians, or the text of its error."""
+    try:
+        return checks.check_jacobians(mesh, [kind])
+    except MeshError as error:
+        return str(error)
+
+
+def turned(mesh):
+    mesh.blocks[0].nodes[[2, 5]] = mesh.blocks[0].nodes[[2, 5]][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+
+
+def flattened(mesh):
+    normal = np.array([0.6, 0.0, 0.8])
+    mesh.points -= (mesh.points @ normal)[:, None] * normal
+
+
+def swapped(mesh):
+    mesh.blocks[0].nodes[3, [0, 1]] = mesh.blocks[0].nodes[3, [1, 0]]
+
+
+def folded(mesh):
+    corner = mesh.blocks[0].nodes[0]
+    mesh.points[corner[0]] = 1.1 * mesh.points[corner[[1, 3, 4]]].mean(axis=0)
+
+
+def collapsed(mesh):
+    mesh.points[mesh.blocks[0].nodes[0, 0]] = mesh.points[mesh.blocks[0].nodes[0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "text"),
+    [
+        (turned, "turned inside out"),
+        (flattened, "must be > 0"),
+        (swapped, "two of its nodes look swapped"),
+        (folded, "slightly < 0 at a node"),
+        (collapsed, "det J = 0 at a corner node"),
+    ],
+)
+def test_both_ways_judge_bad_shapes_alike(spoil, text, numpy_only):
+    mesh = kl.box(cells=(3, 2, 2))
+    mesh.blocks[0].nodes = mesh.blocks[0].nodes.copy()
+    spoil(mesh)
+    found = verdict(mesh, KinematicLinear3D8N)
+    assert text in str(found)
+    numpy_only()
+    assert verdict(mesh, KinematicLinear3D8N) == found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_both_ways_judge_flat_elements_alike(name, numpy_only):
+    kind, found = ELEMENTS[name], []
+    for seed in range(8):
+        mesh = kl.box(cells=(2, 2, 1), element=name)
+        turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+        mesh.points[:] = mesh.points * [1, 1, 0] @ turn + seed  # in a plane but for rounding
+        found.append((mesh, verdict(mesh, kind)))
+    numpy_only()
+    for mesh, text in found:
+        assert "must be > 0" in text
+        assert verdict(mesh, kind) == text
+
+
+@pytest.mark.parametrize("scale", [1e-60, 1e-6, 1.0, 1e6, 1e60])
+def test_a_tetrahedron_with_two_nodes_at_one_place_has_no_volume_at_any_scale(scale):
+    points = scale * np.array([[0.1, 0.2, 0.3], [1.3, 0.7, 0.2], [0.4, 1.1, 0.9], [0.4, 1.1, 0.9]])
+    block = Block(
+        "KinematicLinear3D4N", np.arange(4, dtype=np.int32)[None], np.ones(1, int), np.ones(1, int), None
+    )
+    with pytest.raises(MeshError, match="no volume"):
+        checks.check_jacobians(Mesh(points, [block]), [KinematicLinear3D4N])
+
+
+@compiled
+def test_good_elements_need_no_closer_look_and_bad_ones_do():
+    mesh = distorted("KinematicLinear3D20N")
+    _, dN = fields.tabulate(KinematicLinear3D20N.shape, KinematicLinear3D20N.rule)
+    args = mesh.blocks[0].nodes, KinematicLinear3D20N, dN, len(dN)
+    assert fields.clearly_positive(mesh.points, *args).all()
+    assert not fields.clearly_positive(-mesh.points, *args).any()
+    assert not fields.clearly_positive(mesh.points * np.nan, *args).any()
+    assert not fields.clearly_positive(
+        mesh.points * [1, 1, 1e-12], *args
+    ).any()  # nearly flat: rounding would decide

@@ -1,0 +1,341 @@
+"""Large displacements: exact balances, derivatives, the highest frequency; compiled and NumPy agree."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import kratos_lite as kl
+from kratos_lite.assembly import finite_strain
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.bodies.rotations import exp
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import MaterialError
+from kratos_lite.materials import Isotropic3D, Orthotropic3D
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.native import kernels
+from kratos_lite.testing.patches import patch
+
+NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+WOOD = Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 450.0)
+SOIL = Isotropic3D(2e3, 0.3, 700.0)
+UNIT = Isotropic3D(1.0, 0.3, 1.0)
+STEPS = [(False, 0.0), (True, 0.0), (True, 0.3)]
+compiled = pytest.mark.skipif(kernels("lagrange") is None, reason="the compiled kernels were not built")
+elements = pytest.mark.parametrize("name", NAMES)
+
+
+@pytest.fixture(params=["compiled", "numpy"])
+def way(request, monkeypatch):
+    """Compute with the kernels, then without."""
+    if request.param == "numpy":
+        monkeypatch.setattr(finite_strain, "kernels", lambda name: None)
+    elif kernels("lagrange") is None:
+        pytest.skip("the compiled kernels were not built")
+    return request.param
+
+
+def distorted(name, cells=(2, 1, 1)):
+    """Return a box of elements whose nodes are moved by a tenth of a cell at most."""
+    mesh = kl.box(size=tuple(map(float, cells)), cells=cells, element=name)
+    mesh.points += np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
+    return mesh
+
+
+def moved(name, cells=(2, 1, 1), prestress=0.0):
+    """Return points, groups of two materials, and q and dq without symmetry of some 10 % strain."""
+    mesh, rng = distorted(name, cells), np.random.default_rng(4)
+    model = kl.Model(mesh, SOIL)
+    model.assign(WOOD, np.arange(0, mesh.n_elements, 2))
+    if prestress:
+        model.add_prestress(rng.standard_normal((mesh.n_elements, 6)) * prestress)
+    turned = mesh.points @ (exp(np.array([0.4, -0.9, 0.3])) - np.eye(3)).T
+    q = turned + 0.03 * rng.standard_normal(mesh.points.shape)
+    return mesh.points, model.element_groups(), q, 0.04 * rng.standard_normal(mesh.points.shape)
+
+
+def pattern_of(points, groups):
+    return Pattern(len(points), [group.nodes for group in groups])
+
+
+# ---- balances --------------------------------------------------------------------------------------
+
+
+@elements
+def test_rotation_gives_no_force(name, way):
+    points, groups, _, _ = moved(name)
+    R = exp(np.array([1.0, -2.0, 0.5]))
+    q = points @ (R - np.eye(3)).T + [3.0, -1.0, 2.0]
+    load = finite_strain.internal_load(points, groups, q)
+    assert np.abs(load).max() < 1e-14 * 11e3
+    assert finite_strain.largest_strain(points, groups, q) < 1e-14
+    assert finite_strain.strain_energy(points, groups, q) < 1e-24
+
+
+@elements
+def test_work_of_a_step_is_the_change_of_energy(name, way):
+    points, groups, q, dq = moved(name, prestress=30.0)
+    work = float((finite_strain.internal_load(points, groups, q, dq) * dq).sum())
+    before, after = (finite_strain.strain_energy(points, groups, v) for v in (q, q + dq))
+    assert work == pytest.approx(after - before, abs=1e-13 * (before + after))
+    assert abs(work) > 1e-3 * before
+
+
+@elements
+@pytest.mark.parametrize(("step", "damping"), STEPS)
+def test_net_force_and_moment_are_zero(name, step, damping, way):
+    points, groups, q, dq = moved(name, prestress=30.0)
+    load = finite_strain.internal_load(points, groups, q, dq if step else None, damping)
+    middle = points + q + (dq / 2 if step else 0)
+    size = np.abs(load).sum()
+    assert np.abs(load.sum(axis=0)).max() < 1e-14 * size
+    assert np.abs(np.cross(middle, load).sum(axis=0)).max() < 1e-14 * size * np.abs(middle).max()
+
+
+def test_damping_takes_energy_whatever_the_step(way):
+    points, groups, q, dq = moved(NAMES[3])
+    plain, damped = (finite_strain.internal_load(points, groups, q, dq, d) for d in (0.0, 0.3))
+    assert ((damped - plain) * dq).sum() > 0
+    np.testing.assert_allclose(
+        finite_strain.internal_load(points, groups, q, dq, 0.6) - plain, 2 * (damped - plain), atol=1e-9
+    )
+
+
+def test_small_steps_keep_digits_of_strain(way):
+    """A step of 1e-12 changes E by 1e-12 to ten digits, not to the four that F+ - F would leave."""
+    points, groups, _, dq = moved(NAMES[3])
+    zero = np.zeros_like(points)
+    tiny = finite_strain.internal_load(points, groups, zero, 1e-12 * dq)
+    K = finite_strain.stiffness(points, groups, pattern_of(points, groups), zero)
+    np.testing.assert_allclose(tiny.ravel(), 0.5e-12 * (K @ dq.ravel()), rtol=0, atol=1e-10 * abs(tiny).max())
+
+
+def traction_forces(mesh, P):
+    """Return the nodal forces of P·n on the six faces of a box that begins at the origin."""
+    total = np.zeros_like(mesh.points)
+    for axis, side in itertools.product(range(3), (0.0, 1.0)):
+        on = np.flatnonzero(np.abs(mesh.points[:, axis] - side) < 1e-9)
+        normal = (2 * side - 1) * np.eye(3)[axis]
+        total += kl.Traction(on, P @ normal).forces(mesh, [])
+    return total
+
+
+@elements
+def test_homogeneous_deformation_is_carried_by_surface_tractions(name, way):
+    element = ELEMENTS[name]
+    points, nodes = patch(element.shape, (2, 2, 2), move=0.08)
+    nodes = nodes.astype(np.int32)
+    mesh = Mesh(
+        points, [Block(name, nodes, np.arange(1, len(nodes) + 1), np.ones(len(nodes), int), element.shape)]
+    )
+    F = np.eye(3) + np.random.default_rng(6).uniform(-0.2, 0.2, (3, 3))
+    E = (F.T @ F - np.eye(3)) / 2
+    lam, mu = SOIL.C[0, 1], SOIL.C[3, 3]
+    P = F @ (lam * np.trace(E) * np.eye(3) + 2 * mu * E)
+    group = ElementGroup(element, element.rule, SOIL, nodes, np.arange(len(nodes)))
+    q = points @ (F - np.eye(3)).T
+    load = finite_strain.internal_load(points, [group], q)
+    np.testing.assert_allclose(load, traction_forces(mesh, P), rtol=0, atol=1e-13 * np.abs(P).max())
+    energy = lam / 2 * np.trace(E) ** 2 + mu * (E * E).sum()
+    assert finite_strain.strain_energy(points, [group], q) == pytest.approx(energy, rel=1e-12)
+    assert finite_strain.largest_strain(points, [group], q) == pytest.approx(np.linalg.norm(E), rel=1e-12)
+
+
+# ---- derivatives -----------------------------------------------------------------------------------
+
+
+def fourth_order(f, h):
+    """Return the derivative of f at 0, exact for polynomials of degree four."""
+    return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
+
+
+@elements
+def test_load_is_the_derivative_of_energy(name, way):
+    points, groups, q, dq = moved(name, prestress=30.0)
+    work = float((finite_strain.internal_load(points, groups, q) * dq).sum())
+    slope = fourth_order(lambda h: finite_strain.strain_energy(points, groups, q + h * dq), 1.0)
+    assert slope == pytest.approx(work, rel=1e-11)
+
+
+@elements
+@pytest.mark.parametrize(("step", "damping"), STEPS)
+def test_stiffness_is_the_derivative_of_load(name, step, damping, way):
+    points, groups, q, dq = moved(name, prestress=30.0)
+    v = np.random.default_rng(9).standard_normal(q.shape)
+    if step:
+        K = finite_strain.stiffness(points, groups, pattern_of(points, groups), q, dq, damping)
+        slope = fourth_order(
+            lambda h: finite_strain.internal_load(points, groups, q, dq + h * v, damping), 0.1
+        )
+    else:
+        K = finite_strain.stiffness(points, groups, pattern_of(points, groups), q)
+        slope = fourth_order(lambda h: finite_strain.internal_load(points, groups, q + h * v), 0.1)
+    np.testing.assert_allclose((K @ v.ravel()).reshape(-1, 3), slope, rtol=0, atol=1e-11 * abs(slope).max())
+    asymmetry = np.abs((K.scipy() - K.scipy().T).toarray()).max() / K.norm()
+    assert (asymmetry > 1e-3) if step else (asymmetry < 1e-15)
+
+
+def test_stiffness_at_rest_is_linear_and_that_of_an_empty_step_is_half(way):
+    points, groups, q, _ = moved(NAMES[3])
+    pattern, zero = pattern_of(points, groups), np.zeros_like(q)
+    linear = assemble_stiffness(points, groups, pattern)
+    at_rest = finite_strain.stiffness(points, groups, pattern, zero)
+    np.testing.assert_allclose(at_rest.data, linear.data, rtol=0, atol=1e-15 * linear.norm())
+    tangent = finite_strain.stiffness(points, groups, pattern, q)
+    step = finite_strain.stiffness(points, groups, pattern, q, zero)
+    np.testing.assert_allclose(step.data, tangent.data / 2, rtol=0, atol=1e-15 * tangent.norm())
+
+
+# ---- mean gradient, frequencies --------------------------------------------------------------------
+
+
+@elements
+def test_nodal_gradients_give_the_mean_deformation_gradient(name):
+    points, groups, q, _ = moved(name)
+    g, V = finite_strain.nodal_gradients(points, groups)
+    elements = [group.at(points) for group in groups]
+    wanted = sum(
+        np.einsum("mg,mgij->ij", e.dV, np.swapaxes(e._gauss[1] @ q[b.nodes][:, None], -1, -2))
+        for e, b in zip(elements, groups, strict=True)
+    )
+    np.testing.assert_allclose(q.T @ g, wanted, rtol=0, atol=1e-13)
+    assert pytest.approx(sum(float(e.dV.sum()) for e in elements), rel=1e-14) == V
+
+
+def true_frequency(points, groups, q, lumped):
+    """Return the largest frequency of the assembled dense eigenproblem."""
+    n = len(points)
+    K = finite_strain.stiffness(points, groups, pattern_of(points, groups), q).scipy().toarray()
+    M = np.zeros((n, n))
+    for group in groups:
+        element, rho = group.at(points), group.material.density
+        masses = element.scalar_mass(rho)
+        if lumped:
+            masses = element.lumped_mass(rho)[:, :, None] * np.eye(masses.shape[-1])
+        for nodes, m in zip(group.nodes, masses, strict=True):
+            M[np.ix_(nodes, nodes)] += m
+    return float(np.sqrt(eigh(K, np.kron(M, np.eye(3)), eigvals_only=True)[-1]))
+
+
+@elements
+@pytest.mark.parametrize("lumped", [False, True])
+def test_highest_frequency_is_a_bound(name, lumped):
+    points, groups, q, _ = moved(name, cells=(3, 2, 1))
+    zero = np.zeros_like(q)
+    for state in (q, zero):
+        bound = finite_strain.highest_frequency(points, groups, state, lumped)
+        true = true_frequency(points, groups, state, lumped)
+        assert true <= bound <= 4 * true
+    linear = finite_strain.highest_frequency(points, groups, None, lumped)
+    assert linear == pytest.approx(bound, rel=1e-12)
+
+
+@elements
+@pytest.mark.parametrize("lumped", [False, True])
+def test_highest_frequency_of_one_element_is_exact(name, lumped):
+    element = ELEMENTS[name]
+    X, nodes = np.ascontiguousarray(element.nodes), np.arange(len(element.nodes), dtype=np.int32)[None]
+    groups = [ElementGroup(element, element.rule, UNIT, nodes, np.arange(1))]
+    bound = finite_strain.highest_frequency(X, groups, lumped=lumped)
+    assert bound == pytest.approx(true_frequency(X, groups, np.zeros_like(X), lumped), rel=1e-11)
+
+
+def test_highest_frequencies_of_the_reference_cells():
+    """Largest eigenvalues of K of single cells with E = ρ = 1, ν = 0.3: those of Solfec, but the pyramid."""
+    largest = {4: 1.005427, 5: 2.448228, 6: 2.237320, 8: 2.5}
+    for k, value in largest.items():
+        element = ELEMENTS[f"KinematicLinear3D{k}N"]
+        assert np.linalg.eigvalsh(element(element.nodes).stiffness(UNIT.C))[-1] == pytest.approx(
+            value, rel=1e-6
+        )
+    cube = kl.Model(kl.box((2.0, 2.0, 2.0)), UNIT)
+    points, groups = cube.mesh.points, cube.element_groups()
+    # each node of the cube of edge 2 has the mass 1
+    assert finite_strain.highest_frequency(points, groups, lumped=True) == pytest.approx(2.5**0.5, rel=1e-12)
+
+
+def test_critical_step_of_a_spinning_box():
+    """2/ω of the box 0.4 x 0.6 x 1 m in one element, and a bound of it in eight."""
+    material, critical = Isotropic3D(1e6, 0.3, 1000.0), {1: 0.010115, 2: 0.0053560}
+    steps = {}
+    for n in critical:
+        model = kl.Model(kl.box((0.4, 0.6, 1.0), (n, n, n)), material)
+        steps[n] = 2 / finite_strain.highest_frequency(model.mesh.points, model.element_groups(), lumped=True)
+    assert steps[1] == pytest.approx(critical[1], rel=5e-5)
+    assert 0.9 * critical[2] < steps[2] <= critical[2]
+
+
+def test_boxes_need_one_eigenproblem():
+    model = kl.Model(kl.box((0.1, 0.1, 1.0), (2, 2, 20)), UNIT)
+    points, (group,) = model.mesh.points, model.element_groups()
+    assert len(finite_strain._distinct(points, group)) == 1
+    bound = finite_strain.highest_frequency(points, [group])
+    alone = finite_strain.highest_frequency(points, [group], np.zeros_like(points))
+    assert bound == pytest.approx(alone, rel=1e-10)
+
+
+def test_frequency_needs_a_density():
+    model = kl.Model(kl.box(), Isotropic3D(1.0, 0.3))
+    with pytest.raises(MaterialError, match="density > 0"):
+        finite_strain.highest_frequency(model.mesh.points, model.element_groups())
+
+
+# ---- compiled --------------------------------------------------------------------------------------
+
+
+def everything(points, groups, q, dq):
+    """Return all that has a kernel, by name."""
+    pattern = pattern_of(points, groups)
+    found = {}
+    for step, damping in STEPS:
+        key, change = f"{step} {damping}", dq if step else None
+        found[f"load {key}"] = finite_strain.internal_load(points, groups, q, change, damping)
+        found[f"stiffness {key}"] = finite_strain.stiffness(points, groups, pattern, q, change, damping).data
+    found["energy"] = np.array(finite_strain.strain_energy(points, groups, q))
+    found["strain"] = np.array(finite_strain.largest_strain(points, groups, q))
+    return found
+
+
+@compiled
+@elements
+def test_compiled_is_numpy(name, monkeypatch):
+    given = moved(name, cells=(3, 2, 2), prestress=30.0)
+    fast = everything(*given)
+    monkeypatch.setattr(finite_strain, "kernels", lambda name: None)
+    for key, value in everything(*given).items():
+        np.testing.assert_allclose(fast[key], value, rtol=0, atol=1e-14 * np.abs(value).max(), err_msg=key)
+
+
+@compiled
+@pytest.mark.parametrize("name", [NAMES[0], NAMES[3], NAMES[7]])
+def test_threads_change_no_bit(name):
+    given = moved(name, cells=(11, 7, 4), prestress=30.0)
+    module, results = kernels("lagrange"), []
+    for count in (1, 2, 3, 5):
+        module.set_threads(count)
+        results.append(everything(*given))
+    module.set_threads(2)
+    for other in results[1:]:
+        for key, value in other.items():
+            np.testing.assert_array_equal(value, results[0][key], err_msg=key)
+
+
+@compiled
+def test_element_with_its_own_geometry_takes_numpy():
+    with ELEMENTS.temporary():
+
+        class Half(ELEMENTS[NAMES[3]]):
+            @property
+            def _gauss(self):
+                dV, D = super()._gauss
+                return dV / 2, D
+
+    points, (first, _), q, dq = moved(NAMES[3])
+    own = ElementGroup(Half, first.rule, first.material, first.nodes, first.rows)
+    for change in (None, dq):
+        load = finite_strain.internal_load(points, [first], q, change)
+        np.testing.assert_allclose(
+            finite_strain.internal_load(points, [own], q, change), load / 2, atol=1e-11
+        )

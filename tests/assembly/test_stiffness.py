@@ -1,0 +1,263 @@
+"""Assembly: both paths, compiled and NumPy, against the sum of full element matrices."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.assembly import stiffness as assembly
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.stiffness import Pattern, assemble_dense, assemble_stiffness
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.native import kernels
+from kratos_lite.shapes import SHAPES, Tetrahedron4
+
+STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9, 450.0)
+ROOT = np.random.default_rng(3).standard_normal((6, 6))
+CRYSTAL = SimpleNamespace(C=ROOT @ ROOT.T + np.eye(6))
+"""A material without any symmetry."""
+NAMES = sorted(ELEMENTS)
+MODULE = kernels("stiffness")
+compiled = pytest.mark.skipif(MODULE is None, reason="the compiled kernels were not built")
+
+
+@pytest.fixture(params=["compiled", "numpy"])
+def path(request, monkeypatch):
+    """Run a test on both paths."""
+    if request.param == "numpy":
+        monkeypatch.setattr(assembly, "kernels", lambda name: None)
+    elif MODULE is None:
+        pytest.skip("the compiled kernels were not built")
+    return request.param
+
+
+@pytest.fixture
+def threads():
+    """Set the number of threads, for one test."""
+    yield MODULE.set_threads
+    MODULE.set_threads(2)
+
+
+def scene(name, cells=(3, 2, 2), distortion=0.0, material=STEEL):
+    """Return points and groups of a skewed box whose nodes are moved at random."""
+    mesh = kl.box((1.0, 1.5, 0.8), cells=cells, element=name)
+    points = mesh.points @ np.array([[1.0, 0.2, 0.0], [0.0, 1.1, 0.3], [0.1, 0.0, 0.9]])
+    points = points + distortion * np.random.default_rng(4).uniform(-1, 1, points.shape)
+    return points, [replace(group, material=material) for group in kl.Model(mesh, STEEL).element_groups()]
+
+
+def pattern_of(points, groups):
+    return Pattern(len(points), [group.nodes for group in groups])
+
+
+def assert_sum(points, groups, tolerance=1e-14, skipped=None):
+    """Assert that the sparse matrix is the dense one, and return it."""
+    want = assemble_dense(points, groups)
+    K = assemble_stiffness(points, groups, pattern_of(points, groups), skipped=skipped)
+    np.testing.assert_allclose(K.scipy().toarray(), want, rtol=0, atol=tolerance * np.abs(want).max())
+    return K
+
+
+# ---- pattern ---------------------------------------------------------------------------------
+
+
+@compiled
+@pytest.mark.parametrize("name", NAMES)
+def test_compiled_pattern_is_that_of_scipy(name):
+    points, groups = scene(name)
+    nodes = [group.nodes for group in groups]
+    for got, want in zip(
+        MODULE.pattern(len(points), nodes), assembly._pattern(len(points), nodes), strict=True
+    ):
+        assert got.dtype == np.int32
+        np.testing.assert_array_equal(got, want)
+
+
+@compiled
+def test_compiled_pattern_of_scattered_nodes_in_several_groups(threads):
+    rng = np.random.default_rng(5)
+    n = 20_000
+    nodes = [np.array([rng.choice(n, k, replace=False) for _ in range(300)], np.int32) for k in (4, 7, 20)]
+    nodes.append(np.empty((0, 8), np.int32))
+    want = assembly._pattern(n, nodes)
+    assert (np.diff(want[0]) == 0).any()
+    for count in (1, 2, 3, 5):
+        threads(count)
+        for got, row in zip(MODULE.pattern(n, nodes), want, strict=True):
+            np.testing.assert_array_equal(got, row)
+
+
+@compiled
+@pytest.mark.parametrize("wrong", [-1, 10])
+def test_nodes_that_are_not_there_are_refused(wrong):
+    with pytest.raises(ValueError, match="names a node that is not there"):
+        MODULE.pattern(10, [np.array([[0, 1, 2, wrong]], np.int32)])
+
+
+def test_positions_are_where_the_pairs_are():
+    points, groups = scene("KinematicLinear3D10N")
+    pattern = pattern_of(points, groups)
+    rows = np.repeat(np.arange(len(points)), np.diff(pattern.indptr))
+    (places,), nodes = pattern.positions, groups[0].nodes
+    np.testing.assert_array_equal(rows[places], np.broadcast_to(nodes[:, :, None], places.shape))
+    np.testing.assert_array_equal(pattern.indices[places], np.broadcast_to(nodes[:, None, :], places.shape))
+
+
+# ---- stiffness -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", [STEEL, WOOD, CRYSTAL], ids=["isotropic", "orthotropic", "general"])
+@pytest.mark.parametrize("distortion", [0.0, 0.02], ids=["straight", "distorted"])
+@pytest.mark.parametrize("name", NAMES)
+def test_stiffness_is_the_sum_of_the_elements(path, name, distortion, material):
+    assert_sum(*scene(name, (3, 3, 1), distortion, material))
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 17])
+def test_any_number_of_elements(path, count):
+    points, (group,) = scene("KinematicLinear3D8N", (3, 3, 2), 0.02)
+    part = ElementGroup(group.element, group.rule, STEEL, group.nodes[:count], group.rows[:count])
+    K = assert_sum(points, [part])
+    assert (np.diff(K.indptr) == 0).sum() == len(points) - len(np.unique(part.nodes))
+
+
+def test_several_shapes_rules_and_materials(path):
+    points, (bricks,) = scene("KinematicLinear3D8N", (4, 2, 2), 0.02)
+    tetrahedra = bricks.nodes[5:9][:, [0, 1, 3, 4]]
+    wedges = bricks.nodes[9:][:, [0, 1, 3, 4, 5, 7]]
+    reduced = kl.quadrature.hexahedron(degree=1)
+    groups = [
+        ElementGroup(bricks.element, bricks.rule, STEEL, bricks.nodes[:3], np.arange(3)),
+        ElementGroup(bricks.element, reduced, WOOD, bricks.nodes[3:5], np.arange(3, 5)),
+        ElementGroup(
+            ELEMENTS["KinematicLinear3D4N"],
+            ELEMENTS["KinematicLinear3D4N"].rule,
+            WOOD,
+            tetrahedra,
+            np.arange(5, 9),
+        ),
+        ElementGroup(
+            ELEMENTS["KinematicLinear3D6N"],
+            ELEMENTS["KinematicLinear3D6N"].rule,
+            STEEL,
+            wedges,
+            np.arange(9, 16),
+        ),
+    ]
+    assert_sum(points, groups)
+
+
+def test_an_element_of_a_user_with_seven_nodes(path):
+    edges = ((0, 1), (1, 2), (0, 2))
+    with SHAPES.temporary(), ELEMENTS.temporary():
+
+        class Tetrahedron7(Tetrahedron4):
+            nodes = np.vstack([Tetrahedron4.nodes, [Tetrahedron4.nodes[list(e)].mean(axis=0) for e in edges]])
+
+            @staticmethod
+            def dN(xi):
+                L, dL = Tetrahedron4.N(xi), Tetrahedron4.dN(xi)
+                middle = np.array([4 * (L[i] * dL[j] + L[j] * dL[i]) for i, j in edges])
+                corner = dL.copy()
+                for (i, j), d in zip(edges, middle, strict=True):
+                    corner[[i, j]] -= d / 2
+                return np.vstack([corner, middle])
+
+        class KinematicLinear3D7N(kl.KinematicLinear):
+            shape = Tetrahedron7
+            rule = kl.quadrature.tetrahedron(degree=2)
+
+        points, (tens,) = scene("KinematicLinear3D10N", (2, 2, 1), 0.01)
+        group = ElementGroup(
+            KinematicLinear3D7N, KinematicLinear3D7N.rule, STEEL, tens.nodes[:, :7], tens.rows
+        )
+        assert KinematicLinear3D7N.stiffness_from_tables()
+        assert_sum(points, [group])
+
+
+def test_an_element_class_that_redefines_its_stiffness(path):
+    with ELEMENTS.temporary():
+
+        class Doubled(ELEMENTS["KinematicLinear3D8N"]):
+            def stiffness_by_axis(self, C):
+                return 2 * super().stiffness_by_axis(C)
+
+        points, (group,) = scene("KinematicLinear3D8N", distortion=0.02)
+        plain, doubled = (
+            ElementGroup(element, group.rule, STEEL, group.nodes[rows], group.rows[rows])
+            for element, rows in ((group.element, slice(0, 5)), (Doubled, slice(5, None)))
+        )
+        K = assert_sum(points, [plain, doubled])
+        once = assemble_stiffness(points, [group], pattern_of(points, [group]))
+        assert np.abs(K.data).max() > 1.5 * np.abs(once.data).max()
+
+
+@pytest.mark.parametrize("name", ["KinematicLinear3D8N", "KinematicLinear3D27N"])
+def test_constant_jacobians_are_used_and_said(path, name):
+    skipped = set()
+    assert_sum(*scene(name, (4, 4, 1)), skipped=skipped)
+    assert skipped == {assembly.CONSTANT_JACOBIANS}
+    skipped.clear()
+    assert_sum(*scene(name, (4, 4, 1), 0.02), skipped=skipped)
+    assert not skipped
+
+
+def test_progress_ends_at_one(path):
+    points, groups = scene("KinematicLinear3D8N")
+    seen = []
+    assemble_stiffness(
+        points, groups, pattern_of(points, groups), lambda name, share: seen.append((name, share))
+    )
+    assert seen[-1] == ("assemble", 1.0)
+
+
+@compiled
+@pytest.mark.parametrize("order", ["given", "scattered"])
+@pytest.mark.parametrize(
+    ("name", "cells"), [("KinematicLinear3D8N", (23, 5, 3)), ("KinematicLinear3D10N", (7, 3, 3))]
+)
+def test_stiffness_does_not_depend_on_the_number_of_threads(threads, name, cells, order):
+    points, (group,) = scene(name, cells, 0.01)
+    if order == "scattered":
+        group.nodes = group.nodes[np.random.default_rng(6).permutation(len(group))]
+    pattern = pattern_of(points, [group])
+    results = []
+    for count in (1, 2, 3, 5):
+        threads(count)
+        results.append(assemble_stiffness(points, [group], pattern).data)
+    for other in results[1:]:
+        np.testing.assert_array_equal(other, results[0])
+
+
+@compiled
+@pytest.mark.parametrize("isa", ["base", "avx2", "avx512"])
+def test_every_instruction_set_gives_the_same_to_rounding(isa):
+    code = (
+        "from tests.assembly import test_stiffness as t\n"
+        "for name in t.NAMES:\n"
+        "    for material in (t.STEEL, t.CRYSTAL):\n"
+        "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.0, material))\n"
+        "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.02, material))\n"
+        "print(t.MODULE.isa())"
+    )
+    environment = {**os.environ, "KRATOS_LITE_ISA": isa, "PYTHONPATH": os.getcwd()}
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split()[0] in ("baseline", "AVX2", "AVX-512")
+
+
+@compiled
+def test_a_pattern_of_another_mesh_is_refused():
+    points, (group,) = scene("KinematicLinear3D8N")
+    other = Pattern(len(points), [group.nodes[:4]])
+    other.connectivity = [np.ascontiguousarray(group.nodes)]
+    with pytest.raises(ValueError, match="misses nodes that share an element"):
+        assemble_stiffness(points, [group], other)

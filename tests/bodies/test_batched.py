@@ -1,0 +1,147 @@
+"""Many bodies at once: as lists, and as one object that holds them all."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+SCHEMES = [
+    *((kl.RigidBody, scheme) for scheme in ("RIG_POS", "RIG_NEG", "RIG_IMP")),
+    *((kl.PseudoRigidBody, scheme) for scheme in ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")),
+]
+each = pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
+
+
+def herd(kind, scheme, count=5, damping=0.0):
+    """Return bodies of unlike sizes, materials, loads and velocities."""
+    rng, bodies = np.random.default_rng(8), []
+    for i in range(count):
+        mesh = kl.box(tuple(rng.uniform(0.5, 1.5, 3)))
+        material = kl.Isotropic3D(E=1e5 * (1 + i), nu=0.1 * (i % 4), density=500.0 + 100 * i)
+        options = {"damping": damping} if kind is kl.PseudoRigidBody else {}
+        body = kind(mesh, material, scheme=scheme, **options)
+        body.set_velocity(rng.uniform(-1, 1, 3), rng.uniform(-3, 3, 3))
+        if i % 2:
+            body.add(kl.Gravity((0, 0, -9.81)))
+            frame = "convected" if kind is kl.RigidBody else "spatial"  # F stretches a convected one
+            body.add(kl.Force(mesh.points[3], rng.uniform(-9, 9, 3), frame=frame), 2.0)
+        if i == 3:
+            body.add(kl.Force(body.center, (1.0, 2, 3)))
+        if i == 4 and kind is kl.RigidBody:
+            body.add(kl.Torque((1.0, 2, 3)))
+            body.add(kl.Torque((3.0, 2, 1), frame="convected"))
+        bodies.append(body)
+    return bodies
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3])
+@each
+def test_each_moves_as_if_it_were_alone(kind, scheme, damping):
+    bodies, alone = herd(kind, scheme, damping=damping), herd(kind, scheme, damping=damping)
+    states = list(kl.march(bodies, 2e-3, 30, every=10))
+    assert [state.step for state in states] == [10, 20, 30]
+    assert states[-1].q.shape == (5, 12)
+    for i, body in enumerate(alone):
+        for _ in kl.march(body, 2e-3, 30, every=30):
+            pass
+        np.testing.assert_allclose(states[-1].q[i], body.q, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(bodies[i].q, body.q, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(bodies[i].u, body.u, rtol=1e-10, atol=1e-10)
+        assert bodies[i].time == body.time
+        assert bodies[i].step == 30
+        assert float(bodies[i].energy()) == pytest.approx(float(body.energy()), rel=1e-10)
+        assert float(bodies[i].external_work) == pytest.approx(float(body.external_work), rel=1e-9, abs=1e-9)
+
+
+@each
+def test_they_march_again_together_or_alone(kind, scheme):
+    bodies, alone = herd(kind, scheme), herd(kind, scheme)
+    for _ in kl.march(bodies, 2e-3, 5):
+        pass
+    for _ in kl.march(bodies, 2e-3, 5):
+        pass
+    for _ in kl.march(alone, 2e-3, 10):
+        pass
+    for one, other in zip(bodies, alone, strict=True):
+        np.testing.assert_allclose(one.q, other.q, rtol=1e-13, atol=1e-13)
+        assert one.step == other.step == 10
+
+
+def test_one_object_holds_many():
+    many = kl.RigidBody(
+        mass_properties=kl.MassProperties.box([[1.0, 2, 3], [0.4, 0.6, 1]], [1.0, 1000.0]), scheme="RIG_IMP"
+    )
+    many.set_velocity([[1, 0, 0], [0, 1, 0]], [[0, 0, 2], [0.05, 10, 0.05]])
+    many.add(kl.Gravity((0, 0, -9.81)))
+    L, E = many.angular_momentum(), many.energy()
+    for _ in kl.march(many, 1e-3, 100, every=100):
+        pass
+    assert many.q.shape == (2, 12)
+    np.testing.assert_allclose(many.angular_momentum(), L, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(many.energy(), E, rtol=1e-6)
+    np.testing.assert_allclose(many.mass_center()[:, 2], -9.81 * 0.01 / 2, rtol=1e-12)
+    single = kl.RigidBody(mass_properties=kl.MassProperties.box((0.4, 0.6, 1.0), 1000.0), scheme="RIG_IMP")
+    single.set_velocity((0, 1, 0), (0.05, 10, 0.05))
+    single.add(kl.Gravity((0, 0, -9.81)))
+    for _ in kl.march(single, 1e-3, 100, every=100):
+        pass
+    np.testing.assert_allclose(many.q[1], single.q, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("scheme", ["DEF_LIM", "ENERGY_MOMENTUM"])
+def test_many_pseudo_rigid_bodies_keep_their_invariants(scheme):
+    rng = np.random.default_rng(1)
+    many = kl.PseudoRigidBody(
+        material=kl.Isotropic3D(1e6, 0.3, 1000.0),
+        mass_properties=kl.MassProperties.box(rng.uniform(0.5, 1, (20, 3)), np.full(20, 1000.0)),
+        scheme=scheme,
+    )
+    many.set_velocity(rng.uniform(-1, 1, (20, 3)), rng.uniform(-5, 5, (20, 3)))
+    L, E = many.angular_momentum(), many.energy()
+    for _ in kl.march(many, 2e-3, 50, every=50):
+        pass
+    if scheme == "ENERGY_MOMENTUM":
+        np.testing.assert_allclose(many.energy(), E, rtol=1e-12)
+        np.testing.assert_allclose(many.angular_momentum(), L, rtol=1e-11, atol=1e-11)
+    assert many.external_work.shape == (20,)
+    np.testing.assert_allclose(many.energy(), E, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (lambda bodies: bodies.clear(), kl.InputError, "there is no body to march"),
+        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body stands twice"),
+        (lambda b: setattr(b[1], "scheme", "RIG_IMP"), kl.InputError, "same scheme.*body 1 'RIG_IMP'"),
+        (lambda b: setattr(b[1], "time", 3.0), kl.InputError, "need the same time"),
+        (lambda b: b[1].constrain(kl.FixPoint(b[1].center)), kl.ModelError, "body 1 has constraints"),
+        (
+            lambda b: b[1].add(kl.Gravity((0, 0, 1.0)), kl.TimeSeries([0, 1], [0, 1])),
+            kl.ModelError,
+            "body 1 has constraints or loads that change",
+        ),
+        (
+            lambda b: b[1].add(kl.Force((0.1, 0.1, 0.1), (0, 0, 1.0))),
+            kl.ModelError,
+            "or as it turns, as the moment of a spatial force off the mass center does",
+        ),
+        (
+            lambda b: b.append(kl.FiniteElementBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
+            kl.ModelError,
+            "only single rigid and pseudo-rigid bodies",
+        ),
+        (
+            lambda b: b.append(kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(1.0, 0.0, 1.0))),
+            kl.InputError,
+            "need the same kind",
+        ),
+        (lambda b: b.append("body"), kl.ModelError, "only single rigid and pseudo-rigid bodies"),
+    ],
+)
+def test_bodies_that_cannot_advance_together(change, error, words):
+    bodies = herd(kl.RigidBody, "RIG_NEG", count=2)
+    change(bodies)
+    before = [body.q.tolist() for body in bodies if isinstance(body, kl.Body)]
+    with pytest.raises(error, match=words):
+        list(kl.march(bodies, 1e-3, 3))
+    assert [body.q.tolist() for body in bodies if isinstance(body, kl.Body)] == before

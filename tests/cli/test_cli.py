@@ -1,0 +1,890 @@
+"""The command line as a person uses it: commands, options, files in and out, and what goes wrong."""
+
+import gzip
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.cli import commands, main
+from kratos_lite.native import threads
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+GRAVITY_CUBE = EXAMPLES / "gravity_cube.mdpa"
+SINKS = 7620 * 9.81 * 0.5 / (210e6 * 0.7 / (1.3 * 0.4))
+"""Displacement of the top of the gravity cube, m."""
+STEEL = "E=210e9,nu=0.3,density=7850"
+LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
+HELD = ("--material", STEEL, "--fix", "z-:xyz")
+COMMANDS = ("solve", "info", "check", "convert")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return an empty folder, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def box(folder):
+    """Return a small mesh that lies in the folder as box.vtu, box.msh and box.mdpa."""
+    mesh = kl.box(cells=(2, 2, 2))
+    for ending in ("vtu", "msh"):
+        kl.write(f"box.{ending}", mesh)
+    kl.write("box.mdpa", kl.Model(mesh, LAW))
+    return mesh
+
+
+def held(mesh):
+    model = kl.Model(mesh, LAW)
+    model.fix("z-")
+    return model
+
+
+def process(*words, **options):
+    """Run a command in a process of its own."""
+    command = [sys.executable, "-m", "kratos_lite", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+def displacement(path):
+    return np.array(list(json.loads(Path(path).read_text())["displacement"].values()))
+
+
+def same(first, second, tolerance=1e-12):
+    return np.abs(first - second).max() <= tolerance * np.abs(second).max()
+
+
+def rows_of(text):
+    """Return a table as a dictionary from the first words of its lines."""
+    return {line[:22].strip(): line[22:] for line in text.splitlines()}
+
+
+# ---- solve ---------------------------------------------------------------------------------------
+
+
+def test_gravity_cube_from_the_shell(tmp_path):
+    done = process("solve", GRAVITY_CUBE, "-o", "cube.vtu", "--json", "cube.json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    table = rows_of(done.stdout)
+    assert table["nodes"] == "125"
+    assert table["elements"] == "64 KinematicLinear3D8N"
+    assert table["unknowns"] == "250"
+    assert table["total load"] == "(0, 0, -74752.2) N"
+    assert table["total reaction"] == "(0, 0, 74752.2) N"
+    assert table["largest displacement"].startswith("1.322148e-04 m at node")
+    assert "written               cube.vtu" in done.stdout
+    found = json.loads((tmp_path / "cube.json").read_text())
+    assert found["largest_displacement"]["value"] == pytest.approx(SINKS, rel=1e-12)
+    assert found["total_reaction"][2] == pytest.approx(7620 * 9.81, rel=1e-12)
+    assert len(found["displacement"]) == found["nodes"] == 125
+    assert found["units"] == "SI"
+    assert found["warnings"] == []
+    assert kl.read(tmp_path / "cube.vtu", materials=False).mesh.n_elements == 64
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "cube.vtu"]
+
+
+def test_vtu_holds_the_fields_under_their_names(run, folder):
+    meshio = pytest.importorskip("meshio")
+    assert run("solve", GRAVITY_CUBE, "-o", "cube.vtu", "-q").code == 0
+    found = meshio.read("cube.vtu")
+    assert found.point_data["DISPLACEMENT"][:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+    fields = {"REACTION", "CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "NODE_ID"}
+    assert fields <= found.point_data.keys()
+    assert {"CAUCHY_STRESS_VECTOR", "VON_MISES_STRESS", "ELEMENT_ID"} <= found.cell_data.keys()
+
+
+def test_picture_is_a_png(run, folder):
+    pytest.importorskip("matplotlib")
+    done = run("solve", GRAVITY_CUBE, "--picture", "cube.png")
+    assert done.code == 0
+    assert "written               cube.png" in done.out
+    assert Path("cube.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("mode", ["binary", "compressed", "ascii"])
+def test_numbers_of_a_vtu_file_are_stored_as_asked(run, folder, mode):
+    run("solve", GRAVITY_CUBE, "-q", "-o", "plain.vtu", "--json", "cube.json")
+    assert run("solve", GRAVITY_CUBE, "-q", "-o", "cube.vtu", "--vtu", mode).code == 0
+    content = Path("cube.vtu").read_bytes()
+    assert (b"compressor=" in content, b'format="ascii"' in content) == (
+        mode == "compressed",
+        mode == "ascii",
+    )
+    assert (content == Path("plain.vtu").read_bytes()) == (mode == "binary")
+    meshio = pytest.importorskip("meshio")
+    np.testing.assert_array_equal(
+        meshio.read("cube.vtu").point_data["DISPLACEMENT"], displacement("cube.json")
+    )
+
+
+def test_a_mode_of_vtu_files_needs_such_a_file(run, folder):
+    assert run("solve", GRAVITY_CUBE, "--vtu", "ascii").refuses(
+        "--vtu ascii: there is no output", "-o OUT.vtu"
+    )
+    assert run("solve", GRAVITY_CUBE, "--vtu", "ascii", "-o", "a.json").refuses("a.json: only .vtu files are")
+    assert list(folder.iterdir()) == []
+
+
+def test_threads_are_told_to_the_kernels(run, folder, monkeypatch):
+    monkeypatch.setenv("KRATOS_LITE_THREADS", "1")
+    assert run("solve", GRAVITY_CUBE, "-q", "--threads", "3").code == 0
+    assert threads() == 3
+    assert run("solve", GRAVITY_CUBE, "--threads", "0").refuses("--threads 0", "1 or more")
+
+
+def test_bench_runs_the_benchmarks_of_the_checkout_with_all_words(run, folder, monkeypatch):
+    monkeypatch.setattr(commands, "ROOT", folder)
+    assert run("bench").refuses(f"there are no benchmarks in {folder}", "pip install -e .")
+    Path("benchmarks").mkdir()
+    Path("benchmarks/__main__.py").write_text(
+        "import sys\nopen('said', 'w').write(repr(sys.argv[1:]))\nsys.exit(5)"
+    )
+    assert run("bench", "run", "--cells", "3", "--help", "-q").code == 5
+    assert Path("said").read_text() == "['run', '--cells', '3', '--help', '-q']"
+
+
+def test_unknown_options_of_other_commands_are_refused(run, folder):
+    done = run("info", GRAVITY_CUBE, "--cells")
+    assert done.code == 2
+    assert "unrecognized arguments: --cells" in done.err
+
+
+def test_quiet_prints_nothing(run, folder):
+    done = run("solve", GRAVITY_CUBE, "-q", "--json", "cube.json")
+    assert (done.code, done.out, done.err) == (0, "", "")
+    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh", "mdpa"])
+def test_options_say_the_same_as_a_script(run, box, ending):
+    words = "--gravity -1,0,-9.81 --traction z+:0,0,-1e5 --pressure x+:2e5 --point-load y+:-1,2,3".split()
+    done = run("solve", f"box.{ending}", *HELD, "--fix", "z+:x=-1e-6", *words, "--json", "out.json")
+    assert (done.code, done.err) == (0, "")
+    model = held(box)
+    model.fix("z+", "x", -1e-6)
+    for load in (
+        kl.Gravity((-1.0, 0.0, -9.81)),
+        kl.Traction("z+", (0.0, 0.0, -1e5)),
+        kl.Pressure("x+", 2e5),
+        kl.PointLoad("y+", (-1.0, 2.0, 3.0)),
+    ):
+        model.add(load)
+    assert same(displacement("out.json"), model.solve().displacement())
+
+
+def test_material_by_property_and_by_law(run, box):
+    wood = (
+        "Orthotropic3D:E_x=11e9,E_y=2e9,E_z=1e9,nu_xy=0.4,nu_yz=0.3,nu_xz=0.35,"
+        "G_xy=0.7e9,G_yz=0.2e9,YOUNG_MODULUS_X=11e9,G_xz=0.6e9"
+    )
+    assert run("solve", "box.vtu", "--material", wood).refuses("E_x is given twice")
+    wood = wood.replace(",YOUNG_MODULUS_X=11e9", "")
+    words = ["--fix", "z-:xyz", "--point-load", "z+:1,0,0", "--json", "out.json"]
+    assert run("solve", "box.vtu", "--material", f"1:{wood}", *words).code == 0
+    model = kl.Model(box, kl.Orthotropic3D(11e9, 2e9, 1e9, 0.4, 0.3, 0.35, 0.7e9, 0.2e9, 0.6e9))
+    model.fix("z-")
+    model.add(kl.PointLoad("z+", (1.0, 0.0, 0.0)))
+    assert same(displacement("out.json"), model.solve().displacement())
+
+
+@pytest.mark.parametrize("solver", ["auto", "dense", "direct", "amg"])
+def test_all_solvers_agree(run, box, solver):
+    words = ["--gravity", "0,0,-9.81", "--solver", solver, "--tolerance", "1e-12", "--json", "out.json"]
+    assert run("solve", "box.vtu", *HELD, *words).code == 0
+    model = held(box)
+    model.add(kl.Gravity((0.0, 0.0, -9.81)))
+    assert same(displacement("out.json"), model.solve().displacement(), 1e-9)
+
+
+def test_elem_set_by_hand_by_any_of_its_files_or_its_stem(run, folder):
+    X = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    rows = ", ".join(f"[{i}, {x}, {y}, {z}]" for i, (x, y, z) in enumerate(X, start=1))
+    Path("tet.node").write_text(f"NODES = NodesList([{rows}])\n")
+    Path("tet.elem").write_text("ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n")
+    Path("tet.prop").write_text(
+        "PROPERTIES[1][DENSITY] = 1200.0;\nPROPERTIES[1][YOUNG_MODULUS] = 1e6;\n"
+        "PROPERTIES[1][POISSON_RATIO] = 0.25;\nPROPERTIES[1][GRAVITY] = [0, 0, -10];\n"
+    )
+    fixed = [f"NODES[{n}].Fix(DISPLACEMENT_{axis});\n" for n in (1, 2, 3) for axis in "XYZ"]
+    Path("tet.cond").write_text("".join(fixed))
+    Path("tet.init").write_text("")
+    weight = 1200 * 10 / 6
+    for name in ("tet", "tet.elem", "tet.node"):
+        done = run("solve", name, "--json", "tet.json")
+        assert (done.code, done.err) == (0, "")
+        found = json.loads(Path("tet.json").read_text())
+        assert found["total_load"][2] == pytest.approx(-weight, rel=1e-12)
+        # K_zz of the apex is (λ + 2μ) V = 1.2e6 / 6 with λ = μ = 0.4e6; it carries a quarter of the weight.
+        assert found["displacement"]["4"][2] == pytest.approx(-weight / 4 / (1.2e6 / 6), rel=1e-12)
+
+
+def test_run_file_says_the_same_as_options(run, box):
+    Path("run.json").write_text(
+        json.dumps(
+            {
+                "model": "box.vtu",
+                "material": {"E": 210e9, "nu": 0.3, "density": 7850},
+                "fix": {"z-": "xyz"},
+                "gravity": [0, 0, -9.81],
+                "json": "by_file.json",
+            }
+        )
+    )
+    done = run("solve", "run.json")
+    assert (done.code, done.err) == (0, "")
+    assert run("solve", "box.vtu", *HELD, "--gravity", "0,0,-9.81", "--json", "by_options.json").code == 0
+    assert same(displacement("by_file.json"), displacement("by_options.json"), 1e-14)
+    told = run("info", "run.json")
+    assert told.code == 0
+    assert told.out.startswith("file        run.json\nnodes       27\n")
+    assert "material    Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
+    assert "fixed       27 components" in told.out
+    assert "load        Gravity" in told.out
+    assert run("check", "run.json").out.startswith("run.json: 27 nodes, 8 elements, no errors")
+    assert run("convert", "run.json", "run.mdpa").code == 0
+    assert run("solve", "run.mdpa", "--json", "again.json").code == 0
+    assert same(displacement("again.json"), displacement("by_options.json"))
+
+
+def test_options_win_over_the_run_file(run, box):
+    text = {
+        "model": "box.mdpa",
+        "fix": {"z-": "xyz"},
+        "gravity": [0, 0, -1],
+        "solver": {"type": "dense", "tolerance": 1e-8},
+        "json": "file.json",
+    }
+    Path("run.json").write_text(json.dumps(text))
+    assert run("solve", "run.json", "--solver", "direct", "--json", "option.json").code == 0
+    assert json.loads(Path("option.json").read_text())["solver"].startswith("direct")
+    assert not Path("file.json").exists()
+
+
+def test_gzipped_input(run, folder):
+    Path("cube.mdpa.gz").write_bytes(gzip.compress(GRAVITY_CUBE.read_bytes()))
+    done = run("solve", "cube.mdpa.gz", "--json", "cube.json")
+    assert (done.code, done.err) == (0, "")
+    assert displacement("cube.json")[:, 2].min() == pytest.approx(-SINKS, rel=1e-12)
+
+
+def test_broken_rows_are_read_when_asked_for(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    1 0 0 0\n", "    1 0 0\n    0\n")
+    Path("broken.mdpa").write_text(text)
+    assert run("solve", "broken.mdpa").refuses("broken.mdpa:15:")
+    assert run("solve", "broken.mdpa", "--lenient", "-q").code == 0
+
+
+# ---- info, check, convert --------------------------------------------------------------------------
+
+
+def test_info_tells_what_is_in_a_file(run, folder):
+    done = run("info", GRAVITY_CUBE)
+    assert (done.code, done.err) == (0, "")
+    for text in (
+        "nodes       125",
+        "extent      [0, 1] × [0, 1] × [0, 1] m",
+        "elements    64 ",
+        "DENSITY 7620, YOUNG_MODULUS 2.1e+08, POISSON_RATIO 0.3, VOLUME_ACCELERATION [0, 0, -9.81] (line 6)",
+    ):
+        assert text in done.out
+
+
+def test_check_of_a_good_file(run, folder):
+    done = run("check", GRAVITY_CUBE)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines()[0] == f"{GRAVITY_CUBE}: 125 nodes, 64 elements, no errors"
+    assert "to solve" not in done.out
+
+
+def test_check_tells_warnings_and_what_is_missing(run, folder):
+    text = GRAVITY_CUBE.read_text()
+    start = text.index("Begin NodalData")
+    Path("loose.mdpa").write_text(text[:start].replace("Begin Nodes", "Begin Nodes\n    999 3 3 3"))
+    done = run("check", "loose.mdpa")
+    assert (done.code, done.err) == (0, "")
+    assert "note     1 nodes belong to no element and carry no equations: 999" in done.out
+    assert "to solve the supports leave rigid motions free: the body (125 nodes) can still move: " in done.out
+    assert "translation x, y, z; rotation about x, y, z" in done.out
+
+
+def test_check_tells_all_that_is_missing_at_once(run, box):
+    needs = [line for line in run("check", "box.vtu").out.splitlines() if line.startswith("to solve")]
+    assert len(needs) == 2
+    assert "element 1 (KinematicLinear3D8N) has no material" in needs[0]
+    assert "can still move: translation x, y, z; rotation about x, y, z" in needs[1]
+
+
+def test_check_of_an_element_in_a_python_file(run, folder):
+    good = (EXAMPLES / "my_wedge.py").read_text()
+    Path("good.py").write_text(good)
+    done = run("check", "good.py")
+    assert (done.code, done.err) == (0, "")
+    assert "MyWedge3D6N: " in done.out
+    Path("bad.py").write_text(good.replace("L * (1 + t)", "L * (1 - t)"))
+    done = run("check", "bad.py")
+    assert (done.code, done.err) == (2, "")
+    assert "MyWedge3D6N: " in done.out
+    Path("empty.py").write_text("x = 1\n")
+    assert run("check", "empty.py").refuses("empty.py")
+    Path("wrong.py").write_text("x = (\n")
+    assert run("check", "wrong.py").refuses("wrong.py")
+
+
+def test_conversions_keep_the_mesh_and_the_model(run, folder):
+    shutil.copy(GRAVITY_CUBE, "a.mdpa")
+    for first, second in (("a.mdpa", "b.elem"), ("b.elem", "c.mdpa"), ("c.mdpa", "d.vtu")):
+        done = run("convert", first, second)
+        assert (done.code, done.err) == (0, "")
+        assert done.out.startswith(f"{second}: 125 nodes, 64 elements")
+    assert "left out: properties" in done.out
+    first = kl.read("a.mdpa")
+    for name in ("b.elem", "c.mdpa", "d.vtu"):
+        again = kl.read(name, materials=False)
+        assert np.array_equal(again.mesh.points, first.mesh.points)
+        assert np.array_equal(again.mesh.blocks[0].nodes, first.mesh.blocks[0].nodes)
+    for name in ("b.elem", "c.mdpa"):
+        assert same(kl.read(name).solve().displacement(), first.solve().displacement(), 1e-14)
+
+
+def test_elements_that_a_format_cannot_hold_are_named(run, folder):
+    text = GRAVITY_CUBE.read_text()
+    (kind,) = {line.split()[2] for line in text.splitlines() if line.startswith("Begin Elements")}
+    Path("odd.mdpa").write_text(text.replace(kind, "OddElement"))
+    done = run("convert", "odd.mdpa", "odd.vtu")
+    assert done.code == 0
+    assert "note     left out, for their shape is unknown: 64 OddElement" in done.out
+    assert run("convert", "odd.mdpa", "same.mdpa").code == 0
+    assert "Begin Elements OddElement\n1 1 " in Path("same.mdpa").read_text()
+
+
+# ---- help ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_shows_an_example(run, command):
+    done = run(command, "--help")
+    assert (done.code, done.err) == (0, "")
+    assert f"examples:\n  kratos-lite {command} " in done.out
+
+
+def test_help_tells_the_exit_codes(run):
+    told = run("--help").out
+    for line in ("0    done", "1    a defect", "2    bad input", "3    solved, but", "130  interrupted"):
+        assert f"\n  {line}" in told
+
+
+def test_a_terminal_that_knows_ascii_only_shows_codes(box):
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = process("solve", "box.vtu", *HELD, "--gravity", "0,0,-9.81", env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "54 unknowns \\u2264 60" in done.stdout
+    done = process("solve", "--help", env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "m/s\\xb2" in done.stdout
+
+
+def test_help_names_all_commands_and_version_is_told(run):
+    told = run("--help")
+    assert told.code == 0
+    for command in COMMANDS:
+        assert f"\n    {command} " in told.out
+    assert run("--version").out == f"kratos-lite {kl.__version__}\n"
+
+
+# ---- what goes wrong -------------------------------------------------------------------------------
+
+WRONG_OPTIONS = {
+    "material without a constant": (["--material", "E=1e9"], "Isotropic3D also needs nu"),
+    "unknown constant": (["--material", "E=1e9,nu=0.3,rho=1"], "constants of Isotropic3D are E, nu, density"),
+    "constant twice": (["--material", "E=1e9,E=1e9,nu=0.3"], "E is given twice"),
+    "unknown law": (["--material", "x:Wood:E=1e9,nu=0.3"], "'Wood' is no material; have Isotropic3D"),
+    "constant out of bounds": (["--material", "E=1e9,nu=0.5"], "nu (POISSON_RATIO) 0.5 must be < 0.5"),
+    "unknown property": (["--material", "7:" + STEEL], "no element has property 7"),
+    "no number": ([*HELD, "--gravity", "0,0,down"], "--gravity: 'down' is not a finite number"),
+    "underscore": ([*HELD, "--gravity", "0,0,9_81"], "'9_81' is not a finite number"),
+    "infinite": ([*HELD, "--traction", "z+:0,0,inf"], "--traction: 'inf' is not a finite number"),
+    "two numbers": ([*HELD, "--gravity", "0,1"], "--gravity: three numbers X,Y,Z are needed; got '0,1'"),
+    "no part": ([*HELD, "--pressure", "1e5"], "--pressure: expected PART:P; got '1e5'"),
+    "unknown axis": (["--material", STEEL, "--fix", "z-:w"], "axes must be some of x, y, z"),
+    "two values": ([*HELD, "--fix", "z-:z=1"], "z"),
+    "unknown part": ([*HELD, "--fix", "Top:xyz"], "there is no part 'Top'"),
+    "tolerance zero": ([*HELD, "--tolerance", "0"], "tolerance must be a number between 0 and 1; got 0.0"),
+    "no faces": ([*HELD, "--traction", "one:0,0,1"], "'one'"),
+    "no folder": ([*HELD, "-o", "none/out.vtu"], "none/out.vtu: the folder none does not exist"),
+    "unknown ending": ([*HELD, "-o", "out.foo"], "out.foo: results cannot be written as '.foo'"),
+    "no ending": ([*HELD, "-o", "out"], "out: give the file an ending"),
+    "output is a folder": ([*HELD, "-o", "sub.vtu"], "sub.vtu: cannot be written: it is a folder"),
+    "output twice": (
+        [*HELD, "-o", "out.json", "--json", "./out.json"],
+        "./out.json: is the input or another output",
+    ),
+    "output is the input": ([*HELD, "-o", "box.vtu"], "box.vtu: is the input or another output already"),
+    "no name": ([*HELD, "-o", ""], "an output has an empty name"),
+    "mesh format": (
+        [*HELD, "-o", "out.inp"],
+        "out.inp: results cannot be written as '.inp'; .vtu .vtk .json",
+    ),
+    "other mesh format": ([*HELD, "-o", "out.msh"], "results cannot be written as '.msh'"),
+    "json as vtu": ([*HELD, "--json", "out.vtu"], "out.vtu: the ending must be .json"),
+    "unknown law or part": (
+        ["--material", "Foo:E=1e9,nu=0.3"],
+        "unknown law or part 'Foo'; laws are Isotropic3D",
+    ),
+    "too large": (
+        [*HELD, "--fix", "z+:xyz=1e300", "--json", "out.json"],
+        "numbers exceed what a computer holds",
+    ),
+    "squares too large": (
+        [*HELD, "--fix", "z+:xyz=1e160", "--json", "out.json"],
+        "numbers exceed what a computer holds",
+    ),
+    "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_OPTIONS)
+def test_a_wrong_option_is_named_and_nothing_is_written(run, box, name):
+    Path("sub.vtu").mkdir()
+    before = sorted(Path().iterdir())
+    words, text = WRONG_OPTIONS[name]
+    assert run("solve", "box.vtu", *words).refuses(text)
+    assert sorted(Path().iterdir()) == before
+
+
+def test_words_that_are_no_options_are_refused_with_the_usage(run, box):
+    for words, text in (
+        (["solve", "box.vtu", "--solver", "magic"], "invalid choice: 'magic'"),
+        (["solve", "box.vtu", "--tolerance", "small"], "invalid float value: 'small'"),
+        (["solve"], "the following arguments are required: input"),
+        (["dance"], "invalid choice: 'dance'"),
+        ([], "the following arguments are required: COMMAND"),
+    ):
+        done = run(*words)
+        assert done.code == 2
+        assert text in done.err
+        assert done.err.startswith("usage: kratos-lite")
+
+
+def test_missing_supports_are_named_by_their_motions(run, box):
+    done = run("solve", "box.vtu", "--material", STEEL, "--fix", "z-:z", "--fix", "x-:x")
+    assert done.refuses("can still move: translation y")
+    assert "rotation" not in done.err
+
+
+def test_an_unknown_part_is_answered_with_the_nearest_name(run, folder):
+    mesh = kl.box()
+    mesh.parts["Clamped"] = mesh.parts.pop("z-")
+    kl.write("a.mdpa", kl.Model(mesh, LAW))
+    done = run("solve", "a.mdpa", "--fix", "Clampd:xyz")
+    assert done.refuses("there is no part 'Clampd'", "Did you mean Clamped?")
+
+
+@pytest.mark.parametrize("command", ["solve", "info", "check", "convert"])
+def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command):
+    rest = ["out.mdpa"] if command == "convert" else []
+    for name in ("none.mdpa", "none.elem", "none.vtu", "none.json", "none"):
+        assert run(command, name, *rest).refuses("none")
+    Path("sub").mkdir()
+    for name in (".", "sub", ".."):
+        assert run(command, name, *rest).refuses("folder")
+    assert not Path("out.mdpa").exists()
+
+
+def fingerprints():
+    return {path.name: path.read_bytes() for path in Path().iterdir() if path.is_file()}
+
+
+SELF = {
+    "run file": {"model": "box.mdpa", "json": "run.json"},
+    "model": {"model": "box.vtu", "output": "box.vtu"},
+    "member of a set": {"model": "set.elem", "json": "set.json", "output": "./set.json"},
+    "format": {"model": "box.mdpa", "fix": {"z-": "xyz"}, "output": "out.inp"},
+}
+
+
+@pytest.mark.parametrize("name", SELF)
+def test_a_run_file_overwrites_nothing_that_is_read_and_names_no_useless_format(run, box, name):
+    kl.write("set.elem", held(box))
+    Path("run.json").write_text(json.dumps(SELF[name]))
+    before = fingerprints()
+    assert run("solve", "run.json").refuses(
+        "results cannot be written as '.inp'"
+        if name == "format"
+        else "is the input or another output already"
+    )
+    assert fingerprints() == before
+
+
+def test_no_file_that_is_read_is_overwritten(run, box):
+    kl.write("set.elem", held(box))
+    Path("run.json").write_text('{"model": "box.vtu"}')
+    Path("of_set.json").write_text('{"model": "set"}')
+    Path("kratos.json").write_text(
+        '{"solver_settings": {"model_import_settings": {"input_filename": "box"},'
+        ' "material_import_settings": {"materials_filename": "mat.json"}}}'
+    )
+    Path("mat.json").write_text("{}")
+    before = fingerprints()
+    for words in (
+        ("convert", "set.elem", "set.node"),
+        ("convert", "set", "set.init"),
+        ("convert", "set.cond", "./set.elem"),
+        ("convert", "of_set.json", "set.prop"),
+        ("convert", "kratos.json", "box.mdpa"),
+        ("solve", "run.json", "-o", "box.vtu"),
+        ("solve", "kratos.json", "--json", "mat.json"),
+    ):
+        assert run(*words).refuses("is the input or another output already")
+        assert fingerprints() == before
+
+
+def test_links_in_a_circle_and_pipes_are_refused(run, box):
+    for name in ("loop.mdpa", "loop.vtu"):
+        Path(name).symlink_to(name)
+        assert run("info", name).refuses(name)
+        assert run("convert", "box.mdpa", name).refuses(f"{name}: cannot be written: its symbolic links")
+        assert Path(name).is_symlink()
+    for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem", "pipe.json"):
+        os.mkfifo(name)
+    for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem"):
+        assert run("info", name).refuses(f"{name}: is a pipe or a device")
+
+
+@pytest.mark.parametrize("target", ["out", "out.json", "out.foo", "none/out.vtu", "box.mdpa"])
+def test_a_conversion_to_nowhere_or_onto_itself_is_refused(run, box, target):
+    assert run("convert", "box.mdpa", target).refuses(target)
+    assert not list(Path().glob("out*"))
+
+
+def test_a_folder_without_permission_is_refused(run, box):
+    Path("shut").mkdir(mode=0o500)
+    if os.access("shut", os.W_OK):
+        pytest.skip("this user may write everywhere")
+    assert run("solve", "box.vtu", *HELD, "-o", "shut/out.vtu").refuses("shut/out.vtu: cannot be written")
+
+
+def test_debug_shows_where_an_error_came_from(box):
+    done = process("solve", "none.mdpa", "--debug")
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+
+
+@pytest.mark.parametrize("command", [("solve", *HELD), ("info",), ("check",)], ids=lambda words: words[0])
+def test_a_full_disk_behind_the_output_is_an_error_in_one_line(box, command):
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full on this system")
+    words = [sys.executable, "-m", "kratos_lite", command[0], "box.vtu", *command[1:]]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: the output: No space left on device\n")
+
+
+def test_a_file_that_fails_loses_no_summary(run, box, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    done = run("solve", "box.vtu", *HELD, "--json", "out.json")
+    assert done.code == 2
+    assert rows_of(done.out)["unknowns"] == "54"
+    assert "written" not in done.out
+    assert done.err.startswith("error: out.json: cannot be written: No space left on device; ")
+
+
+def test_a_terminal_that_fails_loses_no_file(box, monkeypatch):
+    def closed(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(kl.Result, "__str__", closed)
+    assert main(["solve", "box.vtu", *HELD, "--json", "out.json", "--gravity", "0,0,-9.81"]) == 0
+    assert len(displacement("out.json")) == 27
+
+
+def test_errors_speak_of_the_option(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    1 0 0 0\n", "    1 0 0\n    0\n")
+    Path("broken.mdpa").write_text(text)
+    done = run("info", "broken.mdpa")
+    assert done.refuses("--lenient")
+    assert "strict" not in done.err
+
+
+def test_gravity_on_top_of_that_of_the_file_is_noted(run, folder):
+    done = run("solve", GRAVITY_CUBE, "--gravity", "0,0,-9.81")
+    assert rows_of(done.out)["total load"] == "(0, 0, -149504) N"
+    assert "--gravity is added to the gravity of the file" in done.out
+    assert "--gravity is added" not in run("solve", GRAVITY_CUBE).out
+
+
+def test_the_material_of_a_part_wins_in_either_order(run, box):
+    pair = (["--material", "1:E=2e9,nu=0"], ["--material", "E=5e9,nu=0"])
+    for number, words in enumerate(([*pair[0], *pair[1]], [*pair[1], *pair[0]], pair[0])):
+        rest = ["--fix", "z-:xyz", "--traction", "z+:0,0,1e5", "--json", f"{number}.json"]
+        assert run("solve", "box.vtu", *words, *rest).code == 0
+    first, second, alone = (displacement(f"{number}.json") for number in range(3))
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, alone)
+
+
+def test_a_conversion_counts_what_is_in_the_file(run, box):
+    assert run("convert", "box.mdpa", "a.mdpa").out.startswith("a.mdpa: 27 nodes, 8 elements, 6 parts\n")
+    for name in ("a.elem", "a.vtu"):
+        done = run("convert", "box.mdpa", name)
+        assert done.out.startswith(f"{name}: 27 nodes, 8 elements\n")
+        assert "left out: " in done.out
+
+
+def test_forces_that_cancel_are_shown_as_zero(run, box):
+    done = run("solve", "box.vtu", *HELD, "--traction", "x-:1e9,1,3e8", "--traction", "x+:-1e9,1,-3e8")
+    assert rows_of(done.out)["total load"] == "(0, 2, 0) N"
+    assert rows_of(done.out)["total reaction"] == "(0, -2, 0) N"
+    assert "Pa (at a Gauss point) in element" in rows_of(done.out)["largest von Mises"]
+
+
+def test_a_defect_is_told_apart_from_bad_input(run, box, monkeypatch):
+    monkeypatch.setattr(kl.Model, "solve", lambda *_: 1 / 0)
+    done = run("solve", "box.vtu", *HELD)
+    assert done.code == 1
+    assert done.err.startswith("internal error: ZeroDivisionError: division by zero\n")
+    assert "report" in done.err
+
+
+def test_want_of_memory_is_told(run, box, monkeypatch):
+    def greedy(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(kl.Model, "solve", greedy)
+    assert run("solve", "box.vtu", *HELD).refuses("not enough memory", "--solver amg")
+
+
+def interrupt(*_):
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_while_modules_are_imported_ends_with_130(run, box, monkeypatch):
+    class Import:
+        def find_spec(self, name, *_):
+            if name == "kratos_lite.cli.commands":
+                interrupt()
+
+    monkeypatch.delitem(sys.modules, "kratos_lite.cli.commands")
+    monkeypatch.delattr("kratos_lite.cli.commands")
+    monkeypatch.setattr(sys, "meta_path", [Import(), *sys.meta_path])
+    done = run("info", "box.vtu")
+    assert (done.code, done.out, done.err) == (130, "", "interrupted; nothing half-written is left\n")
+
+
+def test_ctrl_c_while_solving_ends_with_130(run, box, monkeypatch):
+    monkeypatch.setattr("kratos_lite.analysis.model.solve_static", interrupt)
+    done = run("solve", "box.vtu", *HELD, "-o", "out.vtu")
+    assert (done.code, done.out) == (130, "")
+    assert done.err == "interrupted; nothing half-written is left\n"
+    assert not Path("out.vtu").exists()
+
+
+def test_ctrl_c_while_writing_leaves_the_old_file(run, box, monkeypatch):
+    Path("out.vtu").write_text("old")
+    before = sorted(Path().iterdir())
+    monkeypatch.setattr(os, "fsync", interrupt)
+    assert run("solve", "box.vtu", *HELD, "-o", "out.vtu").code == 130
+    assert Path("out.vtu").read_text() == "old"
+    assert sorted(Path().iterdir()) == before
+
+
+def test_a_reader_that_goes_away_is_no_error(folder):
+    mesh = kl.box()
+    mesh.parts = {f"part_{i}": kl.Part(nodes=np.arange(8)) for i in range(5000)}
+    kl.write("parts.mdpa", mesh)
+    command = [sys.executable, "-m", "kratos_lite", "info", "parts.mdpa"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        running.stdout.close()
+        told = running.stderr.read()
+        running.wait(timeout=120)
+    assert (running.returncode, told) == (0, b"")
+
+
+# ---- files that are wrong on purpose -------------------------------------------------------------------
+
+ACCEPTED = {
+    "00_good.mdpa": "",
+    "06_duplicate_node_id_same_coords.mdpa": "line 19: node 8 stands at line 18 already, the same",
+    "17_fortran_exponent.mdpa": "",
+    "31_crlf.mdpa": "",
+    "32_tabs.mdpa": "",
+    "33_bom.mdpa": "",
+    "34_non_utf8.mdpa": "",
+    "38_comment_everywhere.mdpa": "",
+    "41_elements_before_nodes.mdpa": "",
+    "43_unknown_block.mdpa": "line 33: block Wibble is skipped",
+    "44_cr_only.mdpa": "",
+    "47_unreferenced_node.mdpa": "1 nodes belong to no element and carry no equations: 9",
+    "48_coincident_nodes.mdpa": "1 nodes belong to no element and carry no equations: 9",
+    "49_long_line.mdpa": "",
+    "60_good.json": "",
+}
+"""Files to be read, with what is noted about them."""
+
+REFUSED = {
+    "01_truncated_in_nodes.mdpa": ":15:7: the file ends inside 'Begin Nodes' of line 10",
+    "02_missing_end_nodes.mdpa": ":20:1: 'Begin Elements' inside 'Begin Nodes' of line 10",
+    "03_end_mismatch.mdpa": ":19:1: 'End Elements' closes 'Begin Nodes' of line 10",
+    "05_duplicate_node_id.mdpa": ":18: node 7 stands at line 17 already",
+    "07_missing_node_ref.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): there is no node 99",
+    "08_nan_coord.mdpa": ":18:8: node 8: 'nan' is not a number",
+    "09_inf_coord.mdpa": ":18:8: node 8: '1e999' is too large",
+    "10_too_few_nodes_in_element.mdpa": ":22:2: element 1 has 7 nodes; SmallDisplacementElement3D8N needs 8",
+    "11_too_many_nodes_in_element.mdpa": ":22:2: element 1 has 9 nodes; SmallDisplacementElement3D8N needs 8",
+    "15_E_text.mdpa": ":6:16: YOUNG_MODULUS: 'steel' is not a number",
+    "16_decimal_comma.mdpa": ":12:4: node 2: '1,0' is not a number; decimal comma? write 1.0",
+    "18_missing_property.mdpa": ":22: element 1 uses Properties 7",
+    "19_property_redefined.mdpa": ":10:1: Properties 1 stands at line 4 already",
+    "21_duplicate_element_id.mdpa": ":23: element 1 stands at line 22 already",
+    "22_repeated_node_in_element.mdpa": ":22: element 1 (SmallDisplacementElement3D8N) names node 7 twice",
+    "24_submodelpart_missing_node.mdpa": ":30: SubModelPart Bottom lists node 44",
+    "25_submodelpart_duplicate_name.mdpa": ":33:1: SubModelPart Bottom stands at line 25 already",
+    "26_submodelpart_deep.mdpa": ":97:1: blocks are nested more than 64 deep",
+    "27_negative_id.mdpa": ":18:2: '-8' is not an id; ids are 1 … 2^63-1",
+    "28_zero_id.mdpa": ":11:2: '0' is not an id",
+    "29_float_id.mdpa": ":12:2: '2.5' is not an id",
+    "30_huge_id.mdpa": ":18:2: '99999999999999999999' is not an id",
+    "35_nul_byte.mdpa": ":13:7: NUL byte",
+    "36_empty.mdpa": ": there are no nodes",
+    "37_only_comment.mdpa": ": there are no nodes",
+    "39_mixed_case.mdpa": ":10:1: 'begin' stands outside any block; expected 'Begin <block>'",
+    "40_two_values_on_line.mdpa": ":11:2: node 1 has 7 coordinates; expected id x y z",
+    "42_two_coords.mdpa": ":13:2: node 3 has 2 coordinates; expected id x y z",
+    "45_ctrl_chars_in_name.mdpa": ":25:1: SubModelPart '../../etc/passwd' is no name",
+    "46_no_nodes_block.mdpa": ": there are no nodes",
+    "50_unicode_digits.mdpa": ":18:2: '８' is not an id",
+    "51_underscore_number.mdpa": ":6:16: YOUNG_MODULUS: '2_1e8' is not a number",
+    "52_hex_number.mdpa": ":6:16: YOUNG_MODULUS: '0x10' is not a number",
+    "53_self_nested_begin.mdpa": ":11:1: 'Begin Nodes' inside 'Begin Nodes' of line 10",
+    "61_trailing_comma.json": ":1:9: trailing comma before '}'",
+    "62_nan_literal.json": ":1:15: NaN is not a number in JSON",
+    "63_duplicate_key.json": ":1:12: duplicate key 'E', first given in line 1",
+    "64_unknown_key.json": "unknown key 'sovler'. Did you mean solver?",
+    "65_wrong_type.json": "tolerance must be a number; got '1e-8'",
+    "66_path_traversal.json": "path '../../../../etc/cron.d/x' leaves the folder of the run file",
+    "67_deep.json": ":1:65: nesting deeper than 64",
+    "68_missing_input.json": "does_not_exist.mdpa",
+    "69_directory_as_input.json": "is a folder; name a file in it",
+    "70_bigint.json": ":1:11: integer of 5001 digits is too long",
+    "80_ragged.elem": ":1:1: unknown statement 'NODES'",
+    "81_unknown_keyword.elem": ":1:1: unknown statement 'KinematicLinear3D11N'",
+    "90_pickle_in_npz.npz": ": unknown ending '.npz'",
+    "91_pickle_named_restart.rest": ": unknown ending '.rest'",
+}
+"""Files that no command takes, with place and error."""
+
+DESCRIBED = {
+    "04_unknown_element.mdpa": ":22: unknown element 'SmallDisplacementElement3D9N'",
+    "12_negative_density.mdpa": ":5: Properties 1: density (DENSITY) -7620 must be ≥ 0",
+    "13_nu_half.mdpa": ":7: Properties 1: nu (POISSON_RATIO) 0.5 must be < 0.5",
+    "14_E_zero.mdpa": ":6: Properties 1: E (YOUNG_MODULUS) 0 must be > 0 Pa",
+    "20_unknown_variable.mdpa": "found 'YOUNGS_MODULUS' at line 6: Did you mean YOUNG_MODULUS",
+    "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 4",
+}
+"""Files that read well and mean nonsense: ``info`` describes them, nothing else takes them."""
+
+
+@pytest.fixture
+def bad(shared, tmp_path, monkeypatch):
+    """Return the folder of bad files; a command on one of them that takes 5 s is an error."""
+
+    def late(*_):
+        raise TimeoutError("a bad file took more than 5 s")
+
+    monkeypatch.chdir(tmp_path)
+    old = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, 5)
+    yield shared / "bad"
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, old)
+
+
+def test_every_bad_file_is_in_a_table(shared):
+    names = {path.name for path in (shared / "bad").iterdir() if path.is_file()}
+    assert names == ACCEPTED.keys() | REFUSED.keys() | DESCRIBED.keys()
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+@pytest.mark.parametrize(
+    "words", [["solve", "--fix", "z-:xyz"], ["check"], ["info"]], ids=lambda words: words[0]
+)
+def test_an_odd_file_that_can_be_read_is_read(run, bad, name, words):
+    done = run(*words, bad / name)
+    assert (done.code, done.err) == (0, "")
+    if words[0] != "info" or "line" in ACCEPTED[name]:
+        assert ACCEPTED[name] in done.out
+    if words[0] == "solve":
+        assert rows_of(done.out)["unknowns"] == "12"
+
+
+@pytest.mark.parametrize("name", REFUSED | DESCRIBED)
+@pytest.mark.parametrize("words", [["solve", "--fix", "z-:xyz"], ["check"]], ids=lambda words: words[0])
+def test_a_bad_file_is_refused_with_place_and_cause(run, bad, name, words):
+    assert run(*words, bad / name).refuses(name, (REFUSED | DESCRIBED)[name])
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_bad_file_is_not_described_either(run, bad, name):
+    assert run("info", bad / name).refuses(name, REFUSED[name])
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_a_file_that_means_nonsense_is_described(run, bad, name):
+    done = run("info", bad / name)
+    assert (done.code, done.err) == (0, "")
+    assert "nodes       8\n" in done.out
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_bad_file_is_not_converted(run, bad, name):
+    assert run("convert", bad / name, "out.vtu").refuses(name, REFUSED[name])
+    assert not list(Path().iterdir())
+
+
+# ---- progress ----------------------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    def __init__(self, is_terminal):
+        super().__init__()
+        self.is_terminal = is_terminal
+
+    def isatty(self):
+        return self.is_terminal
+
+
+def shown(monkeypatch, is_terminal, calls):
+    """Return what is shown of calls (second, phase, share)."""
+    screen, now = Terminal(is_terminal), [0.0]
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(commands, "perf_counter", lambda: now[0])
+    progress = commands.TerminalProgress()
+    for now[0], phase, share in calls:
+        progress(phase, share)
+    progress.close()
+    return screen.getvalue()
+
+
+CALLS = [(1.0, "assemble", 0.1), (2.5, "assemble", 0.5), (2.6, "assemble", 0.6), (3.0, "solve", 0.25)]
+
+
+def test_progress_shows_after_two_seconds_five_times_a_second_and_is_wiped(monkeypatch):
+    lines = shown(monkeypatch, True, CALLS).split("\r")
+    assert lines == ["", "assemble     50%     2.5 s", "solve        25%     3.0 s", " " * 40, ""]
+
+
+def test_progress_of_a_short_work_or_without_a_terminal_is_not_shown(monkeypatch):
+    assert shown(monkeypatch, True, CALLS[:1]) == ""
+    assert shown(monkeypatch, False, CALLS) == ""

@@ -1,0 +1,374 @@
+"""Marches of models from run files and options: bit by bit those of Python, and what goes wrong."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.io.files import load
+
+MATERIAL = {"E": 3e10, "nu": 0.2, "density": 2500.0}
+TIME = {"step": 1e-3, "steps": 20, "every": 5}
+WORDS = ("--material", "E=3e10,nu=0.2,density=2500", "--fix", "z-:xyz", "--traction", "z+:1e5,0,0")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return a folder, the current one, with the mesh of a tower."""
+    monkeypatch.chdir(tmp_path)
+    mesh = kl.box((0.2, 0.2, 2.0), cells=(1, 1, 6))
+    mesh.parts = {}
+    kl.write("tower.mdpa", mesh)
+    return tmp_path
+
+
+def write(name="run.json", **changes):
+    content = {
+        "model": "tower.mdpa",
+        "material": MATERIAL,
+        "fix": {"z-": "xyz"},
+        "traction": {"z+": [1e5, 0, 0]},
+        "time": TIME,
+        **changes,
+    }
+    with open(name, "w") as file:
+        json.dump({key: value for key, value in content.items() if value is not None}, file, indent=1)
+
+
+def tower(load=None):
+    model = kl.Model(kl.read("tower.mdpa").mesh, kl.Isotropic3D(**MATERIAL))
+    model.fix("z-")
+    model.add(kl.Traction("z+", (1e5, 0.0, 0.0)) if load is None else load)
+    return model
+
+
+def marched(model, **options):
+    transient = model.transient(**options)
+    return [transient.moment(), *transient.march(dt=1e-3, steps=20, every=5)]
+
+
+def assert_same(path, moments):
+    with np.load(path) as file:
+        for name in ("time", "step", "u", "v", "a", "reactions"):
+            expected = np.array([getattr(moment, name) for moment in moments])
+            assert np.array_equal(file[name], expected), name
+
+
+# ---- the same as in Python ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "scheme"),
+    [
+        ("newmark", "newmark", kl.newmark()),
+        ("newmark:0.3,0.6", {"newmark": [0.3, 0.6]}, kl.newmark(0.3, 0.6)),
+        ("hht", "hht", kl.hht()),
+        ("hht:-0.1", {"hht": -0.1}, kl.hht(-0.1)),
+        ("bossak", "bossak", kl.bossak()),
+        ("bossak:-0.2", {"bossak": [-0.2]}, kl.bossak(-0.2)),
+        ("generalized_alpha:0.5", {"generalized_alpha": 0.5}, kl.generalized_alpha(0.5)),
+    ],
+)
+def test_words_file_and_python_march_alike(run, folder, word, value, scheme):
+    expected = marched(tower(), scheme=scheme, rayleigh=(0.5, 1e-5), lumped=True)
+    options = ("--scheme", word, "--rayleigh", "0.5,1e-5", "--lumped")
+    done = run("solve", "tower.mdpa", *WORDS, "--march", "1e-3:20:5", *options, "-o", "words.npz")
+    assert (done.code, done.err) == (0, "")
+    assert_same("words.npz", expected)
+    write(
+        time={**TIME, "scheme": value, "rayleigh": [0.5, 1e-5], "lumped": True},
+        output="file.npz",
+        json="a.json",
+    )
+    assert run("solve", "run.json").code == 0
+    assert_same("file.npz", expected)
+    end = json.loads((folder / "a.json").read_text())
+    np.testing.assert_array_equal(list(end["displacement"].values()), expected[-1].u)
+
+
+def test_central_differences(run, folder):
+    write(time={"step": 1e-5, "steps": 30, "every": 30, "scheme": "central_difference"}, output="end.npz")
+    done = run("solve", "run.json")
+    assert done.rows["scheme"] == "central_difference, lumped mass"
+    transient = tower().transient(scheme=kl.CentralDifference())
+    assert_same("end.npz", [transient.moment(), *transient.march(1e-5, 30, every=30)])
+    write(time={**TIME, "scheme": "central_difference"})
+    assert run("solve", "run.json").refuses("central differences are not stable", "the critical step is")
+
+
+def test_options_win_over_the_file(run, folder):
+    write(time={**TIME, "scheme": "hht", "rayleigh": [9.0, 0.0]}, output="file.npz")
+    words = ("--march", "2e-3:4:2", "--scheme", "bossak", "--rayleigh", "0,1e-6", "-o", "words.npz")
+    done = run("solve", "run.json", *words)
+    assert done.rows["scheme"] == "bossak(-0.3)"
+    assert done.rows["damping"] == "0 1/s × M + 1e-06 s × K"
+    transient = tower().transient(scheme=kl.bossak(), rayleigh=(0.0, 1e-6))
+    assert_same("words.npz", [transient.moment(), *transient.march(2e-3, 4, every=2)])
+    assert not (folder / "file.npz").exists()
+
+
+def test_loads_and_supports_that_change(run, folder):
+    write(
+        fix={"z-": {"x": {"times": [0, 0.01], "values": [0, 1e-3]}, "y": 0, "z": 0}},
+        traction={"z+": {"value": [1e5, 0, 0], "times": [0, 0.01], "factors": [0, 1]}},
+        pressure={"x-": {"value": 10.0, "times": [0, 1], "factors": [1, 2]}},
+        gravity={"value": [0, 0, -9.81], "times": [0.0], "factors": [0.5]},
+        output="file.npz",
+    )
+    assert run("solve", "run.json").code == 0
+    model = kl.Model(kl.read("tower.mdpa").mesh, kl.Isotropic3D(**MATERIAL))
+    model.fix("z-", "x", kl.TimeSeries([0, 0.01], [0, 1e-3]))
+    model.fix("z-", "yz")
+    ramp = kl.TimeSeries([0, 0.01], [0, 1])
+    model.add(kl.Varying(kl.Traction("z+", (1e5, 0, 0)), ramp))
+    model.add(kl.Varying(kl.Pressure("x-", 10.0), kl.TimeSeries([0, 1], [1, 2])))
+    model.add(kl.Varying(kl.Gravity((0, 0, -9.81)), kl.TimeSeries([0.0], [0.5])))
+    transient = model.transient()
+    moments = transient.march(dt=1e-3, steps=20, every=5)
+    assert_same("file.npz", [transient.moment(), *moments])
+
+
+def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
+    table = {"value": [1e5, 0, 0], "times": [0, 1], "factors": [0.5, 1]}
+    write(traction={"z+": table}, time=None, json="a.json")
+    assert "what changes with the time is that at t = 0" in run("solve", "run.json").rows["note"] + str(
+        json.loads((folder / "a.json").read_text())["notes"]
+    )
+    result = tower(kl.Traction("z+", (5e4, 0.0, 0.0))).solve()
+    found = np.array(list(json.loads((folder / "a.json").read_text())["displacement"].values()))
+    np.testing.assert_allclose(found, result.u, rtol=0, atol=1e-10 * np.abs(result.u).max())
+
+
+def test_a_restart_goes_on_bit_by_bit(run, folder):
+    write()
+    run("solve", "run.json", "-o", "whole.npz")
+    assert run("solve", "run.json", "--march", "1e-3:10", "--state", "half.npz").code == 0
+    assert run("solve", "run.json", "--march", "1e-3:10:5", "--restart", "half.npz", "-o", "b.npz").code == 0
+    write("again.json", time={"step": 1e-3, "steps": 10, "every": 5, "restart": "half.npz"}, output="c.npz")
+    assert run("solve", "again.json").code == 0
+    assert run("solve", "again.json", "--state", "half.npz").refuses("is the input or another output already")
+    with np.load("whole.npz") as whole, np.load("b.npz") as b, np.load("c.npz") as c:
+        for name in ("time", "step", "u", "v", "a"):
+            assert np.array_equal(whole[name][2:], b[name])
+            assert np.array_equal(whole[name][2:], c[name])
+
+
+def test_the_scene_gives_the_transient(folder):
+    write(time={**TIME, "scheme": "hht"})
+    scene = load("run.json")
+    assert str(scene.march) == "20 steps of 0.001 s by hht(-0.05)"
+    transient = scene.transient()
+    end = list(scene.moments(transient))[-1]
+    assert np.array_equal(end.u, marched(tower(), scheme=kl.hht())[-1].u)
+    write(time=None)
+    with pytest.raises(kl.ModelError, match="says nothing of a march"):
+        load("run.json").transient()
+
+
+# ---- outputs -------------------------------------------------------------------------------------
+
+
+def test_a_summary_with_the_numbers(run, folder):
+    write(gravity=[0, 0, -9.81])
+    done = run("solve", "run.json")
+    assert (done.code, done.err) == (0, "")
+    model = tower()
+    model.add(kl.Gravity((0, 0, -9.81)))
+    transient = model.transient()
+    moments = [transient.moment(), *transient.march(dt=1e-3, steps=20, every=5)]
+    largest = max(moments, key=lambda moment: np.linalg.norm(moment.u, axis=1).max())
+    size = np.linalg.norm(largest.u, axis=1)
+    rows = done.rows
+    assert rows["nodes"] == "28"
+    assert rows["elements"].startswith("6 ")
+    assert rows["unknowns"] == "72"
+    assert rows["scheme"] == "newmark(0.25, 0.5)"
+    assert rows["time"] == "0 … 0.02 s, 20 steps of 0.001 s"
+    node = model.mesh.node_ids[size.argmax()]
+    assert rows["largest displacement"] == (
+        f"{size.max():.6e} m at node {node}, t = {largest.time:.6g} s, of {len(moments)} kept"
+    )
+    assert rows["energy"] == f"0.000000e+00 J at the start, {transient.energy():.6e} J at the end"
+    force = [float(f) for f in re.findall(r"-?[\d.]+(?:e[+-]\d+)?", rows["total reaction"])]
+    np.testing.assert_allclose(force, moments[-1].reactions.sum(axis=0), rtol=1e-5, atol=1e-8)
+    assert re.match(r"\S+ s, \S+ s in all", rows["time per step"])
+    assert run("solve", "run.json", "-q").out == ""
+
+
+def test_a_still_march_is_told(run, folder):
+    write(traction=None)
+    assert "nothing moves" in run("solve", "run.json").rows["warning"]
+
+
+def test_frames_table_and_picture(run, folder):
+    pytest.importorskip("matplotlib")
+    write(output="out/swing.pvd", picture="out/end.png")
+    done = run("solve", "run.json", "--vtu", "ascii")
+    assert done.code == 0
+    names = sorted(path.name for path in (folder / "out").iterdir())
+    assert names == ["end.png", "swing.pvd", *(f"swing_{i:05d}.vtu" for i in range(5))]
+    assert b'format="ascii"' in (folder / "out" / "swing_00004.vtu").read_bytes()
+    assert run("solve", "run.json", "-o", "t.csv").code == 0
+    lines = (folder / "t.csv").read_text().splitlines()
+    assert lines[0].startswith("time [s],energy [J]")
+    assert [float(line.split(",")[0]) for line in lines[1:]] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
+
+
+def test_info_and_check_know_the_march(run, folder):
+    write(time={**TIME, "scheme": "bossak"})
+    assert "time        20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out
+    done = run("check", "run.json")
+    assert done.code == 0
+    assert "run.json: 28 nodes, 6 elements, 20 steps of 0.001 s by bossak(-0.3), no errors" in done.out
+    write(material={"E": 3e10, "nu": 0.2})
+    assert "to march Isotropic3D has density 0" in run("check", "run.json").out
+    write(time={**TIME, "scheme": "central_difference"})
+    assert run("check", "run.json").refuses("the critical step is")
+    write(fix=None)
+    assert "to march" not in run("check", "run.json").out  # inertia holds it
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
+def test_ctrl_c_keeps_the_series_and_the_state(folder):
+    write(time={"step": 1e-5, "steps": 10_000_000, "every": 1}, output="t.csv")
+    code = "import sys; from kratos_lite.cli import main; sys.exit(main(sys.argv[1:]))"
+    words = [sys.executable, "-c", code, "solve", "run.json", "--march", "1e-5:10000000", "-o", "out/t.pvd"]
+    process = subprocess.Popen([*words, "--state", "s.npz"], stderr=subprocess.PIPE, text=True)
+    clock = time.monotonic()
+    while not (folder / "out" / "t_00003.vtu").exists() and time.monotonic() - clock < 60:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in err
+    frames = len(re.findall("<DataSet", (folder / "out" / "t.pvd").read_text()))
+    assert kl.Moment.load("s.npz").step in (frames - 1, frames)
+
+
+# ---- what goes wrong -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("section", "place", "text"),
+    [
+        ({**TIME, "stpe": 1}, "stpe", "unknown key 'time.stpe'. Did you mean step"),
+        ({"steps": 2}, "time", "key 'time.step' is missing"),
+        ({"step": 1.0}, "time", "key 'time.steps' is missing"),
+        ({**TIME, "step": 0}, "step", "time.step: a step must be one number of seconds > 0; got 0.0"),
+        ({**TIME, "step": "1"}, "step", "time.step must be a number; got '1'"),
+        ({**TIME, "steps": 0}, "steps", "time.steps: steps must be a whole number ≥ 1; got 0"),
+        ({**TIME, "steps": 1.5}, "steps", "time.steps must be an integer; got 1.5"),
+        ({**TIME, "every": -1}, "every", "time.every: every must be a whole number ≥ 1; got -1"),
+        ({**TIME, "scheme": "nemark"}, "scheme", "unknown scheme 'nemark'. Did you mean newmark?"),
+        ({**TIME, "scheme": {"hht": 0.5}}, "scheme", "the α of HHT lies in -1/3 … 0; got 0.5"),
+        ({**TIME, "scheme": {"bossak": -0.5}}, "scheme", "the α of Bossak lies in -1/3 … 0; got -0.5"),
+        ({**TIME, "scheme": {"newmark": 0.5}}, "scheme", "newmark takes 0 or 2 numbers; got 1"),
+        ({**TIME, "scheme": {"hht": "a"}}, "scheme", "must be a name such as"),
+        ({**TIME, "scheme": 3}, "scheme", "must be a name such as"),
+        ({**TIME, "rayleigh": [1.0]}, "rayleigh", "must be [α, β], both ≥ 0"),
+        ({**TIME, "rayleigh": [-1.0, 0]}, "rayleigh", "must be [α, β], both ≥ 0"),
+        ({**TIME, "lumped": 1}, "lumped", "time.lumped must be true or false; got 1"),
+        ({**TIME, "restart": "none.npz"}, "restart", "time.restart: there is no file"),
+        ({**TIME, "restart": "../a.npz"}, "restart", "leaves the folder of the run file"),
+        ([1], "time", "time must be an object {…}; got [1]"),
+    ],
+)
+def test_a_wrong_section_is_told_with_its_place(run, folder, section, place, text):
+    write(time=section)
+    lines = (folder / "run.json").read_text().splitlines()
+    line = next(i for i, text_ in enumerate(lines, 1) if f'"{place}":' in text_)
+    start = line if place != "time" or section == [1] else r"\d+"
+    assert run("solve", "run.json").refuses(text)
+    assert re.match(rf"error: run\.json:{start}:\d+: ", run("solve", "run.json").err)
+    assert run("check", "run.json").refuses(text)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"output": "a.vtu"}, "output: a.vtu: a march is written as .pvd"),
+        ({"traction": {"z+": {"value": [1, 0, 0], "times": [0]}}}, "key 'traction.z+.factors' is missing"),
+        (
+            {"traction": {"z+": {"value": [1, 0, 0], "times": [0], "factors": [1], "x": 1}}},
+            "unknown key 'traction.z+.x'",
+        ),
+        (
+            {"traction": {"z+": {"value": [1, 0, 0], "times": [1, 0], "factors": [1, 2]}}},
+            "times of a series must ascend",
+        ),
+        ({"gravity": {"value": 9.81, "times": [0], "factors": [1]}}, "gravity.value must be a list of three"),
+        ({"fix": {"z-": {"x": {"times": [0, 1], "values": [0]}}}}, "as many values as times"),
+        ({"fix": {"z-": {"x": {"time": [0, 1]}}}}, "unknown key 'fix.z-.x.time'"),
+    ],
+)
+def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes, text):
+    write(**changes)
+    done = run("solve", "run.json")
+    assert done.refuses(text)
+    assert re.match(r"error: run\.json:\d+:\d+: ", done.err)
+
+
+@pytest.mark.parametrize(
+    ("words", "fragments"),
+    [
+        (("--march", "1e-3"), ("--march: expected STEP:STEPS[:EVERY]",)),
+        (("--march", "1e-3:2.5"), ("--march: expected",)),
+        (("--march", "1e-3:0"), ("steps must be a whole number ≥ 1",)),
+        (("--march", "x:3"), ("--march: 'x' is not a finite number",)),
+        (("--march", "-1:3"), ("a step must be one number of seconds > 0",)),
+        (("--march", "1:3", "--scheme", "euler"), ("unknown scheme 'euler'", "Known are newmark")),
+        (("--march", "1:3", "--scheme", "hht:a"), ("--scheme: 'a' is not a finite number",)),
+        (("--march", "1:3", "--scheme", "hht:1,2"), ("hht takes 0 or 1 numbers; got 2",)),
+        (("--march", "1:3", "--rayleigh", "1"), ("--rayleigh: ALPHA,BETA",)),
+        (("--march", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: ALPHA,BETA",)),
+        (("--march", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
+        (("--march", "1:3", "--modes", "2"), ("--modes and --march: give one of them",)),
+        (("--march", "1:3", "--solver", "amg"), ("--solver and --tolerance are for statics",)),
+        (("--march", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
+        (("--march", "1:3", "-o", "a.vtu"), ("a march is written as .pvd", "-o OUT.pvd")),
+        (("--march", "1:3", "--vtu", "ascii", "-o", "a.csv"), ("add -o OUT.pvd",)),
+        (("--march", "1:3", "--state", "a.csv"), ("the ending of --state must be .npz",)),
+        (("--march", "1:3", "-o", "tower.mdpa"), ("is the input or another output already",)),
+        (("--march", "1:3", "-o", "a.npz", "--state", "a.npz"), ("is the input or another output already",)),
+        (("-o", "a.pvd"), ("a.pvd: that is for a march; add --march STEP:STEPS, or write .vtu",)),
+        (("-o", "a.csv"), ("a.csv: that is for a march",)),
+        *(
+            ((f"--{name}", *value), (f"--{name} belongs to a march; add --march STEP:STEPS",))
+            for name, value in (
+                ("scheme", ["hht"]),
+                ("rayleigh", ["0,1"]),
+                ("lumped", []),
+                ("restart", ["a.npz"]),
+                ("state", ["a.npz"]),
+            )
+        ),
+    ],
+)
+def test_wrong_options_are_explained(run, folder, words, fragments):
+    done = run("solve", "tower.mdpa", *WORDS, *words)
+    assert done.refuses(*fragments)
+    assert [path.name for path in folder.iterdir()] == ["tower.mdpa"]
+
+
+def test_modes_of_a_file_that_marches_are_those_of_its_model(run, folder):
+    write()
+    told = run("solve", "run.json", "--modes", "2")
+    omega, _ = tower().modes(2)
+    assert [float(line.split()[2]) for line in told.out.splitlines()[1:]] == pytest.approx(omega, rel=1e-7)
+
+
+def test_what_is_doubtful_is_told(run, folder):
+    """Supports that jump at the start, and bodies that nothing but inertia holds."""
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--march", "1e-3:3")
+    told = run("solve", "tower.mdpa", *held, "--fix", "z-:xyz", "--fix", "z+:x=0.01").out
+    assert "supports are displaced by 0.01 m at the start of a model at rest" in told
+    told = run("solve", "tower.mdpa", *held, "--traction", "z+:1e3,0,0").out
+    assert "rigid motions are held by inertia alone" in told
+    assert "displaced" not in told

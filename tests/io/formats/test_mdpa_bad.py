@@ -1,0 +1,233 @@
+"""Malformed `.mdpa` files end in one clear error or are read, never in anything else."""
+
+import re
+
+import numpy as np
+import pytest
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Document
+from kratos_lite.io.formats.mdpa.reader import read_mdpa
+
+REFUSED = {
+    "01_truncated_in_nodes": r":15:7: the file ends inside 'Begin Nodes' of line 10; 'End Nodes' is missing",
+    "02_missing_end_nodes": r":20:1: 'Begin Elements' inside 'Begin Nodes' of line 10",
+    "03_end_mismatch": r":19:1: 'End Elements' closes 'Begin Nodes' of line 10",
+    "05_duplicate_node_id": r":18: node 7 stands at line 17 already",
+    "07_missing_node_ref": r":22: element 1 .*: there is no node 99",
+    "08_nan_coord": r":18:8: node 8: 'nan' is not a number",
+    "09_inf_coord": r":18:8: node 8: '1e999' is too large",
+    "10_too_few_nodes_in_element": r":22:2: element 1 has 7 nodes; SmallDisplacementElement3D8N needs 8",
+    "11_too_many_nodes_in_element": r":22:2: element 1 has 9 nodes; SmallDisplacementElement3D8N needs 8",
+    "15_E_text": r":6:16: YOUNG_MODULUS: 'steel' is not a number",
+    "16_decimal_comma": r":12:4: node 2: '1,0' is not a number; decimal comma\? write 1.0",
+    "18_missing_property": r":22: element 1 uses Properties 7",
+    "19_property_redefined": r":10:1: Properties 1 stands at line 4 already",
+    "21_duplicate_element_id": r":23: element 1 stands at line 22 already",
+    "22_repeated_node_in_element": r":22: element 1 .* names node 7 twice",
+    "24_submodelpart_missing_node": r":30: SubModelPart Bottom lists node 44",
+    "25_submodelpart_duplicate_name": r":33:1: SubModelPart Bottom stands at line 25 already",
+    "26_submodelpart_deep": r"blocks are nested more than 64 deep",
+    "27_negative_id": r":18:2: '-8' is not an id; ids are 1 … 2\^63-1",
+    "28_zero_id": r":11:2: '0' is not an id",
+    "29_float_id": r":12:2: '2.5' is not an id",
+    "30_huge_id": r":18:2: '99999999999999999999' is not an id",
+    "35_nul_byte": r":13:7: NUL byte",
+    "36_empty": r"there are no nodes",
+    "37_only_comment": r"there are no nodes",
+    "39_mixed_case": r":10:1: 'begin' stands outside any block; .*capitals matter",
+    "40_two_values_on_line": r":11:2: node 1 .*two nodes on one line\?",
+    "42_two_coords": r":13:2: node 3 has 2 coordinates",
+    "45_ctrl_chars_in_name": r":25:1: SubModelPart '../../etc/passwd' is no name",
+    "46_no_nodes_block": r"there are no nodes",
+    "50_unicode_digits": r":18:2: .* is not an id",
+    "51_underscore_number": r":6:16: YOUNG_MODULUS: '2_1e8' is not a number",
+    "52_hex_number": r":6:16: YOUNG_MODULUS: '0x10' is not a number",
+    "53_self_nested_begin": r":11:1: 'Begin Nodes' inside 'Begin Nodes' of line 10",
+}
+ACCEPTED = {
+    "00_good": [], "04_unknown_element": [], "12_negative_density": [], "13_nu_half": [], "14_E_zero": [],
+    "06_duplicate_node_id_same_coords": ["node 8 stands at line 18 already, the same"],
+    "20_unknown_variable": ["unknown variable YOUNGS_MODULUS is kept"],
+    "17_fortran_exponent": [], "23_inverted": [],
+    "31_crlf": [], "32_tabs": [], "33_bom": [], "34_non_utf8": [], "38_comment_everywhere": [],
+    "41_elements_before_nodes": [], "43_unknown_block": ["block Wibble is skipped"], "44_cr_only": [],
+    "47_unreferenced_node": [], "48_coincident_nodes": [], "49_long_line": [],
+}  # fmt: skip
+SAMPLE = b"""Begin ModelPartData
+ AMBIENT_TEMPERATURE 2.5e2 // C
+End ModelPartData
+Begin Table 1 TIME PRESSURE
+0 1
+End Table
+Begin Properties 1
+ DENSITY 7620.0
+ VOLUME_ACCELERATION [3] (0.0,0.0,-9.81)
+ Begin Table TEMPERATURE DENSITY
+ 1 2
+ End Table
+End Properties
+Begin Nodes
+ 1 0.0 0.0 0.0
+ 2 1.0 0.0 0.0
+ 3 1.0 1.0D0 0.0
+ 4 0.0 1.0 1.5
+End Nodes
+Begin Elements KinematicLinear3D4N /* one */
+ 1 1 1 2 3 4
+End Elements
+Begin Conditions SurfaceLoadCondition3D3N
+ 1 1 1 2 3
+End Conditions
+Begin Geometries Triangle3D3
+ 1 1 2 3
+End Geometries
+Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X
+ 1 0.0 [0.5, 0.5] 4 2 3
+End Constraints
+Begin NodalData DISPLACEMENT_X
+ 1 1 0.0
+End NodalData
+Begin NodalData VELOCITY
+ 1 0 [3] (1,2,3)
+End NodalData
+Begin ElementalData DENSITY
+ 1 2.0
+End ElementalData
+Begin SubModelPart A
+ Begin SubModelPartData
+  IS_RESTARTED true
+ End SubModelPartData
+ Begin SubModelPartNodes
+ 1
+ End SubModelPartNodes
+ Begin SubModelPart b
+ End SubModelPart
+End SubModelPart
+"""
+
+
+def outcome(path, data, **options):
+    """Read bytes; return the document or the error, and let anything else through."""
+    path.write_bytes(data)
+    try:
+        return read_mdpa(path, **options)
+    except InputError as error:
+        return error
+
+
+@pytest.mark.parametrize(("name", "message"), REFUSED.items())
+def test_malformed_file_is_refused_with_place_and_reason(shared, name, message):
+    with pytest.raises(InputError) as raised:
+        read_mdpa(shared / "bad" / f"{name}.mdpa")
+    assert re.search(message, str(raised.value))
+    assert len(str(raised.value).splitlines()) == 1
+    assert str(raised.value).startswith(f"{shared / 'bad' / name}.mdpa:")
+
+
+@pytest.mark.parametrize(("name", "notes"), ACCEPTED.items())
+def test_odd_file_is_accepted_with_its_notes(shared, name, notes):
+    document = read_mdpa(shared / "bad" / f"{name}.mdpa")
+    assert [n.text[: len(text)] for n, text in zip(document.notes, notes, strict=True)] == notes
+    more = name in ("47_unreferenced_node", "48_coincident_nodes")
+    assert (document.mesh.n_nodes, document.mesh.n_elements) == (8 + more, 1)
+
+
+def test_every_malformed_file_has_its_expectation(shared):
+    names = {path.stem for path in (shared / "bad").glob("*.mdpa")}
+    assert names == REFUSED.keys() | ACCEPTED.keys()
+
+
+def test_two_nodes_on_a_line_are_read_without_strict(shared):
+    document = read_mdpa(shared / "bad" / "40_two_values_on_line.mdpa", strict=False)
+    assert document.mesh.n_nodes == 8
+
+
+def test_unknown_element_is_kept_for_the_next_stage(shared):
+    (block,) = read_mdpa(shared / "bad" / "04_unknown_element.mdpa").mesh.blocks
+    assert (block.name, block.shape, block.nodes.shape) == ("SmallDisplacementElement3D9N", None, (1, 8))
+
+
+def test_sample_is_read(tmp_path):
+    document = outcome(tmp_path / "a.mdpa", SAMPLE)
+    assert isinstance(document, Document)
+    assert list(document.mesh.parts) == ["A", "A.b"]
+
+
+@pytest.mark.parametrize("strict", [True, False])
+def test_every_prefix_is_read_or_refused(tmp_path, strict):
+    path = tmp_path / "a.mdpa"
+    results = [outcome(path, SAMPLE[:n], strict=strict) for n in range(len(SAMPLE))]
+    whole = [n for n, result in enumerate(results) if isinstance(result, Document)]
+    ends = [m.end() for m in re.finditer(rb"(?m)^End \w+", SAMPLE)]
+    # A prefix is a whole file only where the last block is closed and the nodes that it needs have come.
+    first = SAMPLE.index(b"End Nodes")
+    assert all(any(end <= n for end in ends) and n > first for n in whole)
+    assert len(whole) < len(SAMPLE) / 10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_flip_is_read_or_refused(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    refused = 0
+    for _ in range(250):
+        data = bytearray(SAMPLE)
+        data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        result = outcome(tmp_path / "a.mdpa", bytes(data), strict=bool(rng.integers(2)))
+        assert isinstance(result, (Document, InputError))
+        refused += isinstance(result, InputError)
+    assert refused > 50
+
+
+def test_flip_of_a_digit_never_changes_more_than_its_number(tmp_path):
+    text = SAMPLE.replace(b"1.5", b"1.7")
+    assert outcome(tmp_path / "a.mdpa", text).mesh.points[3].tolist() == [0, 1, 1.7]
+
+
+def test_twenty_problems_are_shown_and_the_rest_counted(tmp_path):
+    rows = b"".join(b"%d x 0 0\n" % n for n in range(1, 31))
+    error = outcome(tmp_path / "a.mdpa", b"Begin Nodes\n" + rows + b"End Nodes\n")
+    lines = str(error).splitlines()
+    assert len(lines) == 21
+    assert lines[-1] == "… and 10 more"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Begin", r":1:5: a word is missing after 'Begin'; the file ends"),
+        ("Begin Elements\nEnd Elements", r":2:1: a word is missing after 'Begin Elements'; found 'End'"),
+        ("Begin nodes\nEnd nodes", r":1:1: unknown block 'nodes'; capitals matter: write 'Begin Nodes'"),
+        ("Begin SubModelPartNodes\n1\nEnd SubModelPartNodes", r"stands outside the block that it belongs to"),
+        ("End Nodes", r":1:1: 'End Nodes' closes nothing"),
+        ("Begin Nodes\n1 0 0 0\nEnd Nodes 5", r":3:11: '5' stands outside any block"),
+        ("Begin Nodes\n1 0 0 0\nEnd Nodes /* open", r":3:11: comment '/\*' is never closed"),
+        ("Begin Properties x\nEnd Properties", r":1:1: Properties: 'x' is not an id"),
+        ("Begin Properties -1\nEnd Properties", r":1:1: Properties: '-1' is not an id"),
+        ("Begin SubModelPart A\n 3\nEnd SubModelPart", r":2:2: '3' stands outside any block"),
+        ("Begin Elements \xe9\nEnd Elements", r"is no name; use plain letters"),
+    ],
+)
+def test_broken_structure_is_refused_with_its_place(tmp_path, text, message):
+    error = outcome(tmp_path / "a.mdpa", text.encode("latin-1"))
+    assert isinstance(error, InputError)
+    assert re.search(message, str(error))
+
+
+@pytest.mark.parametrize("name", [".A", "A..b", "A.", "A/b", "../A", "A*"])
+def test_part_names_that_are_no_names_are_refused(tmp_path, name):
+    text = f"Begin Nodes\n1 0 0 0\nEnd Nodes\nBegin SubModelPart {name}\nEnd SubModelPart\n"
+    error = outcome(tmp_path / "a.mdpa", text.encode())
+    assert isinstance(error, InputError)
+    assert re.search(r":4:1: SubModelPart .* is no name", str(error))
+
+
+def test_long_line_missing_file_folder_and_broken_gzip(tmp_path):
+    path = tmp_path / "a.mdpa"
+    assert "a line of more than 1000000 bytes" in str(outcome(path, b"\n//" + b" " * 1_000_000))
+    assert ":2: " in str(outcome(path, b"\n//" + b" " * 1_000_000))
+    assert "broken gzip" in str(outcome(path, b"\x1f\x8bxx"))
+    with pytest.raises(InputError, match="there is no such file"):
+        read_mdpa(tmp_path / "none.mdpa")
+    with pytest.raises(InputError, match="is a folder"):
+        read_mdpa(tmp_path)

@@ -1,0 +1,441 @@
+"""Points in a mesh: which element contains them, where in it they lie, and those outside."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.bodies.rotations import exp
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import InputError, MeshError
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.boxes import BoxTree, cell_boxes
+from kratos_lite.mesh.nearest import distance_to_cell
+from kratos_lite.shapes import Quadrilateral4, inverse_map
+
+NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+TURN = exp([0.3, -0.8, 0.5])
+
+each_element = pytest.mark.parametrize("name", NAMES)
+
+
+def block(name, nodes, first_id=1):
+    nodes = np.atleast_2d(nodes).astype(np.int32)
+    ids = np.arange(first_id, first_id + len(nodes))
+    return Block(name, nodes, ids, np.ones_like(ids), ELEMENTS[name].shape)
+
+
+def one_cell(name, X):
+    return Mesh(X, [block(name, np.arange(len(X)))])
+
+
+def points_in(shape, count, seed=0):
+    """Return random points of the reference cell, some of them near its corners and edges."""
+    corners = shape.nodes[: shape.corners]
+    return np.random.default_rng(seed).dirichlet(np.full(len(corners), 0.5), count) @ corners
+
+
+def bent(name, cells=(3, 3, 3)):
+    """Return a turned box whose nodes follow a smooth map, so that quadratic cells are curved."""
+    mesh = kl.box((1.0, 2.0, 3.0), cells, name, origin=(-0.5, -1.0, -1.5))
+    x, y, z = mesh.points.T
+    wave = np.column_stack([0.1 * np.sin(2 * y + z), 0.08 * np.cos(3 * x - z), 0.1 * np.sin(x * y + z)])
+    mesh.points = (mesh.points + wave) @ TURN.T
+    return mesh
+
+
+def points_of(mesh, per_cell=4, seed=0):
+    """Return random points of every element with the row of each."""
+    X, rows, start = [], [], 0
+    for part in mesh.blocks:
+        for cell, nodes in enumerate(part.nodes):
+            X.append(part.shape.N(points_in(part.shape, per_cell, seed + cell)) @ mesh.points[nodes])
+            rows += [start + cell] * per_cell
+        start += len(part)
+    return np.vstack(X), np.array(rows)
+
+
+def mixed():
+    """Return a hexahedron, a pyramid on it, a wedge beside it and a tetrahedron, a block each."""
+    points = np.vstack([
+        ELEMENTS["KinematicLinear3D8N"].nodes,
+        [[0.1, -0.1, 2.5], [3.0, -1.0, 0.1], [3.1, 1.2, 0.0], [0.0, 3.0, 3.0]],
+    ])  # fmt: skip
+    blocks = [
+        block("KinematicLinear3D8N", [0, 1, 2, 3, 4, 5, 6, 7], 10),
+        block("KinematicLinear3D5N", [4, 5, 6, 7, 8], 20),
+        block("KinematicLinear3D6N", [1, 5, 9, 2, 6, 10], 30),
+        block("KinematicLinear3D4N", [6, 7, 8, 11], 40),
+    ]
+    return Mesh(points, blocks)
+
+
+# ---- there and back --------------------------------------------------------------------------------
+
+
+@each_element
+def test_points_of_a_bent_mesh_come_back(name):
+    mesh = bent(name)
+    X, rows = points_of(mesh)
+    found = mesh.locate(X)
+    assert found.inside.all()
+    np.testing.assert_allclose(found.interpolate(mesh.points), X, rtol=0, atol=1e-12)
+    assert found.rows.tolist() == rows.tolist()
+    assert (found.block == 0).all()
+    assert (found.cell == found.rows).all()
+
+
+@each_element
+def test_every_node_locates_to_itself(name):
+    for mesh in (kl.box((1.0, 2.0, 3.0), (2, 2, 2), name), bent(name)):
+        found = mesh.locate(mesh.points)
+        assert found.inside.all()
+        nodes = mesh.blocks[0].nodes[found.cell]
+        assert (nodes == np.arange(mesh.n_nodes)[:, None]).any(axis=1).all()
+        place = (nodes == np.arange(mesh.n_nodes)[:, None]).argmax(axis=1)
+        assert found.xi.tolist() == mesh.blocks[0].shape.nodes[place].tolist()
+        unit = np.eye(mesh.blocks[0].nodes.shape[1])[place]
+        np.testing.assert_allclose(mesh.blocks[0].shape.N(found.xi), unit, rtol=0, atol=1e-12)
+
+
+@each_element
+def test_a_point_of_several_elements_belongs_to_the_lowest_row(name):
+    mesh = bent(name)
+    used = mesh.blocks[0].nodes
+    lowest = [int(np.flatnonzero((used == node).any(axis=1))[0]) for node in range(mesh.n_nodes)]
+    assert mesh.locate(mesh.points).rows.tolist() == lowest
+    shape = mesh.blocks[0].shape
+    for face in mesh.blocks[0].shape.faces:
+        middle = shape.nodes[[a for a in face if a < shape.corners]].mean(axis=0)
+        X = shape.N(middle) @ mesh.points[used]
+        found = mesh.locate(X)
+        assert found.inside.all()
+        assert (found.rows <= np.arange(len(X))).all()
+        again = mesh.locate(X[::-1])
+        assert again.rows[::-1].tolist() == found.rows.tolist()
+
+
+def test_the_middle_of_a_shared_face_belongs_to_the_lower_row_whatever_the_sizes():
+    points = kl.box((1.0, 1.0, 1.0), (2, 1, 1)).points
+    points[points[:, 0] == 1.0, 0] = 100.0
+    nodes = kl.box((1.0, 1.0, 1.0), (2, 1, 1)).blocks[0].nodes
+    for order in ([0, 1], [1, 0]):
+        mesh = Mesh(points, [block("KinematicLinear3D8N", nodes[order])])
+        assert mesh.locate([0.5, 0.3, 0.7]).rows == 0
+
+
+@each_element
+def test_distorted_single_cells(name):
+    shape = ELEMENTS[name].shape
+    edge = 2.0 if shape.cell == "hexahedron" else 1.0
+    for seed in range(5):
+        X = shape.nodes + 0.08 * edge * np.random.default_rng(seed).uniform(-1, 1, shape.nodes.shape)
+        xi = points_in(shape, 200, seed)
+        found = one_cell(name, X).locate(shape.N(xi) @ X)
+        assert found.inside.all()
+        np.testing.assert_allclose(found.xi, xi, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "seed"),
+    [
+        ("KinematicLinear3D10N", 0.15, 8),
+        ("KinematicLinear3D13N", 0.1, 2),
+        ("KinematicLinear3D15N", 0.15, 9),
+        ("KinematicLinear3D27N", 0.3, 6),
+    ],
+)
+def test_a_point_whose_first_way_leads_to_another_xi_is_found(name, size, seed):
+    """Newton from the middle of these cells ends outside them; from near a node it finds the point."""
+    shape, rng = ELEMENTS[name].shape, np.random.default_rng(seed)
+    X = shape.nodes + size * rng.uniform(-1, 1, shape.nodes.shape)
+    xi = points_in(shape, 2000, seed)
+    if shape.cell == "pyramid":
+        h = 10.0 ** -rng.uniform(0, 6, 200)
+        xi = np.vstack([xi, np.column_stack([rng.uniform(-1, 1, (200, 2)) * h[:, None], 1 - h])])
+    assert (np.linalg.det(np.swapaxes(shape.dN(xi), 1, 2) @ X) > 0.02).all()
+    p = shape.N(xi) @ X
+    assert not inverse_map(shape, X, p).inside.all()
+    found = one_cell(name, X).locate(p)
+    assert found.inside.all()
+    np.testing.assert_allclose(found.xi, xi, rtol=0, atol=1e-11)
+
+
+def test_quarter_point_elements_locate_their_points_and_the_singular_node():
+    """With mid-edge nodes at a quarter det J = 0 at the corner."""
+    X = ELEMENTS["KinematicLinear3D20N"].nodes.copy()
+    X[[8, 11, 12]] = (X[[8, 11, 12]] + X[0]) / 2
+    mesh = one_cell("KinematicLinear3D20N", X)
+    xi = points_in(mesh.blocks[0].shape, 200)
+    p = np.vstack([mesh.blocks[0].shape.N(xi) @ X, X])
+    found = mesh.locate(p)
+    assert found.inside.all()
+    np.testing.assert_allclose(found.interpolate(X), p, rtol=0, atol=1e-12)
+    assert found.xi[200].tolist() == [-1, -1, -1]
+
+
+# ---- mixed meshes, scales, gaps --------------------------------------------------------------------
+
+
+def test_a_mixed_mesh():
+    mesh = mixed()
+    X, rows = points_of(mesh, 50)
+    found = mesh.locate(X)
+    assert found.inside.all()
+    assert found.rows.tolist() == rows.tolist()
+    assert found.block.tolist() == rows.tolist()
+    assert set(found.cell) == {0}
+    np.testing.assert_allclose(found.interpolate(mesh.points), X, rtol=0, atol=1e-12)
+    apex = mesh.locate(mesh.points[8])
+    assert (int(apex.rows), apex.xi.tolist()) == (1, [0, 0, 1])
+
+
+def test_blocks_without_a_shape_without_cells_or_of_faces_contain_nothing():
+    mesh = mixed()
+    nodes = mesh.blocks[0].nodes
+    strange = Block("Spring", nodes[:, :2], np.array([1]), np.array([1]), None)
+    empty = block("KinematicLinear3D8N", np.zeros((0, 8)))
+    shell = Block("Shell", nodes[:, :4], np.array([1]), np.array([1]), Quadrilateral4)
+    mesh = Mesh(mesh.points, [strange, empty, shell, *mesh.blocks, empty])
+    X, rows = points_of(mixed(), 20)
+    found = mesh.locate(X)
+    assert found.rows.tolist() == (rows + 2).tolist()
+    assert found.block.tolist() == (rows + 3).tolist()
+    np.testing.assert_allclose(found.interpolate(mesh.points), X, rtol=0, atol=1e-12)
+    only_strange = Mesh(mesh.points, [strange])
+    assert not only_strange.locate(X).inside.any()
+    with pytest.raises(MeshError, match="outside the mesh, which has no elements"):
+        only_strange.locate(X[0], required=True)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+@each_element
+def test_units_do_not_matter(name, scale):
+    mesh = bent(name, (2, 2, 2))
+    X, _ = points_of(mesh, 3)
+    near = mesh.locate(X)
+    mesh.points = scale * mesh.points
+    found = mesh.locate(scale * X)
+    assert found.rows.tolist() == near.rows.tolist()
+    np.testing.assert_allclose(found.xi, near.xi, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found.interpolate(mesh.points), scale * X, rtol=0, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e6, 1e9])
+@each_element
+def test_far_from_the_origin(name, distance):
+    mesh = bent(name, (2, 2, 2))
+    X, _ = points_of(mesh, 3)
+    mesh.points = mesh.points + distance
+    found = mesh.locate(X + distance)
+    assert found.inside.all()
+    error = np.abs(found.interpolate(mesh.points) - (X + distance)).max()
+    assert error <= 8 * np.finfo(float).eps * distance
+    assert mesh.locate(mesh.points).inside.all()
+
+
+def test_a_thin_gap_belongs_to_nobody():
+    gap = 1e-6
+    left, right = (
+        kl.box((1.0, 1.0, 1.0), (2, 2, 2)),
+        kl.box((1.0, 1.0, 1.0), (2, 2, 2), origin=(1 + gap, 0, 0)),
+    )
+    nodes = np.vstack([left.blocks[0].nodes, right.blocks[0].nodes + left.n_nodes])
+    mesh = Mesh(np.vstack([left.points, right.points]), [block("KinematicLinear3D8N", nodes)])
+    x = np.array([1 - gap / 4, 1 + gap / 4, 1 + gap / 2, 1 + 3 * gap / 4, 1 + 5 * gap / 4])
+    found = mesh.locate(np.column_stack([x, 0 * x + 0.3, 0 * x + 0.8]))
+    assert found.inside.tolist() == [True, False, False, False, True]
+    assert (found.rows >= 8).tolist() == [False, False, False, False, True]
+    with pytest.raises(MeshError, match=r"lies outside the mesh, 5e-07 m from element"):
+        found[2].require()
+
+
+def test_thin_slanted_cells_whose_boxes_overlap_all():
+    mesh = kl.box((1.0, 1.0, 1.0), (60, 2, 2))
+    mesh.points = mesh.points * [0.01, 1, 1] @ exp([0.0, 0.0, 0.7]).T
+    X, rows = points_of(mesh, 2)
+    assert mesh.locate(X).rows.tolist() == rows.tolist()
+
+
+def test_cells_of_very_different_sizes():
+    mesh = kl.box((1.0, 1.0, 1.0), (20, 20, 1))
+    mesh.points = mesh.points**8
+    X, _ = points_of(mesh, 3)
+    found = mesh.locate(X)
+    assert found.inside.all()
+    np.testing.assert_allclose(found.interpolate(mesh.points), X, rtol=1e-12, atol=1e-16)
+
+
+def test_boxes_enclose_curved_cells_and_fit_straight_ones():
+    for name in NAMES:
+        shape = ELEMENTS[name].shape
+        xi = points_in(shape, 2000)
+        for seed in range(20):
+            X = shape.nodes + 0.3 * np.random.default_rng(seed).uniform(-1, 1, shape.nodes.shape)
+            low, high = cell_boxes(X, block(name, np.arange(len(X))))
+            assert ((low <= shape.N(xi) @ X) & (shape.N(xi) @ X <= high)).all()
+        low, high = cell_boxes(shape.nodes, block(name, np.arange(len(X))))
+        np.testing.assert_allclose([low[0], high[0]], [shape.nodes.min(0), shape.nodes.max(0)], atol=1e-7)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 8, 9, 500])
+def test_the_tree_finds_what_a_scan_finds(n):
+    rng = np.random.default_rng(n)
+    low = rng.uniform(0, 1, (n, 3))
+    high = low + rng.uniform(0, 0.4, (n, 3))
+    if n > 5:
+        low[3], high[3] = np.inf, -np.inf
+    x = rng.uniform(0, 1.4, (300, 3))
+    at, box = BoxTree(low, high).around(x)
+    scan = np.argwhere(((low <= x[:, None]) & (x[:, None] <= high)).all(axis=2))
+    assert sorted(zip(at.tolist(), box.tolist(), strict=True)) == [tuple(pair) for pair in scan.tolist()]
+
+
+def test_many_points_are_found_as_few_are(monkeypatch):
+    mesh = bent("KinematicLinear3D20N")
+    X, _ = points_of(mesh, 3)
+    once = mesh.locate(X)
+    monkeypatch.setattr("kratos_lite.mesh.locate.POINTS_AT_ONCE", 7)
+    again = mesh.locate(X)
+    assert again.rows.tolist() == once.rows.tolist()
+    assert again.xi.tolist() == once.xi.tolist()
+
+
+# ---- outside ---------------------------------------------------------------------------------------
+
+
+@each_element
+def test_points_outside_are_told_from_points_inside(name):
+    mesh = kl.box((1.0, 2.0, 3.0), (2, 2, 2), name)
+    x = np.random.default_rng(0).uniform(-0.5, 3.5, (500, 3))
+    found = mesh.locate(x)
+    expected = ((x >= 0) & (x <= [1, 2, 3])).all(axis=1)
+    assert found.inside.tolist() == expected.tolist()
+    out = ~expected
+    assert (found.rows[out] == -1).all()
+    assert (found.block[out] == -1).all()
+    assert (found.cell[out] == -1).all()
+    assert np.isnan(found.xi[out]).all()
+    assert np.isnan(found.interpolate(mesh.points)[out]).all()
+    np.testing.assert_allclose(found.interpolate(mesh.points)[~out], x[~out], rtol=0, atol=1e-14)
+
+
+def test_the_error_says_which_point_how_far_and_the_cure():
+    mesh = kl.box((1.0, 1.0, 1.0), (2, 1, 1))
+    points = [[0.5, 0.5, 0.5], [1.25, 0.5, 0.5], [0.0, 0.0, 9.0]]
+    with pytest.raises(
+        MeshError,
+        match=r"point 1 at \[1.25, 0.5, 0.5\] m \(and 1 more of 3\) lies outside the mesh, "
+        r"0.25 m from element 2 \(KinematicLinear3D8N\); move it into the mesh, or choose .*\.inside",
+    ):
+        mesh.locate(points, required=True)
+    with pytest.raises(
+        MeshError, match=r"^the point at \[-1.0, 0.0, 0.0\] m lies outside the mesh, 1 m from"
+    ):
+        mesh.locate([-1.0, 0.0, 0.0], required=True)
+    with pytest.raises(MeshError, match=r"^point 0, 1 at"):
+        mesh.locate([[points[0], points[1]]], required=True)
+    found = mesh.locate(points)
+    for refused in (found.require, found.weights, lambda: found.spread(np.ones(3))):
+        with pytest.raises(MeshError, match="point 1 at"):
+            refused()
+    with pytest.raises(MeshError, match="the point at"):
+        found.nodes_and_weights(2)
+    assert found[found.inside].require().rows.tolist() == [0]
+
+
+def test_the_distance_to_curved_faces_triangles_and_quadrilaterals():
+    x = kl.box((2.0, 2.0, 2.0), (1, 1, 1), "KinematicLinear3D27N", origin=(-1.0, -1.0, -1.0)).points
+    ball = x * (np.abs(x).max(axis=1) / np.maximum(np.linalg.norm(x, axis=1), 1e-300))[:, None]
+    mesh = one_cell("KinematicLinear3D27N", ball[kl.box(element="KinematicLinear3D27N").blocks[0].nodes[0]])
+    shape = mesh.blocks[0].shape
+    assert distance_to_cell(shape, mesh.points, np.array([0.0, 0.0, 3.0])) == pytest.approx(2.0, rel=1e-6)
+    for name in ("KinematicLinear3D4N", "KinematicLinear3D10N"):
+        shape = ELEMENTS[name].shape
+        far = distance_to_cell(shape, shape.nodes, np.array([1.0, 1.0, 1.0]))
+        assert far == pytest.approx(2 / np.sqrt(3), rel=1e-6)
+        assert distance_to_cell(shape, shape.nodes, np.array([0.2, 0.3, -1e-6])) == pytest.approx(
+            1e-6, rel=1e-3
+        )
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        ([[0.0, np.nan, 0.0]], "points to locate must be finite"),
+        ([[0.0, 1.0]], r"shape \(m, 3\) or \(3,\); got \(1, 2\)"),
+        (1.0, r"shape \(m, 3\) or \(3,\); got \(\)"),
+        ("middle", "points to locate must be made of real numbers"),
+    ],
+)
+def test_wrong_points_are_refused(points, words):
+    with pytest.raises(InputError, match=words):
+        kl.box().locate(points)
+
+
+def test_a_mesh_with_a_node_at_no_place_is_refused():
+    mesh = kl.box()
+    mesh.points[3, 1] = np.nan
+    with pytest.raises(MeshError, match="node 4 must have finite coordinates"):
+        mesh.locate([0.5, 0.5, 0.5])
+
+
+# ---- values ----------------------------------------------------------------------------------------
+
+
+def test_one_point_many_points_none_and_any_leading_axes():
+    mesh = bent("KinematicLinear3D8N")
+    X, _ = points_of(mesh, 2)
+    field = mesh.points @ [1.0, 2.0, 3.0] + 4.0
+    all_of_them = mesh.locate(X)
+    one = mesh.locate(X[5])
+    assert one.rows.shape == one.block.shape == one.cell.shape == one.inside.shape == ()
+    assert one.xi.tolist() == all_of_them.xi[5].tolist()
+    assert one.interpolate(field).shape == ()
+    assert one.interpolate(mesh.points).shape == (3,)
+    grid = mesh.locate(X[:12].reshape(2, 6, 3))
+    assert grid.rows.tolist() == all_of_them.rows[:12].reshape(2, 6).tolist()
+    tensors = np.repeat(mesh.points[:, :, None], 2, axis=2)
+    assert grid.interpolate(tensors).shape == (2, 6, 3, 2)
+    np.testing.assert_allclose(grid.interpolate(tensors)[..., 1], X[:12].reshape(2, 6, 3), atol=1e-13)
+    none = mesh.locate(np.zeros((0, 3)))
+    assert none.require().interpolate(mesh.points).shape == (0, 3)
+    assert none.weights().shape == (0, mesh.n_nodes)
+    assert not none.spread(np.zeros((0, 3))).any()
+
+
+@each_element
+def test_spread_is_the_transpose_of_interpolate_and_keeps_force_and_moment(name):
+    mesh = bent(name, (2, 2, 2))
+    X, _ = points_of(mesh, 3)
+    found = mesh.locate(X)
+    f = np.random.default_rng(2).uniform(-1, 1, X.shape)
+    nodal = found.spread(f)
+    assert nodal.shape == mesh.points.shape
+    v = np.random.default_rng(3).uniform(-1, 1, mesh.points.shape)
+    assert np.vdot(v, nodal) == pytest.approx(np.vdot(found.interpolate(v), f), rel=1e-12)
+    np.testing.assert_allclose(nodal.sum(axis=0), f.sum(axis=0), rtol=0, atol=1e-12)
+    moment = np.cross(mesh.points, nodal).sum(axis=0)
+    np.testing.assert_allclose(moment, np.cross(X, f).sum(axis=0), rtol=0, atol=1e-11)
+    W = found.weights()
+    np.testing.assert_allclose(W @ v, found.interpolate(v), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(W.T @ f, nodal, rtol=0, atol=1e-13)
+    assert found.spread(f[:, 0]).shape == (mesh.n_nodes,)
+
+
+def test_nodes_and_weights_of_one_point():
+    mesh = mixed()
+    X = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 1.5]])
+    found = mesh.locate(X)
+    for i, row in enumerate((0, 1)):
+        nodes, weights = found.nodes_and_weights(i)
+        assert nodes.tolist() == mesh.blocks[row].nodes[0].tolist()
+        np.testing.assert_allclose(weights @ mesh.points[nodes], X[i], rtol=0, atol=1e-14)
+        assert mesh.locate(X[i]).nodes_and_weights()[1].tolist() == weights.tolist()
+
+
+def test_values_of_a_wrong_shape_are_refused():
+    found = kl.box().locate([[0.5, 0.5, 0.5]])
+    with pytest.raises(InputError, match=r"nodal values must have shape \(8, …\); got \(7, 3\)"):
+        found.interpolate(np.zeros((7, 3)))
+    with pytest.raises(InputError, match=r"must have shape \(1,\) and more; got \(2, 3\)"):
+        found.spread(np.zeros((2, 3)))

@@ -1,0 +1,126 @@
+"""Compiled kernels: the same numbers as NumPy, whatever the threads; a working package without them."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.errors import InputError
+from kratos_lite.native import described, kernels, threads
+
+compiled = pytest.mark.skipif(kernels("sparse") is None, reason="the compiled kernels were not built")
+
+
+def matrix(n=2500, seed=1):
+    """Return a random matrix of blocks with an empty row."""
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(1, 9, n)
+    counts[7] = 0
+    columns = [np.sort(rng.choice(n, c, replace=False)) for c in counts]
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    indices = np.concatenate(columns).astype(np.int32)
+    return BlockMatrix(rng.standard_normal((len(indices), 3, 3)), indices, indptr)
+
+
+@compiled
+def test_product_is_that_of_scipy():
+    A = matrix()
+    x = np.random.default_rng(2).standard_normal(A.shape[0])
+    np.testing.assert_allclose(A @ x, A.scipy() @ x, rtol=0, atol=1e-13)
+
+
+@compiled
+def test_product_does_not_depend_on_the_number_of_threads():
+    A, module = matrix(), kernels("sparse")
+    x = np.random.default_rng(3).standard_normal(A.shape[0])
+    results = []
+    for count in (1, 2, 3, 5):
+        module.set_threads(count)
+        results.append(A @ x)
+    module.set_threads(2)
+    for other in results[1:]:
+        np.testing.assert_array_equal(other, results[0])
+
+
+@compiled
+def test_wrong_shapes_are_refused():
+    A = matrix()
+    with pytest.raises(ValueError, match="three numbers for each row"):
+        A @ np.zeros(5)
+
+
+def test_norm_and_diagonal_blocks():
+    A = matrix()
+    assert A.norm() == pytest.approx(abs(A.scipy()).sum(axis=1).max(), rel=1e-14)
+    rows, at = A.rows(), A.diagonal_blocks()
+    np.testing.assert_array_equal(rows[at], A.indices[at])
+
+
+def python(code, **environment):
+    """Return what a fresh interpreter prints, output and errors apart."""
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, **environment},
+    )
+    return run.stdout.split(), run.stderr
+
+
+@compiled
+@pytest.mark.parametrize("isa", ["base", "avx2", "avx512"])
+def test_every_instruction_set_gives_the_same_to_rounding(isa):
+    code = (
+        "import numpy as np\nfrom tests.native.test_native import matrix\n"
+        "A = matrix()\nprint(float(np.abs(A @ np.ones(A.shape[0]) - A.scipy() @ np.ones(A.shape[0])).max()))"
+    )
+    out, _ = python(code, KRATOS_LITE_ISA=isa, PYTHONPATH=os.getcwd())
+    assert float(out[0]) < 1e-13
+
+
+def test_kernels_can_be_left_aside():
+    out, _ = python(
+        "from kratos_lite.native import described; print(described())", KRATOS_LITE_KERNELS="numpy"
+    )
+    assert out == ["NumPy"]
+
+
+def test_a_missing_kernel_is_said_once():
+    code = "from kratos_lite.native import kernels\nprint(kernels('nothing'), kernels('nothing'))"
+    out, errors = python(code, KRATOS_LITE_KERNELS="")
+    assert out == ["None", "None"]
+    assert errors.count("compiled kernels are not available") == 1
+
+
+@compiled
+def test_described_names_what_computes():
+    assert described().startswith("compiled (")
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [
+        *(("KRATOS_LITE_THREADS", value) for value in ("²", "0", "-1", "2.0", "many")),
+        ("KRATOS_LITE_KERNELS", "numpi"),
+        ("KRATOS_LITE_ISA", "avx"),
+    ],
+)
+def test_nonsense_in_the_environment_is_refused(monkeypatch, variable, value):
+    monkeypatch.setenv("KRATOS_LITE_KERNELS", "")
+    monkeypatch.setenv(variable, value)
+    with pytest.raises(InputError, match=f"{variable}='{value}'; expected"):
+        threads() if variable == "KRATOS_LITE_THREADS" else kernels.__wrapped__("sparse")
+
+
+@pytest.mark.parametrize("value", ["1000000", "9" * 5000])
+def test_threads_are_at_most_four_a_core(monkeypatch, value):
+    monkeypatch.delenv("KRATOS_LITE_THREADS", raising=False)
+    cores = threads()
+    monkeypatch.setenv("KRATOS_LITE_THREADS", value)
+    assert threads() == 4 * cores
+    monkeypatch.setenv("KRATOS_LITE_THREADS", "01")
+    assert threads() == 1

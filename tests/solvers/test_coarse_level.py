@@ -1,0 +1,93 @@
+"""The linear level of a mesh of quadratic elements: its interpolation and its stiffness."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import kratos_lite as kl
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.stiffness import Pattern, assemble_dense, assemble_stiffness
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.shapes import Hexahedron8
+from kratos_lite.solvers.coarse_level import linear_level
+
+STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+LINEAR_OF = {"3D10N": "3D4N", "3D13N": "3D5N", "3D15N": "3D6N", "3D20N": "3D8N", "3D27N": "3D8N"}
+
+
+def scene(suffix, cells=(3, 2, 2)):
+    """Return points and groups of a skewed box."""
+    mesh = kl.box((1.0, 1.5, 0.8), cells=cells, element=f"KinematicLinear{suffix}")
+    points = mesh.points @ np.array([[1.0, 0.2, 0.0], [0.0, 1.1, 0.3], [0.1, 0.0, 0.9]])
+    return points, kl.Model(mesh, STEEL).element_groups()
+
+
+def interpolation(level, n):
+    return csr_array((level.weights, level.indices, level.indptr), shape=(n, len(level.nodes)))
+
+
+@pytest.mark.parametrize("suffix", LINEAR_OF)
+def test_interpolation_reproduces_a_linear_field_on_straight_cells(suffix):
+    points, groups = scene(suffix)
+    level = linear_level(points, groups)
+    P = interpolation(level, len(points))
+    np.testing.assert_allclose(P @ points[level.nodes], points, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(P.sum(axis=1), 1.0, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(P[level.nodes].toarray(), np.eye(len(level.nodes)))
+    assert (level.weights != 0).all()
+    assert all((np.diff(row) > 0).all() for row in np.split(level.indices, level.indptr[1:-1]))
+
+
+@pytest.mark.parametrize(("suffix", "linear"), LINEAR_OF.items())
+def test_stiffness_is_that_of_the_linear_mesh(suffix, linear):
+    points, groups = scene(suffix)
+    level = linear_level(points, groups)
+    coarse_points, coarse = scene(linear)
+    K = assemble_stiffness(coarse_points, coarse, Pattern(len(coarse_points), [b.nodes for b in coarse]))
+    same = np.array([np.abs(coarse_points - x).max(axis=1).argmin() for x in points[level.nodes]])
+    dofs = (3 * same[:, None] + np.arange(3)).ravel()
+    want = K.scipy().toarray()[np.ix_(dofs, dofs)]
+    np.testing.assert_allclose(level.K.scipy().toarray(), want, rtol=0, atol=1e-14 * np.abs(want).max())
+
+
+def test_linear_meshes_have_no_level():
+    for suffix in LINEAR_OF.values():
+        assert linear_level(*scene(suffix)) is None
+
+
+def test_linear_elements_take_part_as_they_are():
+    points, (quadratic,) = scene("3D20N", (2, 1, 1))
+    first = ElementGroup(quadratic.element, quadratic.rule, STEEL, quadratic.nodes[:1], np.array([0]))
+    brick = ELEMENTS["KinematicLinear3D8N"]
+    rule = kl.quadrature.hexahedron(degree=1)  # a choice of its own, to be kept
+    second = ElementGroup(brick, rule, STEEL, quadratic.nodes[1:, :8], np.array([1]))
+    level = linear_level(points, [first, second])
+    used = np.unique(np.concatenate([first.nodes.ravel(), second.nodes.ravel()]))
+    P = interpolation(level, len(points))
+    np.testing.assert_allclose((P @ points[level.nodes])[used], points[used], rtol=0, atol=1e-14)
+    unused = np.setdiff1d(np.arange(len(points)), used)
+    assert len(unused) > 0
+    assert not np.diff(level.indptr)[unused].any()
+    coarse = [
+        ElementGroup(brick, rule_, STEEL, np.searchsorted(level.nodes, b.nodes[:, :8]), b.rows)
+        for rule_, b in ((brick.rule, first), (rule, second))
+    ]
+    want = assemble_dense(points[level.nodes], coarse)
+    np.testing.assert_allclose(level.K.scipy().toarray(), want, rtol=0, atol=1e-14 * np.abs(want).max())
+
+
+def test_shapes_without_corners_have_no_level():
+    points, (group,) = scene("3D8N")
+    with kl.shapes.SHAPES.temporary(), ELEMENTS.temporary():
+
+        class Shifted(Hexahedron8):
+            nodes = 0.5 * Hexahedron8.nodes
+
+        class KinematicLinearShifted(kl.KinematicLinear):
+            shape = Shifted
+            rule = kl.quadrature.hexahedron(degree=3)
+
+        other = ElementGroup(
+            KinematicLinearShifted, KinematicLinearShifted.rule, STEEL, group.nodes, group.rows
+        )
+        assert linear_level(points, [other]) is None

@@ -1,0 +1,203 @@
+"""Multigrid on stretched meshes, thin plates and unlike materials: iterations and exactness."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.mesh import Block
+from kratos_lite.native import kernels
+from kratos_lite.solvers import coarse_level
+from kratos_lite.solvers import linear_solver as equations
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.multigrid import Compiled
+
+pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="multigrid is not compiled")
+LIMIT = 60
+CELLS = {"4N": (11, 11, 11), "8N": (11, 11, 11), "10N": (5, 5, 5), "20N": (6, 6, 6), "27N": (5, 5, 5)}
+
+
+def body(element, size, side, cells=None, contrast=None):
+    """Return a box under its own weight, which acts in no special direction, clamped at a side."""
+    mesh = kl.box(size, cells or CELLS[element], f"KinematicLinear3D{element}")
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    if contrast:
+        centers = np.vstack([mesh.points[b.nodes].mean(axis=1) for b in mesh.blocks]) / size
+        model.assign(kl.Isotropic3D(E=1e3, nu=0.3, density=1000.0), np.flatnonzero(contrast(centers)))
+    if side == "rollers":
+        for face, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+            model.fix(face, axis)
+    else:
+        model.fix(side)
+    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    return model
+
+
+def check(model, rtol=1e-8):
+    found, exact = model.solve("amg"), model.solve("direct")
+    assert found.report.solver == "amg", found.report.reason
+    assert found.report.iterations < LIMIT
+    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=rtol * np.abs(exact.u).max())
+
+
+@pytest.fixture(autouse=True)
+def to_the_tolerance(monkeypatch):
+    """Few unknowns are iterated to round-off otherwise, like a factorization."""
+    monkeypatch.setattr(equations, "ROUND_OFF", 1e-10)
+
+
+@pytest.mark.parametrize("element", CELLS)
+@pytest.mark.parametrize("aspect", [10, 100, 1000])
+def test_flat_elements(element, aspect):
+    check(body(element, (1.0, 1.0, 1.0 / aspect), "z-"))
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_flat_elements_clamped_at_their_edge(element):
+    check(body(element, (1.0, 1.0, 0.1), "x-"))
+
+
+@pytest.mark.parametrize("element", ["4N", "8N"])
+def test_very_flat_linear_elements_clamped_at_their_edge(element):
+    check(body(element, (1.0, 1.0, 0.01), "x-"))
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_long_elements(element):
+    check(body(element, (1.0, 1.0, 10.0), "z-"))
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_very_long_elements_on_rollers(element):
+    check(body(element, (1.0, 1.0, 100.0), "rollers"))
+
+
+@pytest.mark.parametrize("element", ["4N", "8N", "10N", "27N"])
+def test_extremely_long_elements_on_rollers(element):
+    check(body(element, (1.0, 1.0, 1000.0), "rollers"))
+
+
+@pytest.mark.parametrize("element", ["4N", "8N"])
+def test_a_plate_of_linear_elements(element):
+    check(body(element, (1.0, 1.0, 0.01), "x-", (26, 26, 2)))
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_stiff_and_soft_layers(element):
+    check(body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1))
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_stiff_inclusions(element):
+    check(
+        body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.abs(x - 0.4).max(axis=1) > 0.21), rtol=1e-7
+    )
+
+
+@pytest.mark.parametrize("element", ["4N", "8N"])
+def test_layers_of_flat_elements(element):
+    model = body(element, (1.0, 1.0, 0.1), "z-", contrast=lambda x: np.floor(50 * x[:, 2]) % 2 == 1)
+    check(model)
+
+
+def hierarchy(model):
+    """Return the multigrid of a model, and a right side."""
+    module = kernels("multigrid")
+    system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports)
+    free = np.zeros(3 * len(system.points), dtype=bool)
+    free[system.reduced.free] = True
+    linear = coarse_level.linear_level(system.points, system.groups)
+    b = np.random.default_rng(1).standard_normal(len(free)) * free
+    return Compiled(module, system.K, free, system.points, linear), b
+
+
+@pytest.mark.parametrize(("element", "size"), [("8N", (1.0, 1.0, 0.1)), ("10N", (1.0, 1.0, 20.0))])
+def test_results_do_not_depend_on_the_number_of_threads(element, size):
+    module, results = kernels("multigrid"), []
+    for threads in (1, 2, 3, 5):
+        module.set_threads(threads)
+        solver, b = hierarchy(body(element, size, "z-"))
+        results.append(solver.precondition(b))
+    module.set_threads(2)
+    for other in results[1:]:
+        np.testing.assert_array_equal(other, results[0])
+
+
+def unstructured(aspect):
+    """Return a body of Delaunay tetrahedra between scattered nodes, made flat."""
+    from scipy.spatial import Delaunay
+
+    points = np.random.default_rng(0).random((1500, 3))
+    nodes = Delaunay(points).simplices
+    edges = points[nodes[:, 1:]] - points[nodes[:, :1]]
+    volume = np.linalg.det(edges)
+    nodes[volume < 0] = nodes[volume < 0][:, [1, 0, 2, 3]]
+    nodes = nodes[np.abs(volume) > 1e-5]
+    used, nodes = np.unique(nodes, return_inverse=True)
+    nodes = nodes.reshape(-1, 4).astype(np.int32)
+    shape, n = kl.elements.KinematicLinear3D4N.shape, len(nodes)
+    block = Block("KinematicLinear3D4N", nodes, np.arange(1, n + 1), np.ones(n, int), shape)
+    model = kl.Model(kl.Mesh(points[used] * [1, 1, 1 / aspect], [block]), kl.Isotropic3D(E=1e9, nu=0.3))
+    model.fix(np.flatnonzero(points[used, 2] < 0.1))
+    return model
+
+
+ISOTROPIC = {
+    **{element: lambda element=element: body(element, (1.0, 1.1, 0.9), "z-") for element in CELLS},
+    "a little stretched": lambda: body("8N", (3.0, 1.0, 1.0), "z-"),
+    "unstructured": lambda: unstructured(1),
+    "unstructured and flat": lambda: unstructured(10),
+}
+
+
+@pytest.mark.parametrize("case", ISOTROPIC)
+def test_other_meshes_have_no_clusters(case):
+    model = ISOTROPIC[case]()
+    assert not any(hierarchy(model)[0].clusters)
+
+
+@pytest.mark.parametrize(("size", "clusters"), [((1.0, 1.0, 0.1), 12**2), ((1.0, 1.0, 10.0), 12)])
+def test_clusters_are_lines_across_flat_elements_and_planes_across_long_ones(size, clusters):
+    found = hierarchy(body("8N", size, "rollers"))[0]
+    assert found.levels[0] == 3 * 12**3
+    assert found.clusters[0] == clusters
+
+
+def test_unlike_materials_part_clusters():
+    model = body("8N", (1.0, 1.0, 0.1), "rollers", contrast=lambda x: x[:, 2] > 6 / 11)
+    assert hierarchy(model)[0].clusters[0] == 2 * 12**2
+
+
+def incompressible():
+    model = body("8N", (1.0, 1.0, 1.0), "z-", (8, 8, 8))
+    model.assign(kl.Isotropic3D(E=1e9, nu=0.4999, density=1000.0))
+    return model
+
+
+def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
+    monkeypatch.setattr(equations, "PATIENCE", 70)
+    model = incompressible()
+    result = model.solve("amg")
+    assert result.report.solver == "direct"
+    assert result.report.reason == (
+        "multigrid stopped after 60 iterations short of 1e-10, at a rate that takes more than 70: "
+        "a factorization is faster"
+    )
+    np.testing.assert_allclose(result.u, model.solve("direct").u, rtol=0, atol=1e-14)
+
+
+def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
+    monkeypatch.setattr(equations, "PATIENCE", 70)
+    monkeypatch.setattr(equations, "quick_to_factorize", lambda unknowns: False)
+    model = incompressible()
+    result = model.solve("amg")
+    assert result.report.solver == "amg"
+    assert result.report.iterations > 70
+    exact = model.solve("direct").u
+    np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("installed", "limit"), [(True, 150_000), (False, 30_000)])
+def test_superlu_is_quick_on_fewer_unknowns(monkeypatch, installed, limit):
+    monkeypatch.setattr(equations, "find_spec", lambda name: object() if installed else None)
+    assert equations.quick_to_factorize(limit)
+    assert not equations.quick_to_factorize(limit + 1)

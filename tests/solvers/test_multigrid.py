@@ -1,0 +1,524 @@
+"""Multigrid, compiled and of pyamg: the same displacements as a factorization, whatever the model."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.mesh.blocks import Block
+from kratos_lite.native import kernels
+from kratos_lite.shapes import SHAPES, Tetrahedron4
+from kratos_lite.solvers import multigrid
+from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
+GRAVITY = kl.Gravity((1.0, 2.0, -9.81))
+KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
+MODULE = kernels("multigrid")
+compiled = pytest.mark.skipif(MODULE is None, reason="the compiled kernels were not built")
+
+
+@pytest.fixture(params=["compiled", "pyamg"])
+def path(request, monkeypatch):
+    """Run a test with both hierarchies."""
+    if request.param == "pyamg":
+        monkeypatch.setattr(multigrid, "kernels", lambda name: None)
+    elif MODULE is None:
+        pytest.skip("the compiled kernels were not built")
+    return request.param
+
+
+@pytest.fixture
+def threads():
+    """Set the number of threads, for one test."""
+    modules = [kernels(name) for name in ("multigrid", "sparse")]
+
+    def set_threads(count):
+        for module in modules:
+            module.set_threads(count)
+
+    yield set_threads
+    set_threads(2)
+
+
+# ---- models --------------------------------------------------------------------------------------
+
+
+def box(size=(1.0, 0.8, 0.6), cells=(6, 4, 4), kind="8N"):
+    return kl.box(size, cells, f"KinematicLinear3D{kind}")
+
+
+def clamped(mesh, material=STEEL):
+    """Return a model held where x is smallest, under gravity in all directions."""
+    model = kl.Model(mesh, material)
+    model.fix(lambda p: p[:, 0] <= p[:, 0].min())
+    model.add(GRAVITY)
+    return model
+
+
+def rollers(kind):
+    """Return a block on three planes of symmetry, pulled."""
+    model = kl.Model(box(kind=kind), STEEL)
+    for side in ("x-", "y-", "z-"):
+        model.fix(side, side[0])
+    model.add(kl.Traction("x+", (1e6, 2e5, 0.0)))
+    return model
+
+
+def mesh_of(points, *cells):
+    """Return a mesh of (kind, nodes) pairs."""
+    blocks, first = [], 1
+    for kind, nodes in cells:
+        name = f"KinematicLinear3D{kind}"
+        ids = np.arange(first, first + len(nodes))
+        blocks.append(Block(name, np.asarray(nodes, np.int32), ids, np.zeros_like(ids), ELEMENTS[name].shape))
+        first += len(nodes)
+    return kl.Mesh(points, blocks)
+
+
+def mixed():
+    """Return bricks, of which some are cut into tetrahedra or wedges."""
+    mesh = box()
+    cells = mesh.blocks[0].nodes
+    corners = ([0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [1, 4, 5, 6], [3, 4, 6, 7])
+    tetrahedra = np.vstack([cells[:1, c] for c in corners])
+    wedges = np.vstack([cells[-6:][:, [0, 1, 2, 4, 5, 6]], cells[-6:][:, [0, 2, 3, 4, 6, 7]]])
+    return mesh_of(mesh.points, ("8N", cells[1:-6]), ("4N", tetrahedra), ("6N", wedges))
+
+
+def orders():
+    """Return quadratic bricks beside linear ones on the same points."""
+    mesh = box(kind="20N", cells=(4, 2, 2))
+    cells = mesh.blocks[0].nodes
+    return mesh_of(mesh.points, ("20N", cells[:8]), ("8N", cells[8:, :8]))
+
+
+def bodies(count, stiffer=1.0, cells=(2, 2, 2), kind="8N"):
+    """Return separate boxes in a row, each stiffer than the one before."""
+    one = box((1, 1, 1), cells, kind)
+    points = np.vstack([one.points + np.array([2.0 * i, 0, 0]) for i in range(count)])
+    nodes = np.vstack([one.blocks[0].nodes + i * one.n_nodes for i in range(count)])
+    model = kl.Model(mesh_of(points, (kind, nodes)), STEEL)
+    for i in range(count):
+        rows = np.arange(i * one.n_elements, (i + 1) * one.n_elements)
+        model.assign(kl.Isotropic3D(E=2e11 * stiffer**i, nu=0.3, density=7850.0 * stiffer**i), rows)
+    model.fix(lambda p: p[:, 2] == 0)
+    model.add(GRAVITY)
+    return model
+
+
+def periodic(kind="8N"):
+    """Return a block whose right side moves as the left one, 1 mm further apart."""
+    model = kl.Model(box(kind=kind), STEEL)
+    model.fix("z-")
+    points = model.mesh.points
+    sides = [model.mesh.nodes(side) for side in ("x-", "x+")]
+    left, right = (rows[np.lexsort(points[rows, 1:].round(9).T)] for rows in sides)
+    for master, slave in zip(left, right, strict=True):
+        if points[slave, 2] > 0:
+            for axis in "xyz":
+                offset = 1e-3 if axis == "x" else 0.0
+                model.constrain((int(slave), axis), {(int(master), axis): 1.0}, offset)
+    model.add(GRAVITY)
+    return model
+
+
+def stiff_end(kind="8N", held=False):
+    """Return a beam whose end moves as one; one of its masters may be prescribed."""
+    model = clamped(box(kind=kind))
+    first, *others = model.mesh.nodes("x+").tolist()
+    if held:
+        model.fix(np.array([first]), "x", 1e-4)
+    for slave in others:
+        model.constrain((slave, "x"), {(first, "x"): 1.0})
+        model.constrain((slave, "y"), {(first, "y"): 1.0, (first, "z"): 0.5})
+    return model
+
+
+def two_masters():
+    model = clamped(box())
+    nodes = model.mesh.nodes("x+").tolist()
+    for slave in nodes[1:-1:3]:
+        for axis in "xyz":
+            model.constrain((slave, axis), {(nodes[0], axis): 0.5, (nodes[-1], axis): 0.5})
+    return model
+
+
+def partly_fixed():
+    """Return a block whose nodes are held in components chosen at random."""
+    model = clamped(box(cells=(5, 4, 4)))
+    draw = np.random.default_rng(5)
+    for axis in "xyz":
+        model.fix(np.flatnonzero(draw.random(model.mesh.n_nodes) < 0.2), axis)
+    return model
+
+
+def prescribed():
+    model = clamped(box())
+    model.fix("x+", value=(1e-3, 2e-3, 0.0))
+    return model
+
+
+def contrast(factor, kind="8N"):
+    model = clamped(box(kind=kind))
+    rows = np.flatnonzero(np.random.default_rng(1).random(model.mesh.n_elements) < 0.5)
+    model.assign(kl.Isotropic3D(E=2e11 * factor, nu=0.3, density=7850.0), rows)
+    return model
+
+
+def scattered():
+    """Return a block with nodes that no element uses, before and behind its own."""
+    mesh = box()
+    points = np.vstack([[[9.0, 9, 9]], mesh.points, [[7.0, 7, 7]]])
+    model = kl.Model(mesh_of(points, ("8N", mesh.blocks[0].nodes + 1)), STEEL)
+    model.fix(np.flatnonzero(points[:, 0] == 0))
+    model.add(GRAVITY)
+    return model
+
+
+def distorted(kind="8N"):
+    model = clamped(box(cells=(4, 4, 3), kind=kind))
+    points = model.mesh.points
+    points += 0.01 * np.random.default_rng(7).uniform(-1, 1, points.shape)
+    return model
+
+
+def one_unknown():
+    mesh = box(cells=(2, 2, 2))
+    model = kl.Model(mesh, STEEL)
+    inner = np.flatnonzero((np.abs(mesh.points - mesh.points.mean(axis=0)) < 1e-9).all(axis=1))
+    model.fix(np.setdiff1d(np.arange(mesh.n_nodes), inner))
+    model.fix(inner, "xy")
+    model.add(GRAVITY)
+    return model
+
+
+MODELS = {
+    **{f"clamped {kind}": lambda kind=kind: clamped(box(kind=kind)) for kind in KINDS},
+    **{f"rollers {kind}": lambda kind=kind: rollers(kind) for kind in KINDS},
+    "mixed": lambda: clamped(mixed()),
+    "linear beside quadratic": lambda: clamped(orders()),
+    "bodies": lambda: bodies(5),
+    "bodies of one brick": lambda: bodies(60, cells=(1, 1, 1)),
+    "bodies of six tetrahedra": lambda: bodies(40, cells=(1, 1, 1), kind="10N"),
+    "unlike bodies": lambda: bodies(3, stiffer=1e3),
+    "periodic": periodic,
+    "periodic, quadratic": lambda: periodic("20N"),
+    "end that moves as one": stiff_end,
+    "end that moves as one, quadratic": lambda: stiff_end("20N"),
+    "master that is held": lambda: stiff_end(held=True),
+    "master that is held, quadratic": lambda: stiff_end("10N", held=True),
+    "slaves of two masters": two_masters,
+    "partly fixed": partly_fixed,
+    "prescribed": prescribed,
+    "contrast": lambda: contrast(1e6),
+    "contrast, quadratic": lambda: contrast(1e3, "10N"),
+    "nodes without elements": scattered,
+    "distorted": distorted,
+    "distorted, quadratic": lambda: distorted("27N"),
+    "bar": lambda: clamped(box((40, 1, 1), (40, 1, 1))),
+    "bar, quadratic": lambda: clamped(box((12, 1, 1), (12, 1, 1), "20N")),
+    "one brick": lambda: clamped(box(cells=(1, 1, 1))),
+    "tetrahedra in one brick": lambda: clamped(box(cells=(1, 1, 1), kind="4N")),
+    "one unknown": one_unknown,
+    "nearly incompressible": lambda: clamped(box(), kl.Isotropic3D(E=2e11, nu=0.49, density=7850.0)),
+    "wood": lambda: clamped(
+        box(), kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9, 450.0)
+    ),
+}
+
+
+def assert_solved(model, accuracy=1e-10):
+    """Assert that multigrid solves a model, and as a factorization does; return the report."""
+    found, expected = model.solve("amg"), model.solve("direct")
+    assert found.report.solver == "amg"
+    assert found.report.backward_error < 1e-14
+    np.testing.assert_allclose(found.u, expected.u, rtol=0, atol=accuracy * np.abs(expected.u).max())
+    return found.report
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_displacements_are_those_of_a_factorization(path, name):
+    assert_solved(MODELS[name]())
+
+
+@pytest.mark.parametrize("E", [1e-6, 1e15])
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e6])
+def test_units_do_not_matter(path, E, length):
+    mesh = box(np.array([1.0, 0.8, 0.6]) * length, (6, 5, 4))
+    report = assert_solved(clamped(mesh, kl.Isotropic3D(E=E, nu=0.3, density=1e-8 * E)))
+    assert report.iterations <= 25
+
+
+def test_the_origin_does_not_matter(path):
+    mesh = box(cells=(6, 5, 4))
+    near = assert_solved(clamped(mesh))
+    mesh.points += 1e6
+    assert assert_solved(clamped(mesh)).iterations <= near.iterations + 2
+
+
+@pytest.mark.parametrize("n", [10, 16])
+def test_iterations_do_not_grow_with_the_mesh(path, n):
+    system, b = equations(clamped(box((1, 1, 1), (n, n, n))))
+    solver = system._equations._multigrid
+    x, iterations, converged = solver.solve(b, 1e-10, system.norm, None)
+    assert converged
+    assert iterations <= 25
+    residual = np.where(system._equations._free, b - system.K @ x, 0.0)
+    assert np.linalg.norm(residual) <= 1.01e-10 * np.linalg.norm(b)
+
+
+def test_quadratic_elements_have_a_linear_level(path):
+    model = clamped(box((1, 1, 1), (4, 4, 4), "20N"))
+    system, b = equations(model)
+    solver = system._equations._multigrid
+    assert solver.levels[:2] == [3 * len(system.nodes), 3 * 5**3]
+    with_level = solver.solve(b, 1e-10, system.norm, None)[1]
+    assert with_level <= 25
+
+
+# ---- elements of users ---------------------------------------------------------------------------
+
+
+def test_an_element_of_a_user_with_seven_nodes(path):
+    edges = ((0, 1), (1, 2), (0, 2))
+    with SHAPES.temporary(), ELEMENTS.temporary():
+
+        class Tetrahedron7(Tetrahedron4):
+            nodes = np.vstack([Tetrahedron4.nodes, [Tetrahedron4.nodes[list(e)].mean(axis=0) for e in edges]])
+
+            @staticmethod
+            def dN(xi):
+                L, dL = Tetrahedron4.N(xi), Tetrahedron4.dN(xi)
+                middle = np.array([4 * (L[i] * dL[j] + L[j] * dL[i]) for i, j in edges])
+                corner = dL.copy()
+                for (i, j), d in zip(edges, middle, strict=True):
+                    corner[[i, j]] -= d / 2
+                return np.vstack([corner, middle])
+
+            @staticmethod
+            def N(xi):
+                L = Tetrahedron4.N(xi)
+                middle = [4 * L[..., i] * L[..., j] for i, j in edges]
+                corner = [
+                    L[..., k] - sum(m / 2 for e, m in zip(edges, middle, strict=True) if k in e)
+                    for k in range(4)
+                ]
+                return np.stack([*corner, *middle], axis=-1)
+
+        class KinematicLinear3D7N(kl.KinematicLinear):
+            shape = Tetrahedron7
+            rule = kl.quadrature.tetrahedron(degree=2)
+
+        mesh = box(kind="10N")
+        seven = mesh_of(mesh.points, ("7N", mesh.blocks[0].nodes[:, :7]))
+        assert_solved(clamped(seven))
+
+
+def test_an_element_class_that_redefines_its_stiffness(path):
+    with ELEMENTS.temporary():
+
+        class KinematicLinear3D8NDoubled(ELEMENTS["KinematicLinear3D8N"]):
+            def stiffness_by_axis(self, C):
+                return 2 * super().stiffness_by_axis(C)
+
+        mesh = box()
+        cells = mesh.blocks[0].nodes
+        assert_solved(clamped(mesh_of(mesh.points, ("8N", cells[:9]), ("8NDoubled", cells[9:]))))
+
+
+# ---- the solver by itself ------------------------------------------------------------------------
+
+
+def equations(model):
+    """Return the system of a model and its right side, zero at fixed components."""
+    system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports, solver="amg")
+    free = system._equations._free
+    return system, np.where(free, system.local(GRAVITY.forces(model.mesh, model.element_groups())), 0.0)
+
+
+def solver_of(model):
+    """Return a solver, its right side and the norm of its matrix."""
+    system, b = equations(model)
+    return system._equations._multigrid, b, system.norm
+
+
+CYCLES = ["clamped 8N", "clamped 10N", "clamped 20N", "partly fixed", "bodies", "bar", "contrast"]
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_the_preconditioner_is_symmetric_and_positive(path, name):
+    solver, b, _ = solver_of(MODELS[name]())
+    free = b != 0
+    draw = np.random.default_rng(2)
+    for _ in range(5):
+        x, y = (np.where(free, draw.standard_normal(len(b)), 0.0) for _ in range(2))
+        Mx, My = solver.precondition(x), solver.precondition(y)
+        size = np.sqrt((x @ Mx) * (y @ My))
+        assert x @ My == pytest.approx(y @ Mx, rel=0, abs=1e-5 * size)
+        assert x @ Mx > 0
+        np.testing.assert_array_equal(Mx[~free], 0.0)
+
+
+@compiled
+@pytest.mark.parametrize("name", ["clamped 8N", "clamped 20N", "clamped 10N", "partly fixed", "periodic"])
+def test_results_do_not_depend_on_the_number_of_threads(threads, name):
+    found = []
+    for count in (1, 2, 3, 5, 2):
+        threads(count)
+        found.append(MODELS[name]().solve("amg").u)
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+@compiled
+def test_larger_results_do_not_depend_on_the_number_of_threads(threads):
+    found = []
+    for count in (1, 2, 3, 5, 2):
+        threads(count)
+        solver, b, norm = solver_of(clamped(box(cells=(14, 12, 12))))
+        found.append(solver.solve(b, 1e-10, norm, None)[0])
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+@pytest.mark.parametrize("name", ["clamped 8N", "clamped 20N", "contrast"])
+def test_results_are_the_same_from_run_to_run(path, name):
+    first, second = (MODELS[name]().solve("amg").u for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_second_right_side_needs_no_set_up(path, monkeypatch):
+    made, plain = [], multigrid.multigrid
+
+    def counted(*arguments):
+        made.append(1)
+        return plain(*arguments)
+
+    monkeypatch.setattr(multigrid, "multigrid", counted)
+    model = clamped(box())
+    ready = model.system("amg")
+    first, other = ready.solve(), ready.solve([kl.Gravity((0.0, 0.0, 1.0))])
+    assert len(made) == 1
+    assert not np.array_equal(first.u, other.u)
+    np.testing.assert_array_equal(ready.solve().u, first.u)
+
+
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-15])
+def test_progress_rises_to_one(path, tolerance):
+    seen = []
+    solver, b, norm = solver_of(clamped(box((2, 1, 1), (10, 6, 6))))
+    _, iterations, _ = solver.solve(b, tolerance, norm, lambda phase, share: seen.append((phase, share)))
+    assert iterations <= len(seen) <= iterations + 1
+    assert {phase for phase, _ in seen} == {"solve"}
+    shares = np.array([share for _, share in seen])
+    assert shares[0] >= 0
+    assert (np.diff(shares) >= 0).all()
+    assert shares[len(shares) // 2] > shares[0]
+    assert shares[-1] == 1.0
+
+
+def test_what_a_callback_raises_ends_the_solution(path):
+    solver, b, norm = solver_of(clamped(box(cells=(6, 6, 6))))
+    seen = []
+
+    def stop(phase, share):
+        seen.append(share)
+        if len(seen) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        solver.solve(b, 1e-10, norm, stop)
+    assert len(seen) == 3
+    again = solver.solve(b, 1e-10, norm, None)
+    np.testing.assert_array_equal(again[0], solver.solve(b, 1e-10, norm, None)[0])
+    assert again[2]
+
+
+def test_nothing_in_nothing_out(path):
+    solver, b, norm = solver_of(clamped(box()))
+    x, iterations, converged = solver.solve(np.zeros_like(b), 1e-10, norm, None)
+    assert (iterations, converged) == (0, True)
+    np.testing.assert_array_equal(x, 0.0)
+    np.testing.assert_array_equal(solver.precondition(np.zeros_like(b)), 0.0)
+
+
+def test_numbers_that_are_not_finite_end_the_iteration(path):
+    solver, b, norm = solver_of(clamped(box()))
+    b[np.flatnonzero(b)[0]] = np.nan
+    with np.errstate(invalid="ignore"):
+        _, iterations, converged = solver.solve(b, 1e-10, norm, None)
+    assert not converged
+    assert iterations <= 2
+
+
+@compiled
+def test_wrong_shapes_are_refused():
+    model = clamped(box())
+    system, b = equations(model)
+    K, free = system.K, system._equations._free
+    modes = np.zeros((K.shape[0], 6))
+    points = np.zeros((K.shape[0] // 3, 3))
+    options = (points, 2, 12.0, 0.0)
+
+    def kernel(fixed):
+        return MODULE.Multigrid(MODULE.Matrix(K.indptr, K.indices, K.data), fixed, *options)
+
+    with pytest.raises(ValueError, match="data must be"):
+        MODULE.Matrix(K.indptr, K.indices, K.data[:-1])
+    with pytest.raises(ValueError, match="indptr must end"):
+        MODULE.Matrix(K.indptr[:-1], K.indices, K.data)
+    with pytest.raises(TypeError):
+        MODULE.Matrix(K.indptr.astype(np.int64), K.indices, K.data)
+    with pytest.raises(ValueError, match="fixed must have one entry"):
+        kernel(np.zeros(5, np.uint8))
+    fixed = (~free).astype(np.uint8)
+    with pytest.raises(ValueError, match=r"modes must be \(3n, 6\)"):
+        kernel(fixed).aggregate(modes[:-1])
+    made = kernel(fixed)
+    made.aggregate(modes)
+    with pytest.raises(ValueError, match="aggregated already"):
+        made.aggregate(modes)
+    with pytest.raises(ValueError, match="r must have one number"):
+        made.cycle(b[:-1])
+    with pytest.raises(ValueError, match="b must have one number"):
+        made.solve(b[:-1], 1e-10, 1.0, 10, None)
+
+
+@compiled
+def test_a_linear_level_of_the_wrong_shape_is_refused():
+    model = clamped(box(kind="20N", cells=(2, 2, 2)))
+    system, _ = equations(model)
+    K, level = system.K, linear_level(system.points, system.groups)
+    below = MODULE.Matrix(level.K.indptr, level.K.indices, level.K.data)
+    fixed, corners = np.zeros(K.shape[0], np.uint8), np.zeros(level.K.shape[0], np.uint8)
+    points, inner = np.zeros((K.shape[0] // 3, 3)), np.zeros((len(corners) // 3, 3))
+    right = (corners, level.indptr, level.indices, level.weights, inner, np.zeros((len(corners), 6)))
+    wrong = {
+        0: (corners[:-1], "one entry for each linear unknown"),
+        1: (level.indptr[:-1], "one row for each node"),
+        2: (level.indices[:-1], "one weight for each"),
+        3: (level.weights[:-1], "one weight for each"),
+        5: (np.zeros((3, 6)), "modes must be"),
+    }
+    for place, (value, message) in wrong.items():
+        arguments = [*right[:place], value, *right[place + 1 :]]
+        matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0)
+        with pytest.raises(ValueError, match=message):
+            kernel.aggregate_linear(below, *arguments)
+
+
+@compiled
+def test_parts_without_stiffness_do_no_harm():
+    system, b = equations(clamped(box()))
+    K, free = system.K, system._equations._free
+    K.data[K.rows() < 9] = 0.0
+    K.data[K.indices < 9] = 0.0
+    b[:27] = 0.0
+    solver = multigrid.Compiled(MODULE, K, free, system.points, None)
+    x, _, converged = solver.solve(b, 1e-10, K.norm(), None)
+    assert converged
+    assert np.isfinite(x).all()
+    np.testing.assert_array_equal(x[:27], 0.0)
