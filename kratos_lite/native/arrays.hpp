@@ -41,13 +41,18 @@ inline const double* optional(MaybeNumbers array, int64_t rows, int64_t columns,
 
 inline bool are_rows(Indices numbers, int64_t n) { return in_range(numbers.data(), numbers.size(), n); }
 
+// Rows that lie within `size` entries.
+inline void check_rows(Indices indptr, int64_t size) {
+    const int32_t *start = indptr.data(), *end = start + indptr.size();
+    require(start < end && start[0] == 0 && std::is_sorted(start, end), "indptr must start with 0 and not fall");
+    require(end[-1] == size, "indptr must end with the number of blocks");
+}
+
 // A pattern whose rows lie within its indices; an AssemblyMap checks the indices of the rows that it uses.
 inline Graph pattern(Indices indptr, Indices indices, int64_t rows) {
     require(indptr.size() == rows + 1, "the pattern must have a row for each point");
-    const int32_t* start = indptr.data();
-    require(start[0] == 0 && std::is_sorted(start, start + rows + 1), "indptr must start with 0 and grow");
-    require(start[rows] == indices.size(), "indptr must end with the number of indices");
-    return {rows, start, indices.data()};
+    check_rows(indptr, indices.size());
+    return {rows, indptr.data(), indices.data()};
 }
 
 // A function of a module whose arguments are arrays of exactly the right type, or as given.
