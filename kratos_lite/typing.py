@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,10 @@ Complexes: TypeAlias = NDArray[np.complex128]
 """Complex numbers."""
 Ints: TypeAlias = NDArray[np.int64]
 """Rows, ids and counts."""
+Rows: TypeAlias = NDArray[np.int32]
+"""Rows of nodes in cells and in sparsity patterns: half the memory of `Ints`."""
+Numbers: TypeAlias = NDArray[Any]
+"""Numbers of any kind: real, complex or whole."""
 Mask: TypeAlias = NDArray[np.bool_]
 """Which of many."""
 Progress: TypeAlias = Callable[[str, float], None]

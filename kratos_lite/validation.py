@@ -1,22 +1,64 @@
-"""Arguments: numbers from the caller, checked before they reach any arithmetic."""
+"""Validation: what a caller gives, checked before it reaches any arithmetic.
+
+Each function returns the checked value, or raises one error that says what was expected and what was
+found.  `what` names the value in the message: ``finite(x, "a force", (3,))``.
+
+=====================  =============================================================
+to check               write
+=====================  =============================================================
+an array               ``finite(value, what, (3,))``, ``finite(value, what, ("n", 3))``
+a number               ``number(value, what)``, with ``above=``, ``least=``, ``below=``
+a whole number         ``whole_number(value, what)``, with ``least=``, ``most=``
+one of some names      ``choice(value, what, names)``
+True or False          ``flag(value, what)``
+a function or None     ``function_or_none(value, what)``
+an instance            ``instance(value, what, cls)``
+=====================  =============================================================
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+import operator
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, KratosLiteError, nearest
+from kratos_lite.typing import Array
+
+T = TypeVar("T")
 
 
-def finite(value: Any, what: str) -> NDArray[np.float64]:
+def finite(
+    value: Any,
+    what: str,
+    shape: tuple[int | str, ...] | None = None,
+    *,
+    error: type[KratosLiteError] = InputError,
+) -> Array:
     """Return a finite real number or array of them as floats.
 
-    Raises InputError that says what the value is for.
+    Parameters
+    ----------
+    value : what the caller gave.
+    what : what it is for, with its article.
+    shape : lengths of the axes; a word such as ``"n"`` stands for any length.
+    error : class of the error.
 
+    Raises
+    ------
+    InputError
+        If it is not made of real numbers, not finite, or of another shape.
+
+    Examples
+    --------
     >>> finite([1, 2], "a force")
     array([1., 2.])
+    >>> finite([1, 2], "a force", (3,))
+    Traceback (most recent call last):
+    kratos_lite.errors.InputError: a force must have shape (3,); got (2,)
     """
     try:
         array = np.asarray(value)
@@ -24,47 +66,107 @@ def finite(value: Any, what: str) -> NDArray[np.float64]:
             raise TypeError
         array = array.astype(float)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be made of real numbers; got {_short(value)}") from None
+        raise error(f"{what} must be made of real numbers; got {short(value)}") from None
+    if shape is not None and not _has(array.shape, shape):
+        axes = ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "")
+        raise error(f"{what} must have shape ({axes}); got {array.shape}")
     if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite; got {_short(value)}")
+        raise error(f"{what} must be finite; got {short(value)}")
     return array
 
 
-def number(value: Any, what: str) -> float:
+def _has(found: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    return len(found) == len(wanted) and all(
+        isinstance(w, str) or w == n for n, w in zip(found, wanted, strict=True)
+    )
+
+
+def number(
+    value: Any,
+    what: str,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    unit: str = "",
+    error: type[KratosLiteError] = InputError,
+) -> float:
     """Return one finite real number as a float.
 
+    Parameters
+    ----------
+    above, least, below : bounds: the value must be > `above`, ≥ `least` and < `below`.
+    unit : of the value, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is not one finite number within the bounds.
+
+    Examples
+    --------
     >>> number(2, "a length")
     2.0
+    >>> number(-1, "a length", above=0, unit="m")
+    Traceback (most recent call last):
+    kratos_lite.errors.InputError: a length must be one number > 0, in m; got -1
     """
-    one = finite(value, what)
-    if one.ndim:
-        raise InputError(f"{what} must be one number; got {_short(value)}")
-    return float(one)
+    array = finite(value, what, error=error)
+    x = float(array) if not array.ndim else math.nan
+    bounds = {">": (above, operator.gt), "≥": (least, operator.ge), "<": (below, operator.lt)}
+    limits = {f"{sign} {end:g}": holds(x, end) for sign, (end, holds) in bounds.items() if end is not None}
+    if array.ndim or not all(limits.values()):
+        wanted = " ".join(["one number", " and ".join(limits)]).strip() + (f", in {unit}" if unit else "")
+        raise error(f"{what} must be {wanted}; got {short(value)}")
+    return x
 
 
 def positive_step(dt: Any) -> float:
-    """Return the step of a march in s.
+    """Return a time step in s.
 
     >>> positive_step(0.5)
     0.5
     """
-    h = finite(dt, "a step")
-    if h.ndim or not h > 0:
-        raise InputError(f"a step must be one number of seconds > 0; got {_short(dt)}")
+    h = number(dt, "a step", above=0, unit="s")
     if h * h < np.finfo(float).tiny:
         raise InputError(f"a step of {h:g} s is too short to compute with; take a longer one")
-    return float(h)
+    return h
 
 
-def whole_number(value: Any, what: str, otherwise: str = "") -> int:
-    """Return a whole number ≥ 1; `otherwise` tells what else the caller takes.
+def whole_number(
+    value: Any,
+    what: str,
+    otherwise: str = "",
+    *,
+    least: int = 1,
+    most: int | None = None,
+    error: type[KratosLiteError] = InputError,
+) -> int:
+    """Return a whole number from `least` to `most`; `otherwise` says what else the caller takes.
 
     >>> whole_number(3, "steps")
     3
     """
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise InputError(f"{what} must be a whole number ≥ 1{otherwise}; got {_short(value)}")
+    fits = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least
+    if not fits or (most is not None and value > most):
+        limits = f"≥ {least}" if most is None else f"from {least} to {most}"
+        raise error(f"{what} must be a whole number {limits}{otherwise}; got {short(value)}")
     return int(value)
+
+
+def choice(value: Any, what: str, known: Iterable[str], *, error: type[KratosLiteError] = InputError) -> str:
+    """Return one of some names.
+
+    >>> choice("node", "at", ("nodes", "elements"))
+    Traceback (most recent call last):
+    kratos_lite.errors.InputError: at must be one of nodes, elements; got 'node'. Did you mean nodes?
+    """
+    names = list(known)
+    if not isinstance(value, str) or value not in names:
+        hint = nearest(value, names, 1) if isinstance(value, str) else ""
+        text = f"{what} must be one of {', '.join(names)}; got {short(value)}"
+        raise error(f"{text}.{hint}" if hint else text)
+    return value
 
 
 def flag(value: Any, what: str) -> bool:
@@ -74,7 +176,7 @@ def flag(value: Any, what: str) -> bool:
     True
     """
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{what} must be True or False; got {_short(value)}")
+        raise InputError(f"{what} must be True or False; got {short(value)}")
     return bool(value)
 
 
@@ -84,9 +186,35 @@ def function_or_none(value: Any, must: str) -> None:
     >>> function_or_none(print, "progress must be a function")
     """
     if value is not None and not callable(value):
-        raise InputError(f"{must}; got {_short(value)}")
+        raise InputError(f"{must}; got {short(value)}")
 
 
-def _short(value: Any) -> str:
+def instance(
+    value: Any,
+    what: str,
+    kind: type[T] | tuple[type[T], ...],
+    example: str = "",
+    *,
+    error: type[KratosLiteError] = InputError,
+) -> T:
+    """Return an instance of a class, or of one of several; `example` says how to make one.
+
+    >>> instance("soil", "material", float, "2.0")
+    Traceback (most recent call last):
+    kratos_lite.errors.InputError: material must be a float, such as 2.0; got 'soil'
+    """
+    if not isinstance(value, kind):
+        names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+        such = f", such as {example}" if example else ""
+        raise error(f"{what} must be a {names}{such}; got {short(value)}")
+    return value
+
+
+def short(value: Any) -> str:
+    """Return a value as text of at most 100 characters, for a message.
+
+    >>> short("x" * 200)[-5:]
+    'xx...'
+    """
     text = repr(value)
     return text if len(text) <= 100 else text[:97] + "..."

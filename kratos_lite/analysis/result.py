@@ -263,9 +263,3 @@ class Result:
         from kratos_lite.io.writers.results import write_result
 
         write_result(path, self, mode)
-
-    def plot(self, path: str | Path, values: str = "VON_MISES_STRESS") -> None:
-        """Write a picture (.png) of the deformed body colored by a nodal field."""
-        from kratos_lite.io.writers.results import plot_result
-
-        plot_result(path, self, values)

@@ -88,7 +88,7 @@ class Action:
         except ValueError as error:
             key = "value" if "value" in self.settings else "modulus"
             raise self.settings.error(key, f"{self.component}: {error}") from None
-        return product  # type: ignore[no-any-return]
+        return product
 
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""

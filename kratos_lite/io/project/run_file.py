@@ -11,7 +11,6 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, Problems
 from kratos_lite.io.documents import ending, read_document
 from kratos_lite.io.json_file import Object
-from kratos_lite.io.kratos.time_integration import DYNAMIC
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
 from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
@@ -62,6 +61,8 @@ def read_project(path: str | Path, *, allow_outside: bool = False) -> Scene:
 
 def is_in_time(path: str | Path) -> bool:
     """Return whether a run file asks for a march, without reading what it names."""
+    from kratos_lite.io.kratos.time_integration import DYNAMIC
+
     values = read_settings(path).values
     if "solver_settings" not in values and "problem_data" not in values:
         return "time" in values
