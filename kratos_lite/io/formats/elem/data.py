@@ -126,10 +126,8 @@ def _initial(source: Source, run: Run) -> Array:
     return source.reals(run.columns[3], run.starts)
 
 
-def _value(source: Source, form: Form, text: bytes | float, start: int) -> Any:
+def _value(source: Source, form: Form, text: bytes, start: int) -> Any:
     """Return the value of a property: a float, or a vector or matrix as an array."""
-    if not isinstance(text, bytes):
-        return float(text)
     if form is not MATRIX:
         values = source.reals([text], [start] * (text.count(b",") + 1))
         return values if form is VECTOR else float(values[0])

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Note
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
-from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Ints
 
 INT = rb"\d+(?![\w.+-])"
@@ -37,8 +35,6 @@ WORDS = {
     "<rows>": (rb"(%b(?:\s*,\s*%b)*)\s*(?:,\s*)?" % (ROW, ROW), "a row [number, …]"),
     "<next>": (rb"(?:,\s*|(?=\]))", "',' or ']'"),
 }
-SMALL = 200_000
-"""Bytes below which the compiled kernels are not worth loading."""
 KEYWORDS = ("NODES", "ELEMENTS", "CONDITIONS", "PROPERTIES", "ElementsGroup")
 HOME = {"NODES": ".node, .cond or .init", "ELEMENTS": ".elem", "CONDITIONS": ".cond", "PROPERTIES": ".prop"}
 
@@ -98,24 +94,13 @@ def _word(word: str) -> tuple[bytes, str]:
     return re.escape(word.encode()) + (rb"\b\s*" if word.isalpha() else rb"\s*"), repr(word)
 
 
-class Lists(NamedTuple):
-    """Lists of ids that are read already: how many each holds, and all one after the other."""
-
-    counts: Ints
-    ids: Ints
-
-
 @dataclass
 class Run:
-    """Statements or rows of one form that follow each other: the values by column, and where they start.
-
-    A column holds the words of the file, or the compiled reader has put numbers in their place:
-    an array, or `Lists`; names are always words.
-    """
+    """Statements or rows of one form that follow each other: their values by column, and their offsets."""
 
     form: Form
     head: tuple[bytes, ...] = ()
-    columns: list[Any] = field(default_factory=list)
+    columns: list[Sequence[bytes]] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
 
 
@@ -155,22 +140,18 @@ class Source:
         """Note something odd at an offset."""
         self.notes.append(Note(int(self.lines([start])[0]), text, Path(self.name).name))
 
-    def integers(self, tokens: Iterable[bytes] | Ints, starts: Sequence[int] | Ints, least: int = 1) -> Ints:
+    def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.
 
-        `starts` are the offsets of the statements that hold the integers.  Arrays are right already.
+        `starts` are the offsets of the statements that hold the integers.
         """
-        if isinstance(tokens, np.ndarray):
-            return tokens
         text = b" ".join(tokens).replace(b",", b" ")
         values = np.fromstring(text, dtype=np.int64, sep=" ")
         self._check(text, starts, (values < least) | (values == np.iinfo(np.int64).max), integer)
         return values
 
-    def reals(self, tokens: Iterable[bytes] | Array, starts: Sequence[int] | Ints) -> Array:
+    def reals(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints) -> Array:
         """Convert tokens, or commas between them; a number too large for a float is a problem."""
-        if isinstance(tokens, np.ndarray):
-            return tokens
         text = b" ".join(tokens).replace(b",", b" ").translate(_EXPONENTS)
         values = np.fromstring(text, sep=" ")
         self._check(text, starts, ~np.isfinite(values), real)
@@ -223,22 +204,6 @@ class Source:
 
     def _take(self, form: Form, position: int) -> tuple[Run, int]:
         """Take as many statements of one form as follow each other here."""
-        return self._take_compiled(form, position) or self._take_words(form, position)
-
-    def _take_compiled(self, form: Form, position: int) -> tuple[Run, int] | None:
-        """Take the statements in compiled code; None where it knows less of them than the patterns do."""
-        words = form.text.split()
-        is_plain = not {"<reals>", "<rows>"} & set(words)
-        text = kernels("text") if is_plain and len(self.data) > SMALL else None
-        if text is None:
-            return None
-        starts, columns, end = text.statements(self.data, position, words, form.ends)
-        if form.match(self.data, end):
-            return None
-        columns = [Lists(*column) if isinstance(column, tuple) else column for column in columns]
-        return Run(form, (), columns, starts.tolist()), end
-
-    def _take_words(self, form: Form, position: int) -> tuple[Run, int]:
         data, match = self.data, form.match
         rows: list[tuple[bytes, ...]] = []
         starts: list[int] = []

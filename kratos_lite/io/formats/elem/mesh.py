@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.io.document import Note
 from kratos_lite.io.formats.elem.files import ElemFiles
-from kratos_lite.io.formats.elem.grammar import Lists, Run
+from kratos_lite.io.formats.elem.grammar import Run
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
@@ -77,7 +77,8 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
     starts, names = _starts(runs), [name for run in runs for name in run.columns[1]]
     ids = _joined(runs, 0, source.integers)
     properties = _joined(runs, 3, lambda tokens, at: source.integers(tokens, at, least=0))
-    counts, listed = _lists(runs)
+    bodies = [body for run in runs for body in run.columns[2]]
+    counts = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     lines = source.lines(starts)
     for first, again in _duplicates(ids):
         source.add(starts[again], twice(f"{kind.word} {ids[again]}", lines[first]))
@@ -86,13 +87,17 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
         rows = slice(end, end := end + len(list(group)))
         text = name.decode("ascii")
         block = Block(text, NO_NODES, ids[rows], properties[rows], kind.shape_of(text), lines[rows])
-        _connect(block, counts[rows], listed(rows), starts[rows], (files, mesh, kind))
+        _connect(block, counts[rows], bodies[rows], starts[rows], (files, mesh, kind))
         blocks.append(block)
     return blocks
 
 
 def _connect(
-    block: Block, widths: Ints, bodies: Any, starts: Sequence[int], at: tuple[ElemFiles, Mesh, Kind]
+    block: Block,
+    widths: Ints,
+    bodies: Sequence[bytes],
+    starts: Sequence[int],
+    at: tuple[ElemFiles, Mesh, Kind],
 ) -> None:
     """Fill ``block.nodes`` with the node rows of the `widths` ids that each of the texts `bodies` names."""
     files, mesh, kind = at
@@ -138,26 +143,6 @@ def _joined(runs: Sequence[Run], column: int, read: Callable[[Any, list[int]], N
 
 def _starts(runs: Sequence[Run]) -> list[int]:
     return [start for run in runs for start in run.starts]
-
-
-def _lists(runs: Sequence[Run]) -> tuple[Ints, Callable[[slice], Any]]:
-    """Return how many ids each cell lists, and a function that gives the ids, or texts, of some cells."""
-    columns = [run.columns[2] for run in runs]
-    if all(isinstance(column, Lists) for column in columns):
-        counts = np.concatenate([column.counts for column in columns])
-        ids = np.concatenate([column.ids for column in columns])
-        ends = np.append(0, np.cumsum(counts))
-        return counts, lambda rows: ids[ends[rows.start] : ends[rows.stop]]
-    texts = [_bodies(column) if isinstance(column, Lists) else column for column in columns]
-    bodies = [body for column in texts for body in column]
-    return np.array([body.count(b",") + 1 if body else 0 for body in bodies]), lambda rows: bodies[rows]
-
-
-def _bodies(lists: Lists) -> list[bytes]:
-    """Return the ids of each list as text."""
-    return [
-        ",".join(map(str, ids.tolist())).encode() for ids in np.split(lists.ids, np.cumsum(lists.counts)[:-1])
-    ]
 
 
 def _duplicates(ids: Ints) -> Iterator[tuple[int, int]]:
