@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.bodies.constraint_projection import allowed
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.formulations import FORMULATIONS
