@@ -42,7 +42,7 @@ class BodyMotion:
         body, self.parts = self.body, parts
         self.integrator.check_stable(body, h / parts)
         self.integrator.check(body, h / parts)
-        moved = body.integrated_velocity is None or not np.array_equal(body.u, body.last_velocity)
+        moved = body.integrated_velocity is None or not np.array_equal(body.u, body.integrated_velocity)
         if body.constraints and moved:
             project_velocity(body, h / parts)
 

@@ -113,11 +113,11 @@ def check_rotation(R: ArrayLike, what: str = "a rotation") -> Array:
     return R
 
 
-def rotation(q: Array) -> Array:
-    """Return R (..., 3, 3) of rigid q (..., 12)."""
+def rotation_of(q: Array) -> Array:
+    """Return Λ (..., 3, 3) of configurations (..., 12) of rigid bodies, a view: Λ stands column by column."""
     return np.swapaxes(q[..., :9].reshape(*q.shape[:-1], 3, 3), -1, -2)
 
 
 def set_rotation(q: Array, R: Array) -> None:
-    """Put R (..., 3, 3) into rigid q (..., 12)."""
+    """Put Λ (..., 3, 3) into configurations (..., 12) of rigid bodies."""
     q[..., :9] = np.swapaxes(R, -1, -2).reshape(q[..., :9].shape)

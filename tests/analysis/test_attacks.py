@@ -170,15 +170,16 @@ def test_moments_that_do_not_fit_are_refused():
     off[0, 0] = 1.0
     for field, value, words in (
         ("time", -5.0, "time and a number of steps ≥ 0; got -5 s"),
-        ("time", np.nan, "time of a moment must be finite"),
+        ("time", np.nan, "time of a state must be finite"),
         ("step", -4, "got 0.001 s and -4"),
         ("step", 1.5, "got 0.001 s and 1.5"),
-        ("u", off, "at t = 0.001 s the moment does not fit the supports: node 1 along x is 1 m off"),
-        ("v", np.full_like(off, np.nan), "v of a moment must be finite"),
-        ("a", off.astype(complex), "a of a moment must be made of real numbers"),
+        ("u", off, "at t = 0.001 s the state does not fit the supports: node 1 along x is 1 m off"),
+        ("v", np.full_like(off, np.nan), "v of a state must be finite"),
+        ("a", off.astype(complex), "a of a state must be made of real numbers"),
     ):
         with pytest.raises(kl.InputError, match=words):
-            replace(moment, **{field: value}).restore(transient)
+            wrong = {field: value} if field in ("time", "step") else {"values": {**moment.values, field: value}}
+            replace(moment, **wrong).restore(transient)
 
 
 def test_damaged_files_of_moments_end_in_one_error(tmp_path):
@@ -195,7 +196,7 @@ def test_damaged_files_of_moments_end_in_one_error(tmp_path):
             with suppress(kl.InputError):  # a flip of a bit that no one reads does not matter
                 kl.read_state(path)
     (tmp_path / "text.npz").write_text("time,energy")
-    with pytest.raises(kl.InputError, match=r"not a moment that Moment\.save wrote, or not all of it$"):
+    with pytest.raises(kl.InputError, match=r"not a state that kl\.write wrote, or not all of it$"):
         kl.read_state(tmp_path / "text.npz")
 
 
@@ -210,9 +211,9 @@ def test_arguments_of_solutions_are_checked_with_a_motion_too():
             model.solve(**options)
     with pytest.raises(kl.InputError, match="progress must be a function"):
         model.transient(progress=3)
-    with pytest.raises(kl.InputError, match="until must be a function of a moment"):
+    with pytest.raises(kl.InputError, match="until must be a function of a state"):
         kl.integrate(model.transient(), 1e-3, 1, until=3)
-    with pytest.raises(kl.InputError, match="a Result or a Moment is needed; got NoneType"):
+    with pytest.raises(kl.InputError, match="a Result or a State is needed; got NoneType"):
         kl.reaction_resultant(model, None)
     with pytest.raises(kl.InputError, match="critical rates; got 100000"):
         critical_rate(model, 100_000)
@@ -225,9 +226,9 @@ def test_nonsense_is_told():
             wheel(kl.ale.Rotation("z", rate=value)).solve()
     transient = wheel().transient()
     (moment,) = kl.integrate(transient, 1e-3, 1)
-    with pytest.raises(kl.InputError, match="v of a moment needs shape"):
-        kl.State(0.0, 0, moment.u, moment.v[:4], moment.a, moment.reactions).restore(transient)
-    with pytest.raises(kl.InputError, match="a Moment is needed"):
+    with pytest.raises(kl.InputError, match="v of a state needs shape"):
+        replace(moment, values={**moment.values, "v": moment.v[:4]}).restore(transient)
+    with pytest.raises(kl.InputError, match="a State of a model is needed"):
         transient.restore(None)
     with pytest.raises(kl.InputError, match="count must be"):
         critical_rate(wheel(kl.ale.Rotation("z", 1.0)), -1)

@@ -91,7 +91,7 @@ def test_a_moving_support_carries_the_column(integrator):
     for moment in kl.integrate(transient, h, round(0.8 / h), every=100):
         assert moment.u[foot, 2] == pytest.approx(np.full(4, 1e-3 * np.sin(moment.time) ** 2), rel=1e-12)
         assert moment.u[top, 2] == pytest.approx(moment.u[foot, 2], abs=2e-7)
-    if getattr(integrator, "alpha_f", 0):
+    if isinstance(integrator, (kl.HHT, kl.GeneralizedAlpha)):
         return  # its forces balance within the step, not at its end
     inertia = transient.equations.times_mass(transient.a).reshape(-1, 3)[:, 2].sum()
     assert moment.reactions[:, 2].sum() == pytest.approx(inertia, abs=1e-6 * SOIL.density)

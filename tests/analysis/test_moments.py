@@ -82,7 +82,7 @@ def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
     np.testing.assert_allclose(result.report.total_load, static.report.total_load, atol=1e-9)
     assert result.report.backward_error < 1e-9
     rows = dict(result.table())
-    assert rows["solver"] == "Newmark(0.25, 0.5): step 600, t = 12 s"
+    assert rows["solver"] == "newmark(0.25, 0.5): step 600, t = 12 s"
     assert {"total reaction", "largest von Mises"} <= rows.keys()
     result.save(tmp_path / "late.vtu")
     result.save(tmp_path / "late.json")

@@ -348,7 +348,8 @@ def test_no_density():
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"integrator": "newmark"}, "a integrator such as newmark"),
+        ({"integrator": "newmrk"}, r"unknown integrator 'newmrk'\. Did you mean newmark"),
+        ({"integrator": kl.Newmark}, "an integrator such as Newmark"),
         ({"displacement": np.zeros((3, 3))}, r"initial displacement needs shape \(20, 3\); got \(3, 3\)"),
         ({"velocity": np.full((20, 3), np.nan)}, "initial velocity"),
         ({"rayleigh": (-1.0, 0.0)}, "Rayleigh damping is α ≥ 0"),
@@ -364,7 +365,7 @@ def test_wrong_options(options, text):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"dt": 0.0, "steps": 1}, "seconds > 0; got 0.0"),
+        ({"dt": 0.0, "steps": 1}, "number > 0, in s; got 0.0"),
         ({"dt": np.nan, "steps": 1}, "a step"),
         ({"dt": 1e-3, "steps": 0}, "steps must be a whole number ≥ 1; got 0"),
         ({"dt": 1e-3, "steps": 2.5}, "steps must be a whole number"),
@@ -418,8 +419,8 @@ def test_files_that_are_no_moments(tmp_path):
     with pytest.raises(InputError, match="there is no such file"):
         kl.read_state(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("no moment")
-    with pytest.raises(InputError, match=r"not a moment that Moment\.save wrote"):
+    with pytest.raises(InputError, match=r"not a state that kl\.write wrote"):
         kl.read_state(tmp_path / "text.npz")
     other = bar(2).transient().state()
-    with pytest.raises(InputError, match="u of a moment needs shape"):
+    with pytest.raises(InputError, match="u of a state needs shape"):
         bar(4).transient().put(other)

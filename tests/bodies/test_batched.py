@@ -113,12 +113,12 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
-        (lambda bodies: bodies.clear(), kl.InputError, "there is no body to march"),
+        (lambda bodies: bodies.clear(), kl.InputError, "there is no body to advance"),
         (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body stands twice"),
         (
             lambda b: setattr(b[1], "integrator", "RIG_IMP"),
             kl.InputError,
-            "same integrator.*body 1 'RIG_IMP'",
+            "same integrator.*body 1 'implicit'",
         ),
         (lambda b: setattr(b[1], "time", 3.0), kl.InputError, "need the same time"),
         (lambda b: b[1].constrain(kl.FixPoint(b[1].center)), kl.ModelError, "body 1 has constraints"),

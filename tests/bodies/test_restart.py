@@ -96,7 +96,7 @@ def test_states_come_after_every_so_many_steps_and_at_the_end(brick):
     )
     assert [state.step for state in states] == [3, 6, 7]
     np.testing.assert_allclose([state.time for state in states], [0.3, 0.6, 0.7], rtol=1e-14)
-    assert shares == [("march", 3 / 7), ("march", 6 / 7), ("march", 1.0)]
+    assert shares == [("integrate", 3 / 7), ("integrate", 6 / 7), ("integrate", 1.0)]
     more = list(kl.integrate(body, 0.1, 2))
     assert [state.step for state in more] == [8, 9]
 
@@ -141,7 +141,7 @@ def test_files_that_are_no_states(content, tmp_path):
         np.savez(path, q=np.zeros(3))
     else:
         path.write_bytes(content)
-    with pytest.raises(kl.InputError, match=r"broken\.npz: not a state that State\.save wrote"):
+    with pytest.raises(kl.InputError, match=r"broken\.npz: not a state that kl\.write wrote"):
         kl.read_state(path)
     with pytest.raises(kl.InputError, match="there is no such file"):
         kl.read_state(tmp_path / "missing.npz")

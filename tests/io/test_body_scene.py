@@ -74,7 +74,7 @@ def test_a_march_is_that_of_python(scene):
     from kratos_lite.bodies.rotations import exp
 
     body = kl.FiniteElementBody(
-        kl.box((0.4, 0.6, 1.0), (1, 2, 2)), RUBBER, lumped=True, scheme="DEF_LIM", damping=1e-4
+        kl.box((0.4, 0.6, 1.0), (1, 2, 2)), RUBBER, lumped=True, integrator="DEF_LIM", damping=1e-4
     )
     body.rotate(exp(np.array([0, 0, np.pi / 6])))
     body.set_velocity(angular=(0.05, 10, 0.05))
@@ -274,7 +274,7 @@ def test_a_step_that_is_too_long_has_its_place(tmp_path, script):
     body = {"kind": "pseudo-rigid", "integrator": "DEF_EXP"}
     path = written(tmp_path, body=body, time={"step": 0.1, "steps": 1})
     line = next(i for i, text in enumerate(path.read_text().splitlines(), 1) if '"step"' in text)
-    with pytest.raises(kl.InputError, match=rf"scene\.json:{line}:\d+: DEF_EXP is not stable"):
+    with pytest.raises(kl.InputError, match=rf"scene\.json:{line}:\d+: the explicit integrator is not stable"):
         read_scene(path).march()
     with pytest.raises(kl.InputError, match=r"swing\.py: a step must be one number > 0, in s"):
         read_scene(script(SCRIPT + "dt = 0\n")).march()
@@ -307,7 +307,7 @@ def test_a_description_says_what_there_is(scene):
     )
     text = describe_scene(found)
     for words in (
-        "pseudo-rigid, 12 velocities, ENERGY_MOMENTUM",
+        "pseudo-rigid, 12 velocities, energy_momentum",
         "240 kg",
         "27.2, 23.2, 10.4 kg m²",
         "0.00584 s",

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
-from kratos_lite.bodies.constraint_projection import Solve, Step, constrained_step
+from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array

@@ -20,7 +20,7 @@ from kratos_lite.analysis.integrators.kernels import NO_NEWTON, TOO_FAST, compil
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
-from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation, set_rotation
+from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, set_rotation
 from kratos_lite.errors import SolveError
 from kratos_lite.typing import Array, Mask
 
@@ -100,7 +100,7 @@ def half_step(q: Array, u: Array, h: float) -> Array:
     """
     out = np.empty(q.shape)
     if compiled("rigid_half", q, u, h, out) is NotImplemented:
-        R, x = rotation(q) @ exp(h / 2 * u[..., :3]), q[..., 9:] + h / 2 * u[..., 3:]
+        R, x = rotation_of(q) @ exp(h / 2 * u[..., :3]), q[..., 9:] + h / 2 * u[..., 3:]
         set_rotation(out, R)
         out[..., 9:] = x
     return out
@@ -177,7 +177,7 @@ def steps(
     gravity = np.asarray(mass)[..., None] * acceleration
     for step in range(count):
         qh, before = half_step(q, u, h), u.copy()
-        R, load = rotation(qh), np.empty(u.shape)
+        R, load = rotation_of(qh), np.empty(u.shape)
         load[..., :3] = transposed(R, spatial[..., :3]) + convected[..., :3]
         load[..., 3:] = gravity + spatial[..., 3:] + apply(R, convected[..., 3:])
         body = _finish(q, u, qh, load, *constant[:3], h, method, tolerance)
@@ -205,7 +205,7 @@ def _finish(
 ) -> int:
     """Return the first body whose step failed, or -1: `finish_step` in NumPy."""
     W, T, J = u[..., :3], load[..., :3], inertia
-    Rh = rotation(qh)
+    Rh = rotation_of(qh)
     with np.errstate(all="ignore"):
         p = transposed(exp(h / 2 * W), apply(J, W))
         Wh = apply(inverse, p + h / 2 * T)
