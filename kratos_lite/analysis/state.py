@@ -63,11 +63,24 @@ class State:
 
     @classmethod
     def of(cls, subject: Body | InTime) -> State:
-        """Return the present state of a body or of a `TransientAnalysis`."""
+        """Return the present state of a body or of a model in time.
+
+        Parameters
+        ----------
+        subject : a body, or a `TransientAnalysis`.
+
+        Returns
+        -------
+        State
+        """
         return subject.state() if not isinstance(subject, Body) else state_of_body(subject)
 
     def restore(self, subject: Body | InTime) -> None:
-        """Let a body or a `TransientAnalysis` go on from this state.
+        """Let a body or a model go on from this state.
+
+        Parameters
+        ----------
+        subject : a body of the same kind and size, or a `TransientAnalysis` of the same mesh.
 
         Raises
         ------

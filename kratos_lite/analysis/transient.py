@@ -153,11 +153,21 @@ class TransientAnalysis:
     # ---- steps -----------------------------------------------------------------------------------
 
     def critical_step(self) -> float:
-        """Return the longest stable step in s: infinite for implicit integrators."""
+        """Return the longest stable step.
+
+        Returns
+        -------
+        float, s; infinite for implicit integrators.
+        """
         return self.integrator.critical_step(self.equations)
 
     def prepare(self, h: float, parts: int) -> None:
-        """Make ready for steps of h s in so many parts; `kratos_lite.integrate` does.
+        """Make ready for steps; `kratos_lite.integrate` does.
+
+        Parameters
+        ----------
+        h : step in s.
+        parts : substeps into which each is divided.
 
         Raises
         ------
@@ -180,7 +190,13 @@ class TransientAnalysis:
         self._restored = None
 
     def advance(self, h: float, count: int) -> None:
-        """Take steps of h s; `kratos_lite.integrate` does."""
+        """Take steps; `kratos_lite.integrate` does.
+
+        Parameters
+        ----------
+        h : step in s.
+        count : their number.
+        """
         part = h / self.parts
         for _ in range(count):
             now = self.u, self.v, self.a
@@ -193,7 +209,12 @@ class TransientAnalysis:
             self.step += 1
 
     def diverged(self) -> bool:
-        """Return whether displacements are beyond the divergence limit, or no numbers."""
+        """Return whether the motion has lost its stability.
+
+        Returns
+        -------
+        bool : displacements are beyond the divergence limit, or no numbers.
+        """
         return not np.abs(self.u).max(initial=0.0) < self._limit
 
     def _critical_rate(self) -> tuple[float, bool]:
@@ -220,7 +241,12 @@ class TransientAnalysis:
     # ---- what is known at the time ---------------------------------------------------------------
 
     def state(self) -> State:
-        """Return the model as it is now."""
+        """Return the model as it is now.
+
+        Returns
+        -------
+        State
+        """
         left = self._left()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
         values["reactions"] = self.equations.model.supports.carried(self._whole(left))
@@ -229,6 +255,10 @@ class TransientAnalysis:
 
     def restore(self, state: State) -> None:
         """Go on from a state, of this model or of one that was loaded or held otherwise.
+
+        Parameters
+        ----------
+        state : of a model of the same mesh; an acceleration that does not balance is found anew.
 
         Raises
         ------
@@ -276,10 +306,17 @@ class TransientAnalysis:
         return float(np.abs(self.equations.system.reduced.reduce(forces)).max(initial=0.0))
 
     def result(self, state: State | None = None) -> Result:
-        """Return a state, or now, as a `Result` with strains and stresses; its loads are those of that time.
+        """Return a state as a result with strains and stresses.
 
-        The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative; None for
-        integrators that do not take the balance at the end of a step.
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        Result
+            With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
+            on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
         at, local, left = self.state() if state is None else state, self.equations.system.local, None
         if self.integrator.balanced:
@@ -289,19 +326,39 @@ class TransientAnalysis:
         return result_of(self.equations, at, str(self.integrator), left, critical)
 
     def reactions(self) -> Array:
-        """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
+        """Return the forces of supports and constraints on the model, M a + C v + K u - f.
+
+        Returns
+        -------
+        (n, 3) float, N; 0 where nothing acts.
+        """
         return self.equations.model.supports.carried(self._whole(self._left()))
 
     def energy(self, state: State | None = None) -> float:
-        """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.
+        """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
 
-        It is that of now, or of a state.
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        float, J.
         """
         e, (u, v, time) = self.equations, self._at(state)
         return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
-        """Return the velocity of the material in space, now or in a state; see `material_velocity`."""
+        """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        (n, 3) float, m/s.
+        """
         e, (u, v, time) = self.equations, self._at(state)
         return self._whole(velocity_of_material(e, u, v, time))
 

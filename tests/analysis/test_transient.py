@@ -318,12 +318,10 @@ def test_restart_is_the_same_bit_by_bit(name, tmp_path):
 
 def test_moments_and_the_end():
     seen: list[float] = []
-    model = pulled(None)
-    march = model.transient(
-        progress=lambda phase, share: seen.append(share) if phase == "integrate" else None
+    states = list(
+        kl.integrate(pulled(None).transient(), 1e-3, 10, every=4, progress=lambda _, share: seen.append(share))
     )
-    moments = list(kl.integrate(march, 1e-3, 10, every=4))
-    assert [m.step for m in moments] == [4, 8, 10]
+    assert [state.step for state in states] == [4, 8, 10]
     assert seen == [0.4, 0.8, 1.0]
     stopped = list(kl.integrate(pulled(None).transient(), 1e-3, 100, until=lambda m: m.time > 0.0045))
     assert stopped[-1].step == 5
@@ -423,4 +421,4 @@ def test_files_that_are_no_moments(tmp_path):
         kl.read_state(tmp_path / "text.npz")
     other = bar(2).transient().state()
     with pytest.raises(InputError, match="u of a state needs shape"):
-        bar(4).transient().put(other)
+        other.restore(bar(4).transient())

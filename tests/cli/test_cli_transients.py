@@ -77,7 +77,7 @@ def assert_same(path, moments):
     ],
 )
 def test_words_file_and_python_march_alike(run, folder, word, value, scheme):
-    expected = marched(tower(), scheme=scheme, rayleigh=(0.5, 1e-5), lumped=True)
+    expected = marched(tower(), integrator=scheme, rayleigh=(0.5, 1e-5), lumped=True)
     options = ("--scheme", word, "--rayleigh", "0.5,1e-5", "--lumped")
     done = run("solve", "tower.mdpa", *WORDS, "--march", "1e-3:20:5", *options, "-o", "words.npz")
     assert (done.code, done.err) == (0, "")
@@ -97,7 +97,7 @@ def test_central_differences(run, folder):
     write(time={"step": 1e-5, "steps": 30, "every": 30, "scheme": "central_difference"}, output="end.npz")
     done = run("solve", "run.json")
     assert done.rows["scheme"] == "central_difference, lumped mass"
-    transient = tower().transient(scheme=kl.CentralDifference())
+    transient = tower().transient(integrator=kl.CentralDifference())
     assert_same("end.npz", [transient.state(), *kl.integrate(transient, 1e-5, 30, every=30)])
     write(time={**TIME, "scheme": "central_difference"})
     assert run("solve", "run.json").refuses("central differences are not stable", "the critical step is")
@@ -109,7 +109,7 @@ def test_options_win_over_the_file(run, folder):
     done = run("solve", "run.json", *words)
     assert done.rows["scheme"] == "bossak(-0.3)"
     assert done.rows["damping"] == "0 1/s × M + 1e-06 s × K"
-    transient = tower().transient(scheme=kl.Bossak(), rayleigh=(0.0, 1e-6))
+    transient = tower().transient(integrator=kl.Bossak(), rayleigh=(0.0, 1e-6))
     assert_same("words.npz", [transient.state(), *kl.integrate(transient, 2e-3, 4, every=2)])
     assert not (folder / "file.npz").exists()
 
@@ -166,7 +166,7 @@ def test_the_scene_gives_the_transient(folder):
     assert str(scene.march) == "20 steps of 0.001 s by hht(-0.05)"
     transient = scene.transient()
     end = list(scene.states(transient))[-1]
-    assert np.array_equal(end.u, marched(tower(), scheme=kl.HHT())[-1].u)
+    assert np.array_equal(end.u, marched(tower(), integrator=kl.HHT())[-1].u)
     write(time=None)
     with pytest.raises(kl.ModelError, match="says nothing of a march"):
         load("run.json").transient()

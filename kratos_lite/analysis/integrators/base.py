@@ -54,15 +54,45 @@ class ModelIntegrator(ABC):
         return False
 
     def check(self, e: EquationsOfMotion) -> None:  # noqa: B027 (most take all models)
-        """Raise ModelError if it cannot take a model."""
+        """Refuse a model that it cannot take.
+
+        Parameters
+        ----------
+        e : its equations of motion.
+
+        Raises
+        ------
+        ModelError
+            The model has something that the integrator does not take.
+        """
 
     def critical_step(self, e: EquationsOfMotion) -> float:
-        """Return the longest stable step in s."""
+        """Return the longest stable step.
+
+        Parameters
+        ----------
+        e : equations of motion.
+
+        Returns
+        -------
+        float, s; infinite if any step is stable.
+        """
         return np.inf
 
     @abstractmethod
     def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
-        """Return displacement, velocity and acceleration at the end of a step of h s from `start`."""
+        """Take one step.
+
+        Parameters
+        ----------
+        e : equations of motion.
+        now : displacement, velocity and acceleration (3a,) at its start.
+        start, h : time at its start, and its length, in s.
+
+        Returns
+        -------
+        displacement, velocity and acceleration (3a,) at its end.
+        """
 
     def __str__(self) -> str:
         numbers = [f"{getattr(self, field.name):g}" for field in fields(self)]  # type: ignore[arg-type]

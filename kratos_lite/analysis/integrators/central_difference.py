@@ -28,7 +28,13 @@ class CentralDifference(ModelIntegrator):
     lumps_mass = True
 
     def check(self, e: EquationsOfMotion) -> None:
-        """Raise ModelError for a motion of the material or for constraints."""
+        """Refuse what it does not take; see `ModelIntegrator.check`.
+
+        Raises
+        ------
+        ModelError
+            The model has a motion of its material, or constraints.
+        """
         if e.terms is not None:
             raise ModelError("central differences do not take a motion of the material; use Newmark()")
         if e.model.supports.links:

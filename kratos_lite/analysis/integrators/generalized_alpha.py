@@ -37,7 +37,12 @@ class _Implicit(ModelIntegrator):
 
     @abstractmethod
     def numbers(self) -> NewmarkNumbers:
-        """Return β, γ, αm and αf."""
+        """Return the four numbers of the method.
+
+        Returns
+        -------
+        β, γ, αm and αf.
+        """
 
     @property
     def balanced(self) -> bool:

@@ -26,6 +26,10 @@ def read_state(path: str | Path) -> State:
     ----------
     path : the .npz file.
 
+    Returns
+    -------
+    State
+
     Raises
     ------
     InputError
