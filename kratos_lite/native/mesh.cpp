@@ -114,7 +114,7 @@ Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
         const int64_t a = root(parent, ends[2 * i]), b = root(parent, ends[2 * i + 1]);
         parent[a < b ? b : a] = a < b ? a : b;
     }
-    for (int64_t i = 0; i < n; ++i) parent[i] = parent[parent[i]];  // members before i are labelled
+    for (int64_t i = 0; i < n; ++i) parent[i] = parent[parent[i]];  // members before i are labeled
     return labels;
 }
 
