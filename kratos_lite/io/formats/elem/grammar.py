@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Note
+from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
 from kratos_lite.typing import Array, Ints
 
@@ -107,7 +108,7 @@ class Run:
 CLOSE = Form("] )")
 
 
-class Source:
+class Source(TextSource):
     """One file of the set: its bytes without comments, and places in it for messages.
 
     Parameters
@@ -117,28 +118,8 @@ class Source:
     """
 
     def __init__(self, path: Path, problems: Problems, notes: list[Note]) -> None:
-        self.name = str(path)
-        self.problems = problems
-        self.notes = notes
-        self.data = blank_comments(read_bytes(path), self.name)
-
-    @cached_property
-    def _line_ends(self) -> NDArray[np.int64]:
-        return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == ord("\n"))
-
-    def lines(self, starts: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int32]:
-        """Return the line (from 1) of each offset."""
-        return (np.searchsorted(self._line_ends, starts) + 1).astype(np.int32)
-
-    def add(self, start: int, message: str) -> None:
-        """Note a problem at an offset."""
-        line = int(self.lines([start])[0])
-        column = start - (int(self._line_ends[line - 2]) if line > 1 else -1)
-        self.problems.add(f"{self.name}:{line}:{column}: {message}")
-
-    def note(self, start: int, text: str) -> None:
-        """Note something odd at an offset."""
-        self.notes.append(Note(int(self.lines([start])[0]), text, Path(self.name).name))
+        data = blank_comments(read_bytes(path), str(path))
+        super().__init__(str(path), data, problems, notes, path.name)
 
     def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.
@@ -170,7 +151,7 @@ class Source:
             try:
                 read(tokens[i])
             except ValueError as reason:
-                self.add(int(starts[i]), str(reason))
+                self.problem(str(reason), int(starts[i]))
 
     def scan(self, forms: Sequence[Form]) -> list[Run]:
         """Read the whole file as statements of these forms; what fits none of them is a problem."""
@@ -190,7 +171,7 @@ class Source:
                 runs.append(run)
             elif close := CLOSE.match(self.data, position):
                 if not opened:  # GiD templates wrote the end of a list even where they left out its beginning
-                    self.note(position, "'])' closes no list; ignored")
+                    self.note("'])' closes no list; ignored", position)
                 opened, after = None, self._skip(close.end())
             else:
                 after, stay = self._explain(position, forms, opened)
@@ -222,9 +203,9 @@ class Source:
         found = _FOUND.match(self.data, place)
         word = found.group()[:60] if found else b""
         if place == start and not opened:
-            self.add(place, _unknown(word, forms))
+            self.problem(_unknown(word, forms), place)
         else:
-            self.add(place, _unexpected(word, wanted) + self._opened_at(opened))
+            self.problem(_unexpected(word, wanted) + self._opened_at(opened), place)
         resume = (choices[0].resume if opened else _NEXT_STATEMENT).search(self.data, start + 1)
         after = resume.start() if resume else len(self.data)
         return after, bool(opened and resume) and self.data[after : after + 1] in (b"[", b"]")
@@ -242,7 +223,7 @@ class Source:
         return place, ["the end of the statement"]
 
     def _opened_at(self, opened: Run | None) -> str:
-        return f" (in the list opened at line {self.lines(opened.starts)[0]})" if opened else ""
+        return f" (in the list opened at line {self.line(opened.starts[0])})" if opened else ""
 
 
 _MANY = tuple(WORDS[word][0] for word in ("<ids>", "<reals>", "<rows>"))

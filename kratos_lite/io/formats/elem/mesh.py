@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kratos_lite.io.document import Note
+from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
 from kratos_lite.io.formats.elem.files import ElemFiles
 from kratos_lite.io.formats.elem.grammar import Run
 from kratos_lite.io.names import condition_shape, element_shape
@@ -48,19 +49,15 @@ def _nodes(files: ElemFiles) -> Mesh:
     before = files.problems.count
     if source is None or not starts:
         if source is not None and not before:
-            source.add(0, "there are no nodes; expected NODES = NodesList([[id, x, y, z], …])")
+            source.problem("there are no nodes; expected NODES = NodesList([[id, x, y, z], …])", 0)
         files.nodes_known = False
         return Mesh(np.zeros((0, 3)), source=name)
     ids = _joined(runs, 0, source.integers)
     points = np.column_stack([_joined(runs, column, source.reals) for column in (1, 2, 3)])
     keep = np.ones(len(ids), dtype=bool)
-    for first, again in _duplicates(ids):
-        keep[again] = False
-        line = source.lines([starts[first]])[0]
-        if np.array_equal(points[first], points[again]):
-            source.note(starts[again], f"node {ids[again]} is repeated from line {line}")
-        else:
-            source.add(starts[again], twice(f"node {ids[again]}", line, " with other coordinates"))
+    for row, text, is_same in repeated_nodes(ids, points, source.lines(starts)):
+        keep[row] = False
+        (source.note if is_same else source.problem)(text, starts[row])
     files.nodes_known &= files.problems.count == before
     return Mesh(points[keep], node_ids=ids[keep], source=name)
 
@@ -80,8 +77,8 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
     bodies = [body for run in runs for body in run.columns[2]]
     counts = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     lines = source.lines(starts)
-    for first, again in _duplicates(ids):
-        source.add(starts[again], twice(f"{kind.word} {ids[again]}", lines[first]))
+    for row, first in repeated(ids):
+        source.problem(already(f"{kind.word} {ids[row]}", lines[first]), starts[row])
     blocks, end = [], 0
     for name, group in groupby(names):
         rows = slice(end, end := end + len(list(group)))
@@ -103,12 +100,12 @@ def _connect(
     files, mesh, kind = at
     source = files.sources[kind.ending]
 
-    def add(cell: int, message: str) -> None:
-        source.add(starts[cell], f"{kind.word} {block.ids[cell]} ({block.name}){message}")
+    def problem(cell: int, message: str) -> None:
+        source.problem(f"{kind.word} {block.ids[cell]} ({block.name}){message}", starts[cell])
 
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
     for i in np.flatnonzero(widths != width).tolist():
-        add(i, f" has {widths[i]} nodes; expected {width}")
+        problem(i, f" has {widths[i]} nodes; expected {width}")
     if (widths != width).any():
         return
     before = files.problems.count
@@ -116,11 +113,8 @@ def _connect(
     if files.problems.count > before:
         return
     block.nodes = mesh.node_rows(nodes).astype(np.int32)
-    ordered = np.sort(nodes, axis=1)
-    for i, k in np.argwhere(ordered[:, 1:] == ordered[:, :-1]).tolist():
-        add(i, f" names node {ordered[i, k]} twice; its nodes must differ")
-    for i, k in np.argwhere(block.nodes < 0).tolist() if files.nodes_known else ():
-        add(i, f": {files.no_node(nodes[i, k])}")
+    for i, message in wrong_nodes(nodes, block.nodes) if files.nodes_known else ():
+        problem(i, message)
 
 
 def _note_unused(files: ElemFiles, mesh: Mesh) -> None:
@@ -143,18 +137,3 @@ def _joined(runs: Sequence[Run], column: int, read: Callable[[Any, list[int]], N
 
 def _starts(runs: Sequence[Run]) -> list[int]:
     return [start for run in runs for start in run.starts]
-
-
-def _duplicates(ids: Ints) -> Iterator[tuple[int, int]]:
-    """Yield pairs of rows, the first and a later one, that carry the same id."""
-    if (np.diff(ids) > 0).all():
-        return
-    order = np.argsort(ids, kind="stable")
-    ordered = ids[order]
-    for i in np.flatnonzero(ordered[1:] == ordered[:-1]):
-        yield int(order[np.searchsorted(ordered, ordered[i])]), int(order[i + 1])
-
-
-def twice(what: str, line: int, how: str = "") -> str:
-    """Return the message for what stands in a file for the second time."""
-    return f"{what} is defined twice{how}, first at line {line}; expected once"
