@@ -177,8 +177,8 @@ def test_moments_that_do_not_fit_are_refused():
         ("v", np.full_like(off, np.nan), "v of a state must be finite"),
         ("a", off.astype(complex), "a of a state must be made of real numbers"),
     ):
+        wrong = {"values": {**moment.values, field: value}} if field in "uva" else {field: value}
         with pytest.raises(kl.InputError, match=words):
-            wrong = {field: value} if field in ("time", "step") else {"values": {**moment.values, field: value}}
             replace(moment, **wrong).restore(transient)
 
 

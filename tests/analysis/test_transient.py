@@ -318,9 +318,8 @@ def test_restart_is_the_same_bit_by_bit(name, tmp_path):
 
 def test_moments_and_the_end():
     seen: list[float] = []
-    states = list(
-        kl.integrate(pulled(None).transient(), 1e-3, 10, every=4, progress=lambda _, share: seen.append(share))
-    )
+    transient = pulled(None).transient()
+    states = list(kl.integrate(transient, 1e-3, 10, every=4, progress=lambda _, share: seen.append(share)))
     assert [state.step for state in states] == [4, 8, 10]
     assert seen == [0.4, 0.8, 1.0]
     stopped = list(kl.integrate(pulled(None).transient(), 1e-3, 100, until=lambda m: m.time > 0.0045))

@@ -110,7 +110,11 @@ def test_an_inertia_that_no_deformable_body_has():
 @pytest.mark.parametrize(
     ("kind", "integrator", "words"),
     [
-        (kl.RigidBody, "DEF_EXP", "integrators of a rigid body are momentum_conserving, explicit, implicit; got 'DEF_EXP'"),
+        (
+            kl.RigidBody,
+            "DEF_EXP",
+            "of a rigid body are momentum_conserving, explicit, implicit; got 'DEF_EXP'",
+        ),
         (kl.PseudoRigidBody, "RIG_NEG", "integrators of a pseudo-rigid body are .*; got 'RIG_NEG'"),
         (kl.FiniteElementBody, "DEF_IMP", "integrators of a finite-element body are .*; got 'DEF_IMP'"),
     ],
@@ -123,7 +127,7 @@ def test_a_scheme_of_another_kind(kind, integrator, words, refused):
 
 @pytest.mark.parametrize("formulation", ["corotational", "modal"])
 def test_energy_momentum_is_for_the_total_lagrangian_formulation(formulation):
-    with pytest.raises(kl.InputError, match="integrators of a finite-element body are linearly_implicit, explicit"):
+    with pytest.raises(kl.InputError, match="of a finite-element body are linearly_implicit, explicit"):
         body_of(kl.FiniteElementBody, formulation=formulation, integrator="ENERGY_MOMENTUM")
 
 

@@ -100,7 +100,7 @@ def test_central_differences(run, folder):
     transient = tower().transient(integrator=kl.CentralDifference())
     assert_same("end.npz", [transient.state(), *kl.integrate(transient, 1e-5, 30, every=30)])
     write(time={**TIME, "scheme": "central_difference"})
-    assert run("solve", "run.json").refuses("central differences are not stable", "the critical step is")
+    assert run("solve", "run.json").refuses("central_difference is not stable", "the critical step is")
 
 
 def test_options_win_over_the_file(run, folder):
