@@ -12,7 +12,7 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.solvers.supports import ConstraintMap
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.typing import Array, Ints, Progress
 
 INCREMENTS = (1, 4, 16, 64)

@@ -24,8 +24,8 @@ from kratos_lite.errors import ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import LinearSolver
 from kratos_lite.solvers.banded import Factorizer
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.supports import ConstraintMap
 from kratos_lite.typing import Array
 
 FACTORIZED_MAX = 4000
