@@ -56,4 +56,4 @@ if len(sys.argv) > 1:
     along = np.concatenate([moment.u[:, 0] for moment in moments])
     upward = np.outer(along, (0, 0, 1))
     title = f"Displacement along the bar drawn upwards, {moments[1].time:g} s from one to the next"
-    kl.picture(sys.argv[1], mesh, upward, along, title=title, unit="m", scale=3000, size=(6, 4))
+    kl.draw(sys.argv[1], mesh, upward, along, title=title, unit="m", scale=3000, size=(6, 4))

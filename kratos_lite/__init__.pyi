@@ -22,18 +22,18 @@ from kratos_lite.bodies import FixPoint as FixPoint
 from kratos_lite.bodies import FollowerPressure as FollowerPressure
 from kratos_lite.bodies import Force as Force
 from kratos_lite.bodies import Obstacle as Obstacle
+from kratos_lite.bodies import PrescribedAcceleration as PrescribedAcceleration
+from kratos_lite.bodies import PrescribedDisplacement as PrescribedDisplacement
+from kratos_lite.bodies import PrescribedVelocity as PrescribedVelocity
 from kratos_lite.bodies import PseudoRigidBody as PseudoRigidBody
 from kratos_lite.bodies import RigidBody as RigidBody
 from kratos_lite.bodies import RigidLink as RigidLink
-from kratos_lite.bodies import SetAcceleration as SetAcceleration
-from kratos_lite.bodies import SetDisplacement as SetDisplacement
-from kratos_lite.bodies import SetVelocity as SetVelocity
 from kratos_lite.bodies import Spring as Spring
 from kratos_lite.bodies import State as State
 from kratos_lite.bodies import TimeSeries as TimeSeries
 from kratos_lite.bodies import Torque as Torque
 from kratos_lite.bodies import convert as convert
-from kratos_lite.bodies import equilibrium as equilibrium
+from kratos_lite.bodies import find_equilibrium as find_equilibrium
 from kratos_lite.bodies import march as march
 from kratos_lite.elements import ELEMENTS as ELEMENTS
 from kratos_lite.elements import KinematicLinear as KinematicLinear
@@ -54,8 +54,10 @@ from kratos_lite.errors import ModelError as ModelError
 from kratos_lite.errors import SolveError as SolveError
 from kratos_lite.io.files import read as read
 from kratos_lite.io.files import write as write
-from kratos_lite.io.writers.trajectory import Series as Series
-from kratos_lite.io.writers.trajectory import trajectory_picture as trajectory_picture
+from kratos_lite.io.writers.pictures import draw as draw
+from kratos_lite.io.writers.pictures import draw_element as draw_element
+from kratos_lite.io.writers.pictures import draw_trajectory as draw_trajectory
+from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import Isotropic3D as Isotropic3D
 from kratos_lite.materials import LinearMaterial as LinearMaterial
@@ -75,7 +77,5 @@ from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads import Traction as Traction
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
-from kratos_lite.view import element_picture as element_picture
-from kratos_lite.view import picture as picture
 
 __version__: str

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.output import read_arrays, write_arrays
+from kratos_lite.io.atomic import read_arrays, write_arrays
 from kratos_lite.typing import Array
 
 FIELDS = ("u", "v", "a", "reactions", "time", "step", "imbalance")

@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
-from kratos_lite.io.output import read_arrays, write_arrays
+from kratos_lite.io.atomic import read_arrays, write_arrays
 from kratos_lite.typing import Array
 
 FIELDS = ("kind", "q", "u", "time", "step", "external_work")
@@ -62,7 +62,7 @@ class State:
             )
         body.q[...], body.u[...] = self.q, self.u  # bodies that advance together share these arrays
         body.time, body.step = self.time, self.step
-        body.marched = self.u.copy() if self.step else None
+        body.integrated_velocity = self.u.copy() if self.step else None
         body.external_work[...] = self.external_work
 
     def save(self, path: str | Path) -> None:

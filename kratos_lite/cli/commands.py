@@ -162,7 +162,7 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
 
     All are checked, before any work is done.
     """
-    from kratos_lite.io.writers.results import check_picture, check_result_ending
+    from kratos_lite.io.writers.results import check_result_ending
 
     if Path(options.output or given.get("output", "")).suffix.lower() in (".pvd", ".csv", ".npz"):
         path = options.output or given["output"]
@@ -175,6 +175,8 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
         check_result_ending(found["output"], options.vtu)
     check_json(found.get("json"))
     if "picture" in found:
+        from kratos_lite.io.writers.pictures import check_picture
+
         check_picture(found["picture"])
     return found
 
@@ -183,7 +185,9 @@ def _write(result: Result, targets: dict[str, str], options: Namespace) -> None:
     """Write the files and say so."""
     for key, path in targets.items():
         if key == "picture":
-            result.plot(path)
+            from kratos_lite.io.writers.pictures import draw
+
+            draw(path, result)
         else:
             result.save(path, options.vtu if key == "output" else None)
         if not options.quiet:

@@ -15,8 +15,8 @@ from kratos_lite.cli.targets import check_targets
 from kratos_lite.errors import InputError
 from kratos_lite.io.scenes.describe import body_lines, line, vector
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene, read_scene
-from kratos_lite.io.writers.results import check_picture
-from kratos_lite.io.writers.trajectory import Series, make_folder, trajectory_picture
+from kratos_lite.io.writers.pictures import check_picture, draw_trajectory
+from kratos_lite.io.writers.series import SeriesWriter, make_folder
 
 SERIES = ("pvd", "csv", "npz")
 
@@ -32,7 +32,9 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
         # even after Ctrl-C: the series as far as they came, and the state from which to go on
         stack.callback(_save_state, last, scene.output.get("state"))
         series = [
-            stack.enter_context(Series(scene.output[key], body)) for key in SERIES if key in scene.output
+            stack.enter_context(SeriesWriter(scene.output[key], body))
+            for key in SERIES
+            if key in scene.output
         ]
         stack.enter_context(np.errstate(over="ignore", invalid="ignore"))
         states = scene.march(progress)
@@ -46,9 +48,7 @@ def march_scene(options: Namespace, progress: Callable[[str, float], None]) -> i
                 kept.append(last[0])
     seconds = perf_counter() - clock
     if "picture" in scene.output:
-        trajectory_picture(
-            scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " ")
-        )
+        draw_trajectory(scene.output["picture"], body, kept, title=Path(options.input).stem.replace("_", " "))
     if not options.quiet:
         print(
             "\n".join(
@@ -97,7 +97,7 @@ def _check_outputs(scene: BodyScene, output: dict[str, str], read: list[Path]) -
         if key == "picture":
             check_picture(path)
         if key in SERIES:
-            Series(path, scene.body)
+            SeriesWriter(path, scene.body)
 
 
 def _save_state(last: list[State], path: str | None) -> None:

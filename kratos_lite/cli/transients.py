@@ -18,8 +18,8 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.files import load
 from kratos_lite.io.project.march import NO_RESULT, SERIES, scheme_of
 from kratos_lite.io.scene import March, Scene
-from kratos_lite.io.writers.results import check_picture
-from kratos_lite.io.writers.trajectory import Series, make_folder
+from kratos_lite.io.writers.pictures import check_picture
+from kratos_lite.io.writers.series import SeriesWriter, make_folder
 from kratos_lite.typing import Progress
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def run_march(scene: Scene, targets: dict[str, str], options: Namespace, progres
             stack.callback(course.save, targets.get("state"))
             series = None
             if "output" in targets:
-                writer = Series(targets["output"], transient, mode=options.vtu or "binary")
+                writer = SeriesWriter(targets["output"], transient, mode=options.vtu or "binary")
                 series = stack.enter_context(writer)
                 series.add(start)
             for moment in moments:
@@ -154,11 +154,11 @@ def _written(targets: dict[str, str]) -> list[str]:
 
 
 def _draw(path: str, scene: Scene, moment: Moment) -> None:
-    from kratos_lite.view import picture
+    from kratos_lite.io.writers.pictures import draw
 
     length = np.linalg.norm(moment.u, axis=1)
     title = f"displacement at t = {moment.time:g} s"
-    picture(path, scene.model.mesh, moment.u, length, title=title, unit="m")
+    draw(path, scene.model.mesh, moment.u, length, title=title, unit="m")
 
 
 class _Course:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.grouping import element_class, element_groups_of
-from kratos_lite.assembly.stiffness import PatternCache
+from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements
@@ -31,7 +30,17 @@ class Attachment(ABC):
 
     @abstractmethod
     def attach(self, structure: Structure) -> None:
-        """Become part of a structure: check it, and set what it needs."""
+        """Become part of a structure: check it, and set what it needs.
+
+        Parameters
+        ----------
+        structure : that it is added to.
+
+        Raises
+        ------
+        ModelError
+            It does not fit the structure.
+        """
 
 
 class Structure:

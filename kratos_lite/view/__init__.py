@@ -1,15 +1,8 @@
-"""Pictures: bodies deformed and colored, in motion, and reference cells with node numbers."""
+"""Figures: bodies deformed and colored, in motion, and reference cells with node numbers."""
 
-from kratos_lite.view.canvas import check_picture_target
-from kratos_lite.view.cells import OBLIQUE, element_picture
-from kratos_lite.view.motion import motion_picture
-from kratos_lite.view.surface import ISOMETRIC, picture
+from kratos_lite.view.canvas import file_types
+from kratos_lite.view.cells import OBLIQUE, element_figure
+from kratos_lite.view.motion import motion_figure
+from kratos_lite.view.surface import ISOMETRIC, surface_figure
 
-__all__ = [
-    "ISOMETRIC",
-    "OBLIQUE",
-    "check_picture_target",
-    "element_picture",
-    "motion_picture",
-    "picture",
-]
+__all__ = ["ISOMETRIC", "OBLIQUE", "element_figure", "file_types", "motion_figure", "surface_figure"]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.io.output import write_whole
+from kratos_lite.errors import KratosLiteError
 from kratos_lite.typing import Array
 
 
@@ -52,21 +50,9 @@ def new_figure_with_curves(size: tuple[float, float]) -> tuple[Any, Any, Any]:
     return figure, _without_frame(upper), lower
 
 
-def check_picture_target(path: str | Path) -> str:
-    """Return the format of a picture; InputError for one that cannot be written."""
-    kind = Path(path).suffix[1:].lower() or "png"
-    known = _canvas().get_supported_filetypes()
-    if kind not in known:
-        raise InputError(
-            f"{path}: pictures cannot be written as .{kind}; known are {' '.join(sorted(known))}"
-        )
-    return kind
-
-
-def save_figure(path: str | Path, figure: Any) -> None:
-    """Write a figure, as a whole or not at all."""
-    kind = check_picture_target(path)
-    write_whole(path, lambda file: figure.savefig(file, format=kind, bbox_inches="tight", pad_inches=0.1))
+def file_types() -> list[str]:
+    """Return the endings of files that a figure can be saved as, without the dot."""
+    return sorted(_canvas().get_supported_filetypes())
 
 
 def colors_of(value: Array) -> tuple[Any, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,32 +10,26 @@ from numpy.typing import ArrayLike
 from kratos_lite.errors import InputError
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
-from kratos_lite.view.canvas import new_figure, save_figure
+from kratos_lite.view.canvas import new_figure
 
 OBLIQUE: Array = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
 """Rows: right, up and towards the viewer; no two corners of a cube fall on one another."""
 
 
-def element_picture(path: str | Path, shape: type[Shape], points: ArrayLike | None = None) -> None:
-    """Draw a reference cell with its node numbers (from 0), and Gauss points as crosses.
+def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:
+    """Return a figure of a reference cell with its node numbers (from 0), and Gauss points as crosses.
 
     Parameters
     ----------
-    path : picture to write; .png, .pdf or .svg.
     shape : the cell.
     points : (g, d) reference coordinates to mark.
 
     Raises
     ------
     InputError
-        `points` has the wrong shape, or the file cannot be written.
+        `points` has the wrong shape.
     KratosLiteError
         matplotlib is missing.
-
-    Examples
-    --------
-    >>> from kratos_lite.shapes import Wedge15
-    >>> element_picture(getfixture("tmp_path") / "wedge.png", Wedge15)
     """
     figure, axes = new_figure((5, 5))
     d = shape.nodes.shape[1]
@@ -64,7 +57,7 @@ def element_picture(path: str | Path, shape: type[Shape], points: ArrayLike | No
     _triad(axes, X, flat(np.eye(d)))
     axes.set_title(shape.__name__, fontsize=11)
     axes.autoscale_view()
-    save_figure(path, figure)
+    return figure
 
 
 def _triad(axes: Any, X: Array, directions: Array) -> None:

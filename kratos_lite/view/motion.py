@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,16 +10,15 @@ import numpy as np
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
-from kratos_lite.view.canvas import new_figure, new_figure_with_curves, save_figure
-from kratos_lite.view.surface import ISOMETRIC, PLAIN, draw, fineness, visible
+from kratos_lite.view.canvas import new_figure, new_figure_with_curves
+from kratos_lite.view.surface import ISOMETRIC, PLAIN, draw_facets, fineness, visible
 
 FADED = 0.25
 """Strength of the colors of the first position; the last has 1."""
 PATH = "#c8442b"
 
 
-def motion_picture(
-    path: str | Path,
+def motion_figure(
     mesh: Mesh,
     positions: Sequence[Array],
     centers: Array,
@@ -30,15 +28,14 @@ def motion_picture(
     title: str = "",
     unit: str = "J",
     size: tuple[float, float] = (8, 8),
-) -> None:
-    """Draw positions of a body in one isometric view, later ones stronger, and curves against time.
+) -> Any:
+    """Return a figure of positions of a body in isometric view, later ones stronger, and of curves.
 
     The first and the last position have their times beneath them; a triad of axes shows directions and scale.
-    One time alone has no curves.
+    The curves, against time, are beneath; one time alone has none.
 
     Parameters
     ----------
-    path : picture to write; .png, .pdf or .svg.
     mesh : the elements.
     positions : of the nodes, each (n, 3) in m, in the order of time.
     centers : (k, 3) m, path of the mass center.
@@ -51,7 +48,7 @@ def motion_picture(
     Raises
     ------
     InputError
-        There is nothing to draw, or the file cannot be written.
+        There is nothing to draw.
     KratosLiteError
         matplotlib is missing.
     """
@@ -70,7 +67,7 @@ def motion_picture(
     axes.set_title(title, fontsize=11)
     if below is not None:
         _draw_curves(below, times, curves, unit)
-    save_figure(path, figure)
+    return figure
 
 
 def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array], unit: str) -> None:
@@ -116,4 +113,4 @@ def _body(axes: Any, mesh: Mesh, x: Array, strength: float, n: int, edged: bool)
     colors = np.ones((len(P), 4))
     colors[:, :3] -= strength * (1 - np.array(PLAIN) * light[:, None])
     ink = np.array([0.1, 0.1, 0.15, 0.55 * strength])
-    draw(axes, P, colors, E if edged else E[:0], ink)
+    draw_facets(axes, P, colors, E if edged else E[:0], ink)

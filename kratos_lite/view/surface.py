@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
-from kratos_lite.view.canvas import color_bar, colors_of, lines, new_figure, polygons, save_figure
+from kratos_lite.view.canvas import color_bar, colors_of, lines, new_figure, polygons
 
 ISOMETRIC: Array = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
 """Rows: right, up and towards the viewer."""
@@ -32,8 +31,7 @@ MANY = 20000
 """Faces from which their edges are no longer drawn, and facets to aim at."""
 
 
-def picture(
-    path: str | Path,
+def surface_figure(
     mesh: Mesh,
     displacement: ArrayLike | None = None,
     values: ArrayLike | None = None,
@@ -42,12 +40,11 @@ def picture(
     unit: str | None = None,
     scale: float | None = None,
     size: tuple[float, float] = (8, 6),
-) -> None:
-    """Draw the surface of a body, deformed and colored, in isometric view.
+) -> Any:
+    """Return a figure of the surface of a body, deformed and colored, in isometric view.
 
     Parameters
     ----------
-    path : picture to write; .png, .pdf or .svg.
     mesh : points in m and element blocks.
     displacement : (n, 3) m; the undeformed edges are drawn thin.
     values : (n,) numbers on the nodes that color the surface.
@@ -59,16 +56,9 @@ def picture(
     Raises
     ------
     InputError
-        The mesh has no surface, an array has the wrong shape or gaps, or the file cannot be written.
+        The mesh has no surface, an array has the wrong shape or gaps.
     KratosLiteError
         matplotlib is missing.
-
-    Examples
-    --------
-    >>> from kratos_lite.shapes import Hexahedron8
-    >>> cube = Block("cube", np.arange(8)[None], np.array([1]), np.array([1]), Hexahedron8)
-    >>> mesh = Mesh(Hexahedron8.nodes, [cube])
-    >>> picture(getfixture("tmp_path") / "cube.png", mesh, values=mesh.points[:, 0], title="x", unit="m")
     """
     figure, axes = new_figure(size)
     if not mesh.boundary:
@@ -88,7 +78,7 @@ def picture(
             unit = next((unit for word, unit in UNITS.items() if word in title.upper()), "")
         color_bar(figure, axes, colors, unit)
     axes.set_title(title, fontsize=11)
-    save_figure(path, figure)
+    return figure
 
 
 def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -155,7 +145,7 @@ def _paint(axes: Any, boundary: list[Block], X: Array, field: Array | None) -> A
     P, light, value, E = (np.concatenate(arrays) for arrays in zip(*drawn, strict=True))
     shown, colors = (None, np.tile([*PLAIN, 1], (len(P), 1))) if field is None else colors_of(value)
     colors[:, :3] *= light[:, None]
-    draw(axes, P, colors, E if edged else E[:0])
+    draw_facets(axes, P, colors, E if edged else E[:0])
     return shown
 
 
@@ -164,7 +154,9 @@ def fineness(count: int) -> tuple[int, bool]:
     return int(np.clip(np.sqrt(MANY / max(count, 1)), 1, 16)), count < MANY
 
 
-def draw(axes: Any, P: Array, colors: Array, E: Array, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)) -> None:
+def draw_facets(
+    axes: Any, P: Array, colors: Array, E: Array, ink: ArrayLike = (0.1, 0.1, 0.15, 0.55)
+) -> None:
     """Draw facets (m, 4, 3) in colors (m, 4) and edges (k, 2, 3) in ink from back to front."""
     E = E[:, [0, 1, 1, 0]]
     near = P @ ISOMETRIC[2]

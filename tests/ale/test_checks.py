@@ -179,9 +179,7 @@ def test_a_window_must_be_alike_along_its_way(wheels):
     series.fix("x-", "x")
     series.assign(kl.Isotropic3D(21e6, 0.3, 7620.0), np.arange(4))
     series.add(Translation("x", rate=5.0))
-    with pytest.raises(
-        ModelError, match="the stiffness of the body is not spread evenly along the"
-    ):
+    with pytest.raises(ModelError, match="the stiffness of the body is not spread evenly along the"):
         series.solve()
     layered = kl.Model(kl.box((10, 1, 1), (10, 1, 2)), wheels.steel)
     layered.fix("z-")

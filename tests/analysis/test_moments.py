@@ -29,7 +29,7 @@ def test_frames_table_and_arrays_hold_each_moment(tmp_path):
     meshio = pytest.importorskip("meshio")
     model = shaken_bar()
     transient = model.transient()
-    endings = [kl.Series(tmp_path / f"swing{ending}", transient) for ending in (".pvd", ".csv", ".npz")]
+    endings = [kl.SeriesWriter(tmp_path / f"swing{ending}", transient) for ending in (".pvd", ".csv", ".npz")]
     moments = [transient.moment()]
     for series in endings:
         series.add()
@@ -92,7 +92,7 @@ def test_a_moment_is_drawn_deformed(tmp_path):
     pytest.importorskip("matplotlib")
     transient = shaken_bar().transient()
     *_, moment = transient.march(dt=0.02, steps=5)
-    kl.picture(tmp_path / "bar.png", transient.equations.model.mesh, moment.u, moment.u[:, 0])
+    kl.draw(tmp_path / "bar.png", transient.equations.model.mesh, moment.u, moment.u[:, 0])
     assert (tmp_path / "bar.png").stat().st_size > 10_000
 
 

@@ -716,7 +716,7 @@ def test_a_reader_that_goes_away_is_no_error(folder):
 
 ACCEPTED = {
     "00_good.mdpa": "",
-    "06_duplicate_node_id_same_coords.mdpa": "line 19: node 8 stands at line 18 already, the same",
+    "06_duplicate_node_id_same_coords.mdpa": "line 19: node 8 is already defined at line 18, the same",
     "17_fortran_exponent.mdpa": "",
     "31_crlf.mdpa": "",
     "32_tabs.mdpa": "",
@@ -737,7 +737,7 @@ REFUSED = {
     "01_truncated_in_nodes.mdpa": ":15:7: the file ends inside 'Begin Nodes' of line 10",
     "02_missing_end_nodes.mdpa": ":20:1: 'Begin Elements' inside 'Begin Nodes' of line 10",
     "03_end_mismatch.mdpa": ":19:1: 'End Elements' closes 'Begin Nodes' of line 10",
-    "05_duplicate_node_id.mdpa": ":18: node 7 stands at line 17 already",
+    "05_duplicate_node_id.mdpa": ":18: node 7 is already defined at line 17",
     "07_missing_node_ref.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): there is no node 99",
     "08_nan_coord.mdpa": ":18:8: node 8: 'nan' is not a number",
     "09_inf_coord.mdpa": ":18:8: node 8: '1e999' is too large",
@@ -746,11 +746,11 @@ REFUSED = {
     "15_E_text.mdpa": ":6:16: YOUNG_MODULUS: 'steel' is not a number",
     "16_decimal_comma.mdpa": ":12:4: node 2: '1,0' is not a number; decimal comma? write 1.0",
     "18_missing_property.mdpa": ":22: element 1 uses Properties 7",
-    "19_property_redefined.mdpa": ":10:1: Properties 1 stands at line 4 already",
-    "21_duplicate_element_id.mdpa": ":23: element 1 stands at line 22 already",
+    "19_property_redefined.mdpa": ":10:1: Properties 1 is already defined at line 4",
+    "21_duplicate_element_id.mdpa": ":23: element 1 is already defined at line 22",
     "22_repeated_node_in_element.mdpa": ":22: element 1 (SmallDisplacementElement3D8N) names node 7 twice",
     "24_submodelpart_missing_node.mdpa": ":30: SubModelPart Bottom lists node 44",
-    "25_submodelpart_duplicate_name.mdpa": ":33:1: SubModelPart Bottom stands at line 25 already",
+    "25_submodelpart_duplicate_name.mdpa": ":33:1: SubModelPart Bottom is already defined at line 25",
     "26_submodelpart_deep.mdpa": ":97:1: blocks are nested more than 64 deep",
     "27_negative_id.mdpa": ":18:2: '-8' is not an id; ids are 1 … 2^63-1",
     "28_zero_id.mdpa": ":11:2: '0' is not an id",
@@ -797,7 +797,7 @@ DESCRIBED = {
 
 
 @pytest.fixture
-def bad(shared, tmp_path, monkeypatch):
+def bad(malformed, tmp_path, monkeypatch):
     """Return the folder of bad files; a command on one of them that takes 5 s is an error."""
 
     def late(*_):
@@ -806,13 +806,13 @@ def bad(shared, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     old = signal.signal(signal.SIGALRM, late)
     signal.setitimer(signal.ITIMER_REAL, 5)
-    yield shared / "bad"
+    yield malformed
     signal.setitimer(signal.ITIMER_REAL, 0)
     signal.signal(signal.SIGALRM, old)
 
 
-def test_every_bad_file_is_in_a_table(shared):
-    names = {path.name for path in (shared / "bad").iterdir() if path.is_file()}
+def test_every_bad_file_is_in_a_table(malformed):
+    names = {path.name for path in malformed.iterdir() if path.is_file()}
     assert names == ACCEPTED.keys() | REFUSED.keys() | DESCRIBED.keys()
 
 

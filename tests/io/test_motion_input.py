@@ -164,7 +164,7 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
         (("--boundaries", "fixed"), "--boundaries belongs to --translation"),
         (("--rotation", "x:1"), "not one of revolution about the axis"),
         (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
-        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number in 1/s, ≥ 0; got -2.0"),
+        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number ≥ 0, in 1/s; got -2.0"),
         (("--damping", "2"), "--damping belongs to --rotation or --translation"),
         (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
     ],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.errors import InputError
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.atomic import write_whole
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import threads
 

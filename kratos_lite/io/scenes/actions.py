@@ -36,9 +36,9 @@ LOADS = {
 CONSTRAINTS = {
     "fix_point": Kind(bodies.FixPoint, ("points",)),
     "fix_direction": Kind(bodies.FixDirection, ("points", "direction")),
-    "set_displacement": Kind(bodies.SetDisplacement, ("points", "direction", "displacement")),
-    "set_velocity": Kind(bodies.SetVelocity, ("points", "direction", "velocity")),
-    "set_acceleration": Kind(bodies.SetAcceleration, ("points", "direction", "acceleration")),
+    "prescribed_displacement": Kind(bodies.PrescribedDisplacement, ("points", "direction", "displacement")),
+    "prescribed_velocity": Kind(bodies.PrescribedVelocity, ("points", "direction", "velocity")),
+    "prescribed_acceleration": Kind(bodies.PrescribedAcceleration, ("points", "direction", "acceleration")),
     "rigid_link": Kind(bodies.RigidLink, ("point", "anchor")),
 }
 OF_LOADS: dict[str, Read] = {
@@ -56,9 +56,9 @@ OF_CONSTRAINTS: dict[str, Read] = {
 
 def add_load(body: Body, section: Settings) -> None:
     """Let the load of an object act on a body."""
-    load = _build(section, body, LOADS, OF_LOADS, ("factor",))
-    factor = function(section, "factor", body.mesh) if "factor" in section else 1.0
-    placed(section, "type", body.add, load, factor)
+    load = _build(section, body, LOADS, OF_LOADS, ("amplitude",))
+    amplitude = function(section, "amplitude", body.mesh) if "amplitude" in section else 1.0
+    placed(section, "type", body.add, load, amplitude)
 
 
 def add_constraint(body: Body, section: Settings) -> None:

@@ -48,7 +48,7 @@ MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str],
 }
 """Meshes that are made, by name: function, and how its arguments are read."""
 OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
-    "form": Settings.text,
+    "formulation": Settings.text,
     "modes": Settings.integer,
     "lumped": Settings.flag,
     "scheme": Settings.text,
@@ -229,7 +229,7 @@ def _start(settings: Settings, body: Body) -> None:
     start = settings.section("start")
     start.check_keys(("rotation", "velocity", "angular_velocity"))
     if "rotation" in start:
-        placed(start, "rotation", body.turn, exp(np.array(start.vector("rotation"))))
+        placed(start, "rotation", body.rotate, exp(np.array(start.vector("rotation"))))
     keys = {"linear": "velocity", "angular": "angular_velocity"}
     given = {name: start.vector(key) for name, key in keys.items() if key in start}
     if given:

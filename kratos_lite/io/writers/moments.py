@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.io.atomic import write_arrays, write_whole
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
-from kratos_lite.io.output import write_arrays, write_whole
 from kratos_lite.io.writers.results import fields
 from kratos_lite.typing import Array
 

@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.vtk`, `.json` and pictures."""
+"""Results to files: `.vtu` for ParaView, `.vtk`, and `.json`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.errors import InputError, SolveError
-from kratos_lite.io.output import write_whole
+from kratos_lite.io.atomic import write_whole
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 RESULT_ENDINGS = (".vtu", ".vtk", ".json")
 """Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
-NAMES = {"VON_MISES_STRESS": "von Mises stress"}
-"""Titles of pictures where the words of the variable do not do."""
 
 
 def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -81,13 +79,6 @@ def check_result_ending(path: str | Path, mode: str | None = None) -> None:
             )
 
 
-def check_picture(path: str | Path) -> None:
-    """Raise KratosLiteError, before any work is done, if a picture of this name cannot be made."""
-    from kratos_lite.view import check_picture_target
-
-    check_picture_target(Path(path))
-
-
 def summary(result: Result) -> dict[str, Any]:
     """Return the numbers of the table, for programs."""
     report, mesh = result.report, result.mesh
@@ -142,19 +133,3 @@ def write_json(path: str | Path, result: Result) -> None:
             "look for loads, supports or constants in wrong units"
         ) from None
     write_whole(path, text.encode())
-
-
-def plot_result(path: str | Path, result: Result, values: str = "VON_MISES_STRESS") -> None:
-    """Write a picture of the deformed body colored by a nodal field of `fields`."""
-    from kratos_lite.view import picture
-
-    points, _ = fields(result)
-    if values not in points:
-        raise InputError(f"there is no nodal field {values!r}; have {', '.join(points)}")
-    field = points[values]
-    if values == "CAUCHY_STRESS_VECTOR":
-        field, values = voigt.von_mises(field), "VON_MISES_STRESS"
-    elif field.ndim == 2:
-        field = np.linalg.norm(field, axis=1)
-    title = NAMES.get(values, values.replace("_", " ").lower())
-    picture(path, result.mesh, result.u, field, title=title)

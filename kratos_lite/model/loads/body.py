@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly import fields
+from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
@@ -43,7 +43,7 @@ class BodyForce(Load):
         for group in groups:
             b, part = self.per_volume(group), group.take(chosen[group.rows])
             if b.any() and len(part):
-                total += fields.body_force(mesh.points, part, b)
+                total += gauss_point_fields.body_force(mesh.points, part, b)
         return total
 
 

@@ -13,7 +13,7 @@ REFUSED = {
     "01_truncated_in_nodes": r":15:7: the file ends inside 'Begin Nodes' of line 10; 'End Nodes' is missing",
     "02_missing_end_nodes": r":20:1: 'Begin Elements' inside 'Begin Nodes' of line 10",
     "03_end_mismatch": r":19:1: 'End Elements' closes 'Begin Nodes' of line 10",
-    "05_duplicate_node_id": r":18: node 7 stands at line 17 already",
+    "05_duplicate_node_id": r":18: node 7 is already defined at line 17",
     "07_missing_node_ref": r":22: element 1 .*: there is no node 99",
     "08_nan_coord": r":18:8: node 8: 'nan' is not a number",
     "09_inf_coord": r":18:8: node 8: '1e999' is too large",
@@ -22,11 +22,11 @@ REFUSED = {
     "15_E_text": r":6:16: YOUNG_MODULUS: 'steel' is not a number",
     "16_decimal_comma": r":12:4: node 2: '1,0' is not a number; decimal comma\? write 1.0",
     "18_missing_property": r":22: element 1 uses Properties 7",
-    "19_property_redefined": r":10:1: Properties 1 stands at line 4 already",
-    "21_duplicate_element_id": r":23: element 1 stands at line 22 already",
+    "19_property_redefined": r":10:1: Properties 1 is already defined at line 4",
+    "21_duplicate_element_id": r":23: element 1 is already defined at line 22",
     "22_repeated_node_in_element": r":22: element 1 .* names node 7 twice",
     "24_submodelpart_missing_node": r":30: SubModelPart Bottom lists node 44",
-    "25_submodelpart_duplicate_name": r":33:1: SubModelPart Bottom stands at line 25 already",
+    "25_submodelpart_duplicate_name": r":33:1: SubModelPart Bottom is already defined at line 25",
     "26_submodelpart_deep": r"blocks are nested more than 64 deep",
     "27_negative_id": r":18:2: '-8' is not an id; ids are 1 … 2\^63-1",
     "28_zero_id": r":11:2: '0' is not an id",
@@ -47,7 +47,7 @@ REFUSED = {
 }
 ACCEPTED = {
     "00_good": [], "04_unknown_element": [], "12_negative_density": [], "13_nu_half": [], "14_E_zero": [],
-    "06_duplicate_node_id_same_coords": ["node 8 stands at line 18 already, the same"],
+    "06_duplicate_node_id_same_coords": ["node 8 is already defined at line 18, the same"],
     "20_unknown_variable": ["unknown variable YOUNGS_MODULUS is kept"],
     "17_fortran_exponent": [], "23_inverted": [],
     "31_crlf": [], "32_tabs": [], "33_bom": [], "34_non_utf8": [], "38_comment_everywhere": [],
@@ -117,34 +117,34 @@ def outcome(path, data, **options):
 
 
 @pytest.mark.parametrize(("name", "message"), REFUSED.items())
-def test_malformed_file_is_refused_with_place_and_reason(shared, name, message):
+def test_malformed_file_is_refused_with_place_and_reason(malformed, name, message):
     with pytest.raises(InputError) as raised:
-        read_mdpa(shared / "bad" / f"{name}.mdpa")
+        read_mdpa(malformed / f"{name}.mdpa")
     assert re.search(message, str(raised.value))
     assert len(str(raised.value).splitlines()) == 1
-    assert str(raised.value).startswith(f"{shared / 'bad' / name}.mdpa:")
+    assert str(raised.value).startswith(f"{malformed / name}.mdpa:")
 
 
 @pytest.mark.parametrize(("name", "notes"), ACCEPTED.items())
-def test_odd_file_is_accepted_with_its_notes(shared, name, notes):
-    document = read_mdpa(shared / "bad" / f"{name}.mdpa")
+def test_odd_file_is_accepted_with_its_notes(malformed, name, notes):
+    document = read_mdpa(malformed / f"{name}.mdpa")
     assert [n.text[: len(text)] for n, text in zip(document.notes, notes, strict=True)] == notes
     more = name in ("47_unreferenced_node", "48_coincident_nodes")
     assert (document.mesh.n_nodes, document.mesh.n_elements) == (8 + more, 1)
 
 
-def test_every_malformed_file_has_its_expectation(shared):
-    names = {path.stem for path in (shared / "bad").glob("*.mdpa")}
+def test_every_malformed_file_has_its_expectation(malformed):
+    names = {path.stem for path in malformed.glob("*.mdpa")}
     assert names == REFUSED.keys() | ACCEPTED.keys()
 
 
-def test_two_nodes_on_a_line_are_read_without_strict(shared):
-    document = read_mdpa(shared / "bad" / "40_two_values_on_line.mdpa", strict=False)
+def test_two_nodes_on_a_line_are_read_without_strict(malformed):
+    document = read_mdpa(malformed / "40_two_values_on_line.mdpa", strict=False)
     assert document.mesh.n_nodes == 8
 
 
-def test_unknown_element_is_kept_for_the_next_stage(shared):
-    (block,) = read_mdpa(shared / "bad" / "04_unknown_element.mdpa").mesh.blocks
+def test_unknown_element_is_kept_for_the_next_stage(malformed):
+    (block,) = read_mdpa(malformed / "04_unknown_element.mdpa").mesh.blocks
     assert (block.name, block.shape, block.nodes.shape) == ("SmallDisplacementElement3D9N", None, (1, 8))
 
 

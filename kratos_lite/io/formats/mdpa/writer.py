@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
+from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.document import Constraint, Data, Document, Note
 from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
 from kratos_lite.io.names import kratos_name
-from kratos_lite.io.output import write_whole
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part
 from kratos_lite.typing import Ints
 

@@ -1,9 +1,7 @@
-"""Trajectories: the states of a body or a model in time as files for ParaView, as tables and as pictures."""
+"""Trajectories: the states of a body or a model in time as files for ParaView, as tables and arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import product
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -31,12 +29,6 @@ COLUMNS = (
     *(f"angular momentum {axis} [kg m2/s]" for axis in "xyz"),
 )
 """Columns of a table: energy is the sum of the three before it, angular momentum about the mass center."""
-SHOWN = 6
-"""Positions in a picture."""
-CANDIDATES = 400
-"""States, evenly spread, among which they are chosen."""
-ALIKE = 0.02
-"""Share of its size that a body moves between positions that are worth drawing."""
 
 
 def row_of(body: Body, state: State) -> Array:
@@ -57,7 +49,7 @@ class _BodyFrames(Frames):
 
     def __init__(self, path: Path, owner: Body, mode: str) -> None:
         super().__init__(path, owner, mode)
-        _check_single(owner, path)
+        check_single(owner, path)
         if owner.mesh is None:
             raise ModelError(f"{path}: this body has no mesh to be shown; write .csv or .npz")
 
@@ -77,7 +69,7 @@ class _BodyTable(Table):
 
     def __init__(self, path: Path, owner: Body, mode: str) -> None:
         super().__init__(path, owner, mode)
-        _check_single(owner, path)
+        check_single(owner, path)
 
     def add(self, state: State) -> None:
         self.rows.append(row_of(self.owner, state))
@@ -93,12 +85,13 @@ class _BodyArrays(Arrays):
         return {"kind": np.array(self.owner.kind)}
 
 
-def _check_single(body: Body, path: Path) -> None:
+def check_single(body: Body, path: Path) -> None:
+    """Raise ModelError for bodies that hold many."""
     if body.q.ndim > 1:
         raise ModelError(f"{path}: only a single body can be written so; for many bodies write .npz")
 
 
-class Series:
+class SeriesWriter:
     """The states of a march as files; what they are is said by the ending of the path.
 
     - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
@@ -130,7 +123,7 @@ class Series:
     >>> import kratos_lite as kl
     >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     >>> folder = getfixture("tmp_path")
-    >>> with Series(folder / "spin.pvd", body) as series:
+    >>> with SeriesWriter(folder / "spin.pvd", body) as series:
     ...     series.add()
     ...     for state in kl.march(body, dt=0.01, steps=20, every=10):
     ...         series.add(state)
@@ -152,7 +145,12 @@ class Series:
         self._writer = kinds[Path(path).suffix.lower()](Path(path), owner, mode)
 
     def add(self, state: State | Moment | None = None) -> None:
-        """Take a state or moment, or body or transient as it is if none is given."""
+        """Take one more state.
+
+        Parameters
+        ----------
+        state : of the owner; as it is now if none is given.
+        """
         if not self.count:
             make_folder(self._writer.path)
         if state is None:
@@ -165,7 +163,7 @@ class Series:
         if self.count:
             self._writer.write()
 
-    def __enter__(self) -> Series:
+    def __enter__(self) -> SeriesWriter:
         return self
 
     def __exit__(
@@ -184,90 +182,5 @@ def make_folder(path: Path) -> None:
 
 def check_ending(path: str | Path) -> None:
     """Raise InputError for a path whose ending is none of a series."""
-    if Path(path).suffix.lower() not in Series.kinds:
-        raise InputError(f"{path}: a series of states is written as {', '.join(Series.kinds)}")
-
-
-def trajectory_picture(
-    path: str | Path,
-    body: Body,
-    states: Iterable[State],
-    *,
-    shown: int = SHOWN,
-    title: str = "",
-    size: tuple[float, float] = (8, 8),
-) -> None:
-    """Draw a body along its path, and its energies against time beneath if there is more than one state.
-
-    Parameters
-    ----------
-    path : picture to write; .png, .pdf or .svg.
-    body : a single body with a mesh.
-    states : in the order of time.
-    shown : how many positions are drawn at most: the first, the last, and those that differ most from each
-        other, such as turning points; the later the stronger.
-    title : above the picture.
-    size : largest width and height in inches, at 150 dots per inch.
-
-    Raises
-    ------
-    InputError
-        There are no states, or the file cannot be written.
-    ModelError
-        The body has no mesh, or is many bodies.
-    KratosLiteError
-        matplotlib is missing.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> body = kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
-    >>> body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
-    >>> trajectory_picture(getfixture("tmp_path") / "spin.png", body, kl.march(body, 0.01, 100, every=10))
-    """
-    from kratos_lite.view import motion_picture
-
-    _check_single(body, Path(path))
-    if body.mesh is None:
-        raise ModelError(f"{path}: this body has no mesh to be drawn")
-    rows, kept = [], []
-    for state in states:
-        rows.append(row_of(body, state))
-        kept.append(state.q)
-    if not kept:
-        raise InputError(f"{path}: there is no state to draw")
-    table = np.array(rows)
-    positions = [body.position(body.mesh.points, kept[i]) for i in _telling(body, kept, shown)]
-    names = ("kinetic", "internal", "potential", "sum")
-    curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
-    motion_picture(
-        path,
-        body.mesh,
-        positions,
-        table[:, 6:9],
-        table[:, 0],
-        curves,
-        title=title,
-        unit="energy in J",
-        size=size,
-    )
-
-
-def _telling(body: Body, kept: list[Array], shown: int) -> list[int]:
-    """Return the states to draw: first and last, then again and again the one farthest from those chosen."""
-    assert body.mesh is not None
-    X = body.mesh.points
-    corners = np.unique([np.argmax(X @ side) for side in product((-1, 1), repeat=3)])
-    rows = np.unique(np.linspace(0, len(kept) - 1, CANDIDATES).round().astype(int))
-    places = np.array([body.position(X, kept[row])[corners] for row in rows])
-
-    def away(i: int) -> Array:
-        return np.asarray(((places - places[i]) ** 2).sum(axis=(1, 2)))
-
-    chosen = [len(rows) - 1, 0][: max(shown, 1)]
-    distance = np.min([away(i) for i in chosen], axis=0)
-    alike = (ALIKE * np.ptp(X, axis=0).max()) ** 2 * len(corners)
-    while len(chosen) < shown and distance.max() > alike:
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, away(chosen[-1]))
-    return sorted({int(rows[i]) for i in chosen})
+    if Path(path).suffix.lower() not in SeriesWriter.kinds:
+        raise InputError(f"{path}: a series of states is written as {', '.join(SeriesWriter.kinds)}")

@@ -8,7 +8,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.state import at
-from kratos_lite.io.writers.trajectory import COLUMNS
+from kratos_lite.io.writers.series import COLUMNS
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
@@ -26,7 +26,7 @@ def thrown(kind):
 def test_frames_hold_the_motion_of_the_nodes(tmp_path, kind):
     meshio = pytest.importorskip("meshio")
     body = thrown(kind)
-    with kl.Series(tmp_path / "fly.pvd", body) as series:
+    with kl.SeriesWriter(tmp_path / "fly.pvd", body) as series:
         series.add()
         for state in kl.march(body, 0.01, 10, every=5):
             series.add(state)
@@ -46,7 +46,10 @@ def test_frames_hold_the_motion_of_the_nodes(tmp_path, kind):
 @kinds
 def test_table_and_arrays_hold_each_state(tmp_path, kind):
     body = thrown(kind)
-    with kl.Series(tmp_path / "a.csv", body) as table, kl.Series(tmp_path / "a.npz", body) as arrays:
+    with (
+        kl.SeriesWriter(tmp_path / "a.csv", body) as table,
+        kl.SeriesWriter(tmp_path / "a.npz", body) as arrays,
+    ):
         states = list(kl.march(body, 0.01, 20, every=10))
         for state in states:  # the body is at the end already: each state is looked at as itself
             table.add(state)
@@ -74,7 +77,7 @@ def test_an_error_leaves_what_there_is(tmp_path, name):
     body = thrown(kl.RigidBody)
 
     def stopped():
-        with kl.Series(tmp_path / name, body) as series:
+        with kl.SeriesWriter(tmp_path / name, body) as series:
             for state in kl.march(body, 0.01, 100):
                 series.add(state)
                 if state.step == 3:
@@ -92,56 +95,56 @@ def test_an_error_leaves_what_there_is(tmp_path, name):
 
 def test_a_missing_folder_is_made_with_the_first_state(tmp_path):
     for name in ("a.pvd", "a.csv", "a.npz"):
-        with kl.Series(tmp_path / "new" / name[2:] / name, thrown(kl.RigidBody)) as series:
+        with kl.SeriesWriter(tmp_path / "new" / name[2:] / name, thrown(kl.RigidBody)) as series:
             assert not (tmp_path / "new" / name[2:]).exists()
             series.add()
         assert (tmp_path / "new" / name[2:] / name).is_file()
     (tmp_path / "taken").write_text("")
     with pytest.raises(kl.InputError, match=r"a\.csv: its folder cannot be made"):
-        kl.Series(tmp_path / "taken" / "a.csv", thrown(kl.RigidBody)).add()
+        kl.SeriesWriter(tmp_path / "taken" / "a.csv", thrown(kl.RigidBody)).add()
 
 
 def test_a_series_is_of_one_body(tmp_path):
     body = thrown(kl.RigidBody)
     with pytest.raises(kl.InputError, match=r"a\.pvd: a series holds the states of one body.*got list"):
-        kl.Series(tmp_path / "a.pvd", [body, body])
+        kl.SeriesWriter(tmp_path / "a.pvd", [body, body])
 
 
 def test_no_state_no_file(tmp_path):
-    with kl.Series(tmp_path / "a.csv", thrown(kl.RigidBody)) as series:
+    with kl.SeriesWriter(tmp_path / "a.csv", thrown(kl.RigidBody)) as series:
         assert series.count == 0
     assert list(tmp_path.iterdir()) == []
 
 
 def test_many_bodies_are_written_as_arrays_only(tmp_path):
     many = kl.RigidBody(mass_properties=kl.MassProperties.box([(1, 1, 1), (1, 2, 3)], density=1.0))
-    with kl.Series(tmp_path / "a.npz", many) as series:
+    with kl.SeriesWriter(tmp_path / "a.npz", many) as series:
         for state in kl.march(many, 0.1, 3):
             series.add(state)
     assert np.load(tmp_path / "a.npz")["q"].shape == (3, 2, 12)
     for name in ("a.csv", "a.pvd"):
         with pytest.raises(kl.ModelError, match=r"only a single body can be written so; .* write \.npz"):
-            kl.Series(tmp_path / name, many)
+            kl.SeriesWriter(tmp_path / name, many)
 
 
 def test_bad_targets_are_refused_at_once(tmp_path):
     body = thrown(kl.RigidBody)
     with pytest.raises(kl.InputError, match=r"a\.txt: a series of states is written as \.pvd, \.csv, \.npz"):
-        kl.Series(tmp_path / "a.txt", body)
+        kl.SeriesWriter(tmp_path / "a.txt", body)
     with pytest.raises(kl.InputError, match="is written as binary, compressed, ascii; got 'zip'"):
-        kl.Series(tmp_path / "a.pvd", body, mode="zip")
+        kl.SeriesWriter(tmp_path / "a.pvd", body, mode="zip")
     top = kl.RigidBody(mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])))
     with pytest.raises(kl.ModelError, match="has no mesh to be shown"):
-        kl.Series(tmp_path / "a.pvd", top)
+        kl.SeriesWriter(tmp_path / "a.pvd", top)
     with pytest.raises(kl.ModelError, match="has no mesh to be drawn"):
-        kl.trajectory_picture(tmp_path / "a.png", top, [kl.State.of(top)])
+        kl.draw_trajectory(tmp_path / "a.png", top, [kl.State.of(top)])
 
 
 @kinds
 def test_a_picture_shows_path_and_energies(tmp_path, kind):
     pytest.importorskip("matplotlib")
     body = thrown(kind)
-    kl.trajectory_picture(tmp_path / "a.svg", body, kl.march(body, 0.01, 20, every=2), title="a throw")
+    kl.draw_trajectory(tmp_path / "a.svg", body, kl.march(body, 0.01, 20, every=2), title="a throw")
     words = words_of(tmp_path / "a.svg")
     assert {"a throw", "kinetic", "potential", "sum", "time in s", "energy in J"} <= set(words)
     assert ("internal" in words) == (kind is not kl.RigidBody)
@@ -155,7 +158,7 @@ def words_of(path):
 def test_a_picture_of_one_state_has_no_curves(tmp_path):
     pytest.importorskip("matplotlib")
     body = thrown(kl.RigidBody)
-    kl.trajectory_picture(tmp_path / "a.svg", body, [kl.State.of(body)], title="at rest")
+    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body)], title="at rest")
     words = words_of(tmp_path / "a.svg")
     assert {"at rest", "0 s", "0.2 m", "x", "y", "z"} <= set(words)
     assert not {"time in s", "sum"} & set(words)
@@ -164,20 +167,20 @@ def test_a_picture_of_one_state_has_no_curves(tmp_path):
 def test_a_picture_says_when_a_body_starts_and_ends(tmp_path):
     pytest.importorskip("matplotlib")
     body = thrown(kl.RigidBody)
-    kl.trajectory_picture(tmp_path / "a.svg", body, [kl.State.of(body), *kl.march(body, 0.01, 20)])
+    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body), *kl.march(body, 0.01, 20)])
     assert {"0 s", "0.2 s"} <= set(words_of(tmp_path / "a.svg"))
     body = kl.RigidBody(kl.box(), RUBBER)
     body.set_velocity(angular=(0, 0, 2 * np.pi))
     states = [kl.State.of(body), *kl.march(body, 0.01, 100)]  # once around
-    kl.trajectory_picture(tmp_path / "b.svg", body, states)
+    kl.draw_trajectory(tmp_path / "b.svg", body, states)
     assert "0 s and 1 s" in words_of(tmp_path / "b.svg")
 
 
 def test_turning_points_are_among_the_positions_drawn():
-    from kratos_lite.io.writers.trajectory import _telling
+    from kratos_lite.io.writers.pictures import _telling
 
     body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
-    body.constrain(kl.SetDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
+    body.constrain(kl.PrescribedDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
     q = [kl.State.of(body).q, *(state.q for state in kl.march(body, 0.01, 100))]
     assert _telling(body, q, 4) == [0, 25, 75, 100]
     assert _telling(body, q[:1], 6) == [0]
@@ -187,21 +190,21 @@ def test_turning_points_are_among_the_positions_drawn():
 
 def test_a_picture_without_states_is_refused(tmp_path):
     with pytest.raises(kl.InputError, match=r"a\.png: there is no state to draw"):
-        kl.trajectory_picture(tmp_path / "a.png", thrown(kl.RigidBody), [])
+        kl.draw_trajectory(tmp_path / "a.png", thrown(kl.RigidBody), [])
     assert list(tmp_path.iterdir()) == []
 
 
 @kinds
 def test_a_body_is_turned_about_its_mass_center(kind):
     body = kind(kl.box((0.4, 0.6, 1.0), cells=(1, 2, 2)), RUBBER)
-    body.turn(exp(np.array([0.0, 0.0, np.pi / 2])))
+    body.rotate(exp(np.array([0.0, 0.0, np.pi / 2])))
     X = body.mesh.points
     A = X - body.center
     turned = body.center + np.stack([-A[:, 1], A[:, 0], A[:, 2]], axis=1)
     np.testing.assert_allclose(body.position(X), turned, atol=1e-15)
     assert abs(body.internal_energy()) < 1e-9
     with pytest.raises(kl.InputError, match="must be orthogonal"):
-        body.turn(2 * np.eye(3))
+        body.rotate(2 * np.eye(3))
 
 
 def test_a_body_comes_back_from_a_state():
