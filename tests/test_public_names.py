@@ -77,7 +77,6 @@ INCOMPLETE = {
     "Mesh.place",
     "Mesh.reoriented",
     "Mesh.used_nodes",
-    "Model",
     "Model.add",
     "Model.add_prestress",
     "Model.assign",
