@@ -182,8 +182,8 @@ def _check(path: Path, found: Any) -> None:
         if cells.type in CELLS and len(cells.data):
             low, high = int(cells.data.min()) + 1, int(cells.data.max()) + 1
             if low < 1 or high > len(points):
-                text = f"a {cells.type} names point {high if low >= 1 else low} of 1 … {len(points)}"
-                raise InputError(f"{path}: {text}; is the file complete?")
+                text = f"a {cells.type} names point {high if low >= 1 else low}; the points are 1 … "
+                raise InputError(f"{path}: {text}{len(points)}; is the file complete?")
 
 
 def _ids(given: list[Any], count: int) -> Ints | None:
@@ -223,8 +223,8 @@ class _Reading:
             self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
         node_ids = self._name(elements)
         self._note_lost()
-        mesh = Mesh(self.found.points, elements, node_ids=node_ids, source=self.path.name)
-        mesh.conditions, mesh.parts = conditions, self._parts()
+        source, parts, points = self.path.name, self._parts(), self.found.points
+        mesh = Mesh(points, elements, node_ids=node_ids, conditions=conditions, parts=parts, source=source)
         return Document(mesh, {i: Properties(i) for i in used}, notes=self.notes)
 
     def _name(self, elements: list[Block]) -> Ints:
