@@ -334,7 +334,7 @@ class Translation(Motion):
     Examples
     --------
     >>> Translation("x", rate=20.0, boundaries="periodic").field(np.zeros(3)).tolist()
-    [-1.0, 0.0, 0.0]
+    [-1.0, -0.0, -0.0]
     """
 
     kind, unit, is_open = "translation", "m/s", True
