@@ -51,7 +51,7 @@ def files_read(source: str) -> list[Path]:
     path = Path(source)
     found = [path, *_on_disk(path)]
     if ending(path) == ".json":
-        from kratos_lite.io.project.settings import read_settings
+        from kratos_lite.io.settings import read_settings
 
         for name in _named(read_settings(path).values):
             for file in (path.parent / name, path.parent / Path(name.replace("\\", "/")).name):

@@ -19,7 +19,7 @@ from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_
 from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.settings import Settings, find_file, read_settings
+from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.io.scene import Scene
 from kratos_lite.materials import LinearMaterial
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import times_of
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
-from kratos_lite.io.project.settings import Settings
+from kratos_lite.io.settings import Settings
 from kratos_lite.io.scene import March
 
 if TYPE_CHECKING:

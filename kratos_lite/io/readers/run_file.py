@@ -14,7 +14,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.project.ale import add_motion, number_or_series
 from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
-from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
+from kratos_lite.io.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.scene import Scene
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying

@@ -10,7 +10,7 @@ import kratos_lite as kl
 from kratos_lite.cli import main
 from kratos_lite.io.project import read_project
 from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.settings import read_settings
+from kratos_lite.io.settings import read_settings
 
 RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
 

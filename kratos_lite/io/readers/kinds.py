@@ -13,7 +13,7 @@ def is_scene(path: str | Path) -> bool:
     """Return whether a file is a scene: a .json file with a body, or a script that defines one."""
     path = Path(path)
     if path.suffix.lower() == ".json" and path.is_file():
-        from kratos_lite.io.project.settings import read_settings
+        from kratos_lite.io.settings import read_settings
 
         settings = read_settings(path)
         return "body" in settings and "model" not in settings

@@ -18,7 +18,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.project.run_file import read_material
-from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
+from kratos_lite.io.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.scenes.actions import add_constraint, add_load
 from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
 from kratos_lite.io.scenes.values import Read, matrix, number, placed, vector

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.json_file import Object
-from kratos_lite.io.project.settings import Settings, inside, is_number, shown
+from kratos_lite.io.settings import Settings, inside, is_number, shown
 from kratos_lite.io.scene import March
 from kratos_lite.model.loads import Load, Varying
 from kratos_lite.time_series import TimeSeries
