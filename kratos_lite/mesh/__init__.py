@@ -10,18 +10,14 @@ from kratos_lite.mesh.blocks import (
     with_rows,
     without_repeats,
 )
-from kratos_lite.mesh.faces import Faces, components, equal_sets
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
-from kratos_lite.mesh.orientation import outward_signs
-from kratos_lite.typing import Array, Ints
+from kratos_lite.mesh.topology import Faces, components, equal_sets, outward_signs
 
 __all__ = [
     "NO_ROWS",
-    "Array",
     "Block",
     "Faces",
-    "Ints",
     "Located",
     "Mesh",
     "Part",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Ints
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
 
@@ -30,21 +30,32 @@ class Block:
     """
 
     name: str
-    nodes: NDArray[np.int32]
+    nodes: Rows
     ids: Ints
     properties: Ints
     shape: type[Shape] | None
-    lines: NDArray[np.int32] | None = None
+    lines: Rows | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
 
-    def take(self, chosen: NDArray[Any]) -> Block:
+    def take(self, chosen: Ints | Mask) -> Block:
         """Return the block of the chosen cells (rows or a mask)."""
         lines = None if self.lines is None else self.lines[chosen]
         return Block(
             self.name, self.nodes[chosen], self.ids[chosen], self.properties[chosen], self.shape, lines
         )
+
+
+class Cells(Protocol):
+    """Points and blocks of cells on them, as a mesh has them."""
+
+    points: Array
+    blocks: list[Block]
+    node_ids: Ints
+
+    def place(self, block: Block, cell: int) -> str:
+        """Return a readable place of a cell for messages."""
 
 
 @dataclass(eq=False)

@@ -7,22 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, with_rows
+from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.nearest import nearest_element
 from kratos_lite.shapes import Shape, inverse_map
 from kratos_lite.shapes.inverse import outside_by
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-    from kratos_lite.mesh.mesh import Mesh
-
 
 POINTS_AT_ONCE = 2**14
 """Points that are searched for together, so that candidates take little memory."""
@@ -50,7 +47,7 @@ class Located:
     xi : (..., 3) float, reference coordinates; nan outside.
     """
 
-    mesh: Mesh
+    mesh: Cells
     points: Array
     rows: Ints
     block: Ints
@@ -92,36 +89,17 @@ class Located:
     def interpolate(self, nodal: ArrayLike) -> Array:
         """Return Σ N_a v_a at the points, (..., *), of nodal values v (n, *); nan outside the mesh."""
         values = np.asarray(nodal, dtype=float)
-        if values.shape[:1] != (self.mesh.n_nodes,):
-            raise InputError(f"nodal values must have shape ({self.mesh.n_nodes}, …); got {values.shape}")
+        if values.shape[:1] != (len(self.mesh.points),):
+            raise InputError(f"nodal values must have shape ({len(self.mesh.points)}, …); got {values.shape}")
         out = np.full((self.rows.size, *values.shape[1:]), np.nan)
         for at, nodes, N in self._shares():
             out[at] = np.einsum("ma,ma...->m...", N, values[nodes])
         return out.reshape((*self.rows.shape, *values.shape[1:]))
 
-    def spread(self, values: ArrayLike) -> Array:
-        """Return nodal sums (n, *) of N_a times values (..., *) at the points: forces to nodes.
-
-        It is the transpose of `interpolate`.
-
-        Raises
-        ------
-        MeshError
-            A point lies outside the mesh.
-        """
-        self.require()
-        given = np.asarray(values, dtype=float)
-        lead = self.rows.shape
-        if given.shape[: len(lead)] != lead:
-            raise InputError(f"values at the points must have shape {lead} and more; got {given.shape}")
-        given = given.reshape(self.rows.size, *given.shape[len(lead) :])
-        total = np.zeros((self.mesh.n_nodes, *given.shape[1:]))
-        for at, nodes, N in self._shares():
-            np.add.at(total, nodes, np.einsum("ma,m...->ma...", N, given[at]))
-        return total
-
     def weights(self) -> csr_array[Any]:
-        """Return the shape functions as a sparse matrix (m, n), one row per point.
+        """Return the shape functions as a sparse matrix W (m, n), one row per point.
+
+        W v are nodal values v (n, ...) at the points, W.T f are forces f (m, ...) at them as nodal forces.
 
         Raises
         ------
@@ -135,7 +113,7 @@ class Located:
         rows = np.concatenate([NO_ROWS, *(np.repeat(at, nodes.shape[1]) for at, nodes, _ in shares)])
         columns = np.concatenate([NO_ROWS, *(nodes.ravel() for _, nodes, _ in shares)])
         entries = np.concatenate([np.zeros(0), *(N.ravel() for _, _, N in shares)])
-        return csr_array((entries, (rows, columns)), shape=(self.rows.size, self.mesh.n_nodes))
+        return csr_array((entries, (rows, columns)), shape=(self.rows.size, len(self.mesh.points)))
 
     def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
         """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
@@ -149,7 +127,7 @@ class Located:
         ((_, nodes, N),) = one.require()._shares()
         return nodes[0].astype(np.int64), N[0]
 
-    def _shares(self) -> Iterator[tuple[Ints, NDArray[np.int32], Array]]:
+    def _shares(self) -> Iterator[tuple[Ints, Rows, Array]]:
         """Yield, for each block, points (m,) in it, counted through, nodes (m, k) and N (m, k)."""
         numbers, cells, xi = np.ravel(self.block), np.ravel(self.cell), self.xi.reshape(-1, 3)
         for number, block in enumerate(self.mesh.blocks):
@@ -158,7 +136,7 @@ class Located:
                 yield at, block.nodes[cells[at]], block.shape.N(xi[at])
 
 
-def locate(mesh: Mesh, points: ArrayLike) -> Located:
+def locate(mesh: Cells, points: ArrayLike) -> Located:
     """Return the elements that contain points (..., 3), by the inverse isoparametric map.
 
     A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
@@ -187,13 +165,13 @@ def locate(mesh: Mesh, points: ArrayLike) -> Located:
 class _Search:
     """The elements of a mesh, ready to be searched; one without a shape contains nothing."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Cells) -> None:
         bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
         if len(bad):
             raise MeshError(f"node {mesh.node_ids[bad[0]]} must have finite coordinates to locate points")
         self.mesh = mesh
-        n = mesh.n_elements
-        self.starts = np.array([0, *(at.stop for _, at in with_rows(mesh.blocks))])[:-1]
+        ends = [0, *(at.stop for _, at in with_rows(mesh.blocks))]
+        n, self.starts = ends[-1], np.array(ends[:-1])
         low, high, self.middle = np.full((n, 3), np.inf), np.full((n, 3), -np.inf), np.zeros((n, 3))
         for block, at in with_rows(mesh.blocks):
             if is_solid(block):

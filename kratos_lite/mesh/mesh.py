@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, distinct, rows_of_ids, select, without_repeats
-from kratos_lite.mesh.faces import Faces
 from kratos_lite.mesh.locate import Located, locate
-from kratos_lite.mesh.orientation import inside_out, mirror
+from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.typing import Array, Ints
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
@@ -279,10 +278,10 @@ class Mesh:
         return faces
 
     def reoriented(self) -> Mesh:
-        """Return the mesh with the node order of elements that are inside out turned around."""
+        """Return the mesh in which inverted elements have the node order of their mirror image."""
         blocks = []
         for block in self.blocks:
-            turn = inside_out(block, self.points)
+            turn = inverted(block, self.points)
             nodes = block.nodes.copy()
             if turn.any() and block.shape is not None:
                 nodes[turn] = nodes[turn][:, mirror(block.shape)]

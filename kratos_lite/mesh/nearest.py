@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from kratos_lite.mesh.blocks import with_rows
+from kratos_lite.mesh.blocks import Cells
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array
-
-if TYPE_CHECKING:
-    from kratos_lite.mesh.mesh import Mesh
 
 CANDIDATES = 32
 """Elements whose boxes are nearest and whose faces are looked at."""
 
 
-def nearest_element(mesh: Mesh, point: Array) -> str:
+def nearest_element(mesh: Cells, point: Array) -> str:
     """Return how far from a point (3,) the nearest element is: ``0.5 m from element 1 (…3D8N)``."""
     found = []
-    for block, _ in with_rows(mesh.blocks):
+    for block in mesh.blocks:
         if block.shape is None or not is_solid(block):
             continue
         low, high = cell_boxes(mesh.points, block)

@@ -13,7 +13,7 @@ import numpy as np
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
-from kratos_lite.mesh.faces import Sets, corners, faces_of, set_keys
+from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
 from kratos_lite.solvers.supports import Supports, rigid_modes
 from kratos_lite.typing import Array, Ints
 
@@ -34,7 +34,7 @@ def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
         ids = mesh.element_ids
         a, b = sorted((ids[one[0]].item(), ids[other[0]].item()))
         warnings.append(f"{len(one)} elements have the same nodes as another ({a} and {b}): both count")
-    one, other = faces.gaping()
+    one, other = faces.non_conforming()
     if len(one):
         a, b = sorted(mesh.element_ids[faces.element[[one[0], other[0]]]].tolist())
         warnings.append(

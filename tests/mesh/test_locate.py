@@ -335,7 +335,7 @@ def test_the_error_says_which_point_how_far_and_the_cure():
     with pytest.raises(MeshError, match=r"^point 0, 1 at"):
         mesh.locate([[points[0], points[1]]], required=True)
     found = mesh.locate(points)
-    for refused in (found.require, found.weights, lambda: found.spread(np.ones(3))):
+    for refused in (found.require, found.weights):
         with pytest.raises(MeshError, match="point 1 at"):
             refused()
     with pytest.raises(MeshError, match="the point at"):
@@ -400,26 +400,23 @@ def test_one_point_many_points_none_and_any_leading_axes():
     none = mesh.locate(np.zeros((0, 3)))
     assert none.require().interpolate(mesh.points).shape == (0, 3)
     assert none.weights().shape == (0, mesh.n_nodes)
-    assert not none.spread(np.zeros((0, 3))).any()
 
 
 @each_element
-def test_spread_is_the_transpose_of_interpolate_and_keeps_force_and_moment(name):
+def test_weights_interpolate_and_their_transpose_keeps_force_and_moment(name):
     mesh = bent(name, (2, 2, 2))
     X, _ = points_of(mesh, 3)
     found = mesh.locate(X)
     f = np.random.default_rng(2).uniform(-1, 1, X.shape)
-    nodal = found.spread(f)
+    W = found.weights()
+    nodal = W.T @ f
     assert nodal.shape == mesh.points.shape
     v = np.random.default_rng(3).uniform(-1, 1, mesh.points.shape)
     assert np.vdot(v, nodal) == pytest.approx(np.vdot(found.interpolate(v), f), rel=1e-12)
     np.testing.assert_allclose(nodal.sum(axis=0), f.sum(axis=0), rtol=0, atol=1e-12)
     moment = np.cross(mesh.points, nodal).sum(axis=0)
     np.testing.assert_allclose(moment, np.cross(X, f).sum(axis=0), rtol=0, atol=1e-11)
-    W = found.weights()
     np.testing.assert_allclose(W @ v, found.interpolate(v), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(W.T @ f, nodal, rtol=0, atol=1e-13)
-    assert found.spread(f[:, 0]).shape == (mesh.n_nodes,)
 
 
 def test_nodes_and_weights_of_one_point():
@@ -437,5 +434,3 @@ def test_values_of_a_wrong_shape_are_refused():
     found = kl.box().locate([[0.5, 0.5, 0.5]])
     with pytest.raises(InputError, match=r"nodal values must have shape \(8, …\); got \(7, 3\)"):
         found.interpolate(np.zeros((7, 3)))
-    with pytest.raises(InputError, match=r"must have shape \(1,\) and more; got \(2, 3\)"):
-        found.spread(np.zeros((2, 3)))

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.mesh import Block, Faces, components, equal_sets
-from kratos_lite.mesh import faces as connections
+from kratos_lite.mesh import Block, Faces, components, equal_sets, topology
 from kratos_lite.native import kernels
 
 compiled = pytest.mark.skipif(kernels("mesh") is None, reason="the compiled kernels were not built")
@@ -15,7 +14,7 @@ EITHER = ["numpy", pytest.param("compiled", marks=compiled)]
 @pytest.fixture(params=EITHER)
 def way(request, monkeypatch):
     if request.param == "numpy":
-        monkeypatch.setattr(connections, "kernels", lambda name: None)
+        monkeypatch.setattr(topology, "kernels", lambda name: None)
     return request.param
 
 
@@ -78,7 +77,7 @@ def test_faces_of_mixed_cells(way):
         ("Quadrilateral4", 4 + 2),
         ("Triangle3", 2 + 4),
     ]
-    assert [len(rows) for rows in faces.gaping()] == [0, 0]
+    assert [len(rows) for rows in faces.non_conforming()] == [0, 0]
 
 
 @pytest.mark.parametrize("element", list(kl.ELEMENTS))
@@ -89,7 +88,7 @@ def test_both_ways_find_the_same_faces(element, monkeypatch):
     block = mesh.blocks[0]
     kept = Block(block.name, renumbered[block.nodes], block.ids, block.properties, block.shape)
     first = Faces([kept])
-    monkeypatch.setattr(connections, "kernels", lambda name: None)
+    monkeypatch.setattr(topology, "kernels", lambda name: None)
     second = Faces([kept])
     assert len(first.one) > 0
     np.testing.assert_array_equal(first.one, second.one)

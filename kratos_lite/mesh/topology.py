@@ -1,20 +1,20 @@
-"""Connections: sets of nodes that occur more than once, such as shared faces, and what hangs together."""
+"""Topology: shared and outer faces, connected parts, and the orientation of faces and cells."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.native import kernels
-from kratos_lite.shapes import FACE_SHAPES
-from kratos_lite.typing import Ints
+from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 
-Sets: TypeAlias = "tuple[NDArray[Any], Sequence[Sequence[int]]]"
+Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
 """Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
 
 
@@ -36,7 +36,7 @@ def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
     return one, other
 
 
-def _table(columns: Sequence[Sequence[int]]) -> NDArray[np.int32]:
+def _table(columns: Sequence[Sequence[int]]) -> Rows:
     """Return tuples of columns as rows, filled up with -1."""
     table = np.full((len(columns), max(map(len, columns), default=0)), -1, dtype=np.int32)
     for row, picked in zip(table, columns, strict=True):
@@ -105,7 +105,7 @@ class Faces:
         rows = [np.tile(np.arange(at.start, at.stop), len(faces_of(b))) for b, at in with_rows(self.blocks)]
         return np.concatenate([NO_ROWS, *rows])
 
-    def gaping(self) -> tuple[Ints, Ints]:
+    def non_conforming(self) -> tuple[Ints, Ints]:
         """Return the pairs that have the same corners but not the same nodes."""
         if all(len(face) == len(corners(face)) for block in self.blocks for face in faces_of(block)):
             return NO_ROWS, NO_ROWS
@@ -121,7 +121,7 @@ class Faces:
         """
         alone = np.ones(sum(len(block) * len(faces_of(block)) for block in self.blocks), dtype=bool)
         alone[self.one] = alone[self.other] = False
-        by_size: dict[int, list[tuple[NDArray[np.int32], Ints]]] = {}
+        by_size: dict[int, list[tuple[Rows, Ints]]] = {}
         start = 0
         for block, at in with_rows(self.blocks):
             for face in faces_of(block):
@@ -150,3 +150,49 @@ def corners(face: tuple[int, ...]) -> tuple[int, ...]:
     (0, 2, 1)
     """
     return face[: 3 if len(face) in (3, 6) else 4]
+
+
+# ---- orientation -----------------------------------------------------------------------------------
+
+
+def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
+    """Return +1 for faces whose nodes run counter-clockwise from outside, -1 for others, 0 inside."""
+    assert block.shape is not None
+    c = block.shape.corners
+    outside = [b.nodes[:, :c] for b in boundary if b.shape is not None and b.shape.corners == c]
+    known = np.vstack([np.zeros((0, c), dtype=np.int32), *outside])
+    corners = block.nodes[:, :c]
+    both = np.sort(np.vstack([known, corners]), axis=1)
+    _, key = np.unique(both, axis=0, return_inverse=True)
+    key = key.ravel()
+    owner = np.full(key.max(initial=-1) + 1, -1)
+    owner[key[: len(known)]] = np.arange(len(known))
+    match = owner[key[len(known) :]]
+    signs = np.zeros(len(block))
+    on = np.flatnonzero(match >= 0)
+    mate = known[match[on]]
+    start = np.argmax(mate == corners[on, :1], axis=1)
+    following = np.take_along_axis(mate, ((start + 1) % c)[:, None], axis=1)[:, 0]
+    signs[on] = np.where(following == corners[on, 1], 1.0, -1.0)
+    return signs
+
+
+def mirror(shape: type[Shape]) -> Ints:
+    """Return the node order of the mirror image of a cell: its reflection in r = s.
+
+    >>> from kratos_lite.shapes import Tetrahedron4
+    >>> mirror(Tetrahedron4).tolist()
+    [0, 2, 1, 3]
+    """
+    swapped = shape.nodes[:, [1, 0, 2]]
+    distance = np.abs(swapped[:, None, :] - shape.nodes[None, :, :]).max(axis=2)
+    return np.asarray(distance.argmin(axis=1))
+
+
+def inverted(block: Block, points: Array) -> Mask:
+    """Return a mask of the cells with det J < 0 at their centroid."""
+    if block.shape is None or block.shape.nodes.shape[1] != 3:
+        return np.zeros(len(block), dtype=bool)
+    center = block.shape.nodes[: block.shape.corners].mean(axis=0)
+    J = np.swapaxes(points[block.nodes], 1, 2) @ block.shape.dN(center)
+    return np.asarray(np.linalg.det(J) < 0)
