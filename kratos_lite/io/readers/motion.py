@@ -6,7 +6,7 @@ from typing import Any
 
 from kratos_lite.ale import Motion, Rotation, Translation
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.readers.values import number_or_series
 from kratos_lite.io.settings import Settings
 from kratos_lite.time_series import TimeSeries
 

@@ -1,4 +1,4 @@
-"""The section ``time`` of run files, and values that change with the time."""
+"""The section ``time`` of a file: steps, integrator, damping and restart; and loads that change in time."""
 
 from __future__ import annotations
 
@@ -7,55 +7,54 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.json_file import Object
-from kratos_lite.io.settings import Settings, inside, is_number, shown
-from kratos_lite.io.scene import March
+from kratos_lite.io.readers.values import number_or_series
+from kratos_lite.io.settings import Settings, find_file, is_number, shown
 from kratos_lite.model.loads import Load, Varying
-from kratos_lite.time_series import TimeSeries
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
     from kratos_lite.analysis import CentralDifference
     from kratos_lite.analysis.schemes import Implicit
 
-KEYS = ("step", "steps", "every", "scheme", "rayleigh", "lumped", "restart")
-SERIES = (".pvd", ".csv", ".npz")
-"""Endings of files that hold a march."""
-NO_RESULT = "{}: a march is written as .pvd (for ParaView), .csv or .npz"
-SCHEMES = {
+OF_MODELS = ("step", "steps", "every", "integrator", "rayleigh", "lumped", "restart")
+OF_BODIES = ("step", "steps", "every", "substeps")
+INTEGRATORS = {
     "newmark": (0, 2),
     "hht": (0, 1),
     "bossak": (0, 1),
     "generalized_alpha": (0, 1),
     "central_difference": (0,),
 }
-"""How many numbers each scheme takes."""
+"""How many numbers each integrator takes."""
 
 
-def scheme_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
-    """Return a scheme by its name and numbers; InputError for those that are none.
+def integrator_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
+    """Return an integrator by its name and numbers; InputError for those that are none.
 
-    >>> scheme_of("hht", [-0.1]).name
+    >>> integrator_of("hht", [-0.1]).name
     'hht(-0.1)'
     """
-    if name not in SCHEMES:
-        raise InputError(f"unknown scheme {name!r}.{nearest(name, SCHEMES)} Known are {', '.join(SCHEMES)}")
-    counts = SCHEMES[name]
+    if name not in INTEGRATORS:
+        hint = nearest(name, INTEGRATORS)
+        raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
+    counts = INTEGRATORS[name]
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
-    from kratos_lite import analysis as dynamics
+    from kratos_lite import analysis
 
     make: Callable[..., Implicit | CentralDifference]
-    make = getattr(dynamics, "CentralDifference" if name == "central_difference" else name)
+    make = getattr(analysis, "CentralDifference" if name == "central_difference" else name)
     return make(*numbers)
 
 
-def march_of(settings: Settings, folder: Path, outside: bool = False) -> March | None:
+def read_time(settings: Settings, folder: Path, *, outside: bool = False) -> TimeIntegration | None:
     """Return what the section ``time`` of a run file says, or None without one.
 
-    It is ``{"step": s, "steps": n, "every": k, "scheme": …, "rayleigh": [α, β], "lumped": false, "restart":
-    "moment.npz"}``.  A scheme is a name such as ``"newmark"``, or a name with its numbers such as
-    ``{"hht": -0.05}`` or ``{"newmark": [0.25, 0.5]}``.
+    It is ``{"step": s, "steps": n, "every": k, "integrator": …, "rayleigh": [α, β], "lumped": false,
+    "restart": "state.npz"}``.  An integrator is a name such as ``"newmark"``, or a name with its numbers such
+    as ``{"hht": -0.05}`` or ``{"newmark": [0.25, 0.5]}``.
 
     Raises
     ------
@@ -65,40 +64,54 @@ def march_of(settings: Settings, folder: Path, outside: bool = False) -> March |
     if "time" not in settings:
         return None
     section = settings.section("time")
-    section.check_keys(KEYS)
-    return March(
-        _checked(section, "step", positive_step, section.number("step")),
-        _checked(section, "steps", lambda n: whole_number(n, "steps"), section.integer("steps")),
-        _checked(section, "every", lambda n: whole_number(n, "every"), section.integer("every", 1)),
-        _scheme(section) if "scheme" in section else None,
-        _rayleigh(section) if "rayleigh" in section else (0.0, 0.0),
-        section.flag("lumped", False),
-        restart=_restart(section, folder, outside) if "restart" in section else None,
+    section.check_keys(OF_MODELS)
+    return TimeIntegration(
+        **_steps(section),
+        integrator=_integrator(section) if "integrator" in section else None,
+        rayleigh=_rayleigh(section) if "rayleigh" in section else (0.0, 0.0),
+        lumped=section.flag("lumped", False),
+        restart=restart_of(section, folder, outside) if "restart" in section else None,
     )
 
 
-def _checked(section: Settings, key: str, check: Callable[..., Any], *values: Any) -> Any:
-    """Return what a check makes of values; give its error the place of a key."""
-    try:
-        return check(*values)
-    except InputError as error:
-        raise section.error(key, f"{section.name(key)}: {error}") from None
+def read_time_of_body(settings: Settings) -> TimeIntegration:
+    """Return what the section ``time`` of a file with a body says: step, steps, every and substeps."""
+    section = settings.section("time", required=True)
+    section.check_keys(OF_BODIES)
+    substeps: int | str = "auto"
+    if section.values.get("substeps") != "auto":
+        substeps = _whole(section, "substeps", 1)
+    return TimeIntegration(**_steps(section), substeps=substeps)
 
 
-def _scheme(section: Settings) -> Implicit | CentralDifference:
-    value = section.values["scheme"]
+def _steps(section: Settings) -> dict[str, Any]:
+    step = section.placed("step", positive_step, section.number("step"))
+    line, column = section.values.places["step"]
+    return {
+        "step": step,
+        "steps": _whole(section, "steps"),
+        "every": _whole(section, "every", 1),
+        "place": f"{section.source}:{line}:{column}",
+    }
+
+
+def _whole(section: Settings, key: str, *default: int) -> int:
+    return section.placed(key, whole_number, section.integer(key, *default), key)
+
+
+def _integrator(section: Settings) -> Implicit | CentralDifference:
+    value = section.values["integrator"]
     name, numbers = value, []
     if isinstance(value, Object) and len(value) == 1:
         ((name, given),) = value.items()
         numbers = given if isinstance(given, list) else [given]
     if not isinstance(name, str) or not all(map(is_number, numbers)):
         raise section.error(
-            "scheme",
-            f'{section.name("scheme")} must be a name such as "newmark", or a name with its numbers such as '
-            f'{{"hht": -0.05}}; got {shown(value)}',
+            "integrator",
+            f'{section.name("integrator")} must be a name such as "newmark", or a name with its numbers such '
+            f'as {{"hht": -0.05}}; got {shown(value)}',
         )
-    scheme: Implicit | CentralDifference = _checked(section, "scheme", scheme_of, name, numbers)
-    return scheme
+    return section.placed("integrator", integrator_of, name, numbers)
 
 
 def _rayleigh(section: Settings) -> tuple[float, float]:
@@ -110,24 +123,18 @@ def _rayleigh(section: Settings) -> tuple[float, float]:
     return values[0], values[1]
 
 
-def _restart(section: Settings, folder: Path, outside: bool) -> str:
-    try:
-        path = inside(folder, section.text("restart"), outside)
-    except ValueError as error:
-        raise section.error("restart", f"{section.name('restart')}: {error}") from None
-    if not path.is_file():
-        raise section.error("restart", f"{section.name('restart')}: there is no file {path}")
-    return str(path)
+def restart_of(section: Settings, folder: Path, outside: bool = False) -> str:
+    """Return the file of the key ``restart``: a state from which to go on."""
+    return str(find_file(section, "restart", folder, outside=outside)[0])
 
 
-def varying(section: Settings, key: str, make: Callable[[Settings, str], Load]) -> Load:
-    """Return the load that `make` reads of a key, or one that varies.
+def load_of(section: Settings, key: str, make: Callable[[Settings, str], Load]) -> Load:
+    """Return the load that `make` reads of a key, or one that changes in time.
 
-    The latter is ``{"value": …, "times": […], "factors": […]}``: the value times a piecewise linear factor.
+    The latter is ``{"value": …, "amplitude": …}``: the value times a number or a time series.
     """
     if not isinstance(section.values[key], Object):
         return make(section, key)
     table = section.section(key)
-    table.check_keys(("value", "times", "factors"))
-    load = make(table, "value")
-    return Varying(load, _checked(section, key, TimeSeries, table.numbers("times"), table.numbers("factors")))
+    table.check_keys(("value", "amplitude"))
+    return section.placed(key, Varying, make(table, "value"), number_or_series(table, "amplitude"))

@@ -32,7 +32,7 @@ def number_or_series(section: Settings, key: str) -> float | TimeSeries:
     return section.placed(key, TimeSeries, table.numbers("times"), table.numbers("values"))
 
 
-def material(section: Settings) -> LinearMaterial:
+def read_material(section: Settings) -> LinearMaterial:
     """Return the material of an object with the name of its law and its constants."""
     law = section.text("law", "Isotropic3D")
     kind = section.placed("law", MATERIALS.__getitem__, law)
