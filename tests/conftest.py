@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from malformed import write_malformed
 
 from kratos_lite.cli import main
 
@@ -10,12 +11,26 @@ collect_ignore = ["interop/kratos_driver.py"]
 """Scripts that tests run in other processes."""
 
 
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+"""Folder of real input files beside the repository: more of what `fixtures` has."""
+SOURCES = ["fixtures", "shared"] if (SHARED / "cases").is_dir() else ["fixtures"]
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Folder of real input files beside the repository; tests that need it skip without it."""
-    folder = Path(__file__).resolve().parents[2] / "shared"
-    if not (folder / "cases").is_dir():
+    if "shared" not in SOURCES:
         pytest.skip("the folder of real input files is not there")
+    return SHARED
+
+
+@pytest.fixture(scope="session", params=SOURCES)
+def malformed(request, tmp_path_factory) -> Path:
+    """Folder of malformed input files, and others made from the outside by the same faults."""
+    if request.param == "shared":
+        return SHARED / "bad"
+    folder = tmp_path_factory.mktemp("malformed")
+    write_malformed(folder)
     return folder
 
 

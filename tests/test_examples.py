@@ -182,10 +182,10 @@ def test_a_scene_in_python_is_marched(tmp_path):
 def test_both_forms_of_the_spinning_bar_stretch_alike():
     out = run(sys.executable, BODIES / "rotating_bar.py")
     # Solfec-1.0: 7.038e-4 m and 7.035e-4 m
-    assert number(r"TL: elongation (\S+) m", out) == pytest.approx(7.038e-4, abs=1e-7)
-    assert number(r"BC: elongation (\S+) m", out) == pytest.approx(7.035e-4, abs=1e-7)
-    for form in ("TL", "BC"):
-        assert number(rf"{form}: energy (\S+) J", out) == pytest.approx(3.315, abs=1e-3)
+    assert number(r"total_lagrangian: elongation (\S+) m", out) == pytest.approx(7.038e-4, abs=1e-7)
+    assert number(r"corotational: elongation (\S+) m", out) == pytest.approx(7.035e-4, abs=1e-7)
+    for formulation in ("total_lagrangian", "corotational"):
+        assert number(rf"{formulation}: energy (\S+) J", out) == pytest.approx(3.315, abs=1e-3)
 
 
 def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone():

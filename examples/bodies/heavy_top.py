@@ -24,7 +24,7 @@ mesh = kl.box((0.5, 0.5, 2.0), origin=(-0.25, -0.25, -1.0))  # only to be drawn
 top = kl.RigidBody(
     mesh, mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])), scheme="RIG_IMP"
 )
-top.turn(exp(np.array([0.5, 0.0, 0.0])))
+top.rotate(exp(np.array([0.5, 0.0, 0.0])))
 top.u[:3] = 0.0, 0.0, 25.0  # referential angular velocity, rad/s
 top.add(kl.Callback(weight))
 

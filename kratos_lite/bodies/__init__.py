@@ -8,10 +8,10 @@ from kratos_lite.bodies.constraints import (
     Constraint,
     FixDirection,
     FixPoint,
+    PrescribedAcceleration,
+    PrescribedDisplacement,
+    PrescribedVelocity,
     RigidLink,
-    SetAcceleration,
-    SetDisplacement,
-    SetVelocity,
 )
 from kratos_lite.bodies.conversion import convert
 from kratos_lite.bodies.finite_element import FiniteElementBody
@@ -20,7 +20,7 @@ from kratos_lite.bodies.marching import march
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.bodies.state import State
-from kratos_lite.bodies.statics import equilibrium
+from kratos_lite.bodies.statics import find_equilibrium
 from kratos_lite.time_series import TimeSeries
 
 __all__ = [
@@ -34,17 +34,17 @@ __all__ = [
     "FollowerPressure",
     "Force",
     "Obstacle",
+    "PrescribedAcceleration",
+    "PrescribedDisplacement",
+    "PrescribedVelocity",
     "PseudoRigidBody",
     "RigidBody",
     "RigidLink",
-    "SetAcceleration",
-    "SetDisplacement",
-    "SetVelocity",
     "Spring",
     "State",
     "TimeSeries",
     "Torque",
     "convert",
-    "equilibrium",
+    "find_equilibrium",
     "march",
 ]

@@ -63,7 +63,7 @@ class Body(ABC):
 
     kind: ClassVar[str]
     schemes: ClassVar[tuple[str, ...]] = ()
-    rows_are_constant: ClassVar[bool] = False
+    jacobian_is_constant: ClassVar[bool] = False
     dofs: int
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -82,14 +82,14 @@ class Body(ABC):
         damping: float = 0.0,
     ) -> None:
         self.mesh, self.material, self.mass_properties = mesh, material, mass_properties
-        for doubt in self.doubts():
-            _log.warning("%s", doubt)
+        for warning in self.warnings():
+            _log.warning("%s", warning)
         self.q, self.u = q, u
         self.clock = Clock()
         self.external_work: Array = np.zeros(q.shape[:-1])
         self.loads: list[Bound] = []
         self.constraints: list[Constraint] = []
-        self.marched: Array | None = None
+        self.integrated_velocity: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
         self.scheme = self.default_scheme() if scheme is None else scheme
         self.damping = damping
@@ -109,7 +109,7 @@ class Body(ABC):
         """Return the velocity of material points X, shaped as by `position`, in m/s."""
 
     @abstractmethod
-    def place(self, q: ArrayLike) -> None:
+    def set_configuration(self, q: ArrayLike) -> None:
         """Set the configuration.
 
         Raises
@@ -119,7 +119,7 @@ class Body(ABC):
         """
 
     @abstractmethod
-    def turn(self, rotation: ArrayLike) -> None:
+    def rotate(self, rotation: ArrayLike) -> None:
         """Turn the undeformed body about its mass center, which stays where it is.
 
         Parameters
@@ -138,25 +138,25 @@ class Body(ABC):
         """
 
     @abstractmethod
-    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
         """Return dofs (k,) and H (3, k) with velocity(X) = H u[dofs], for one point X (3,) of one body.
 
-        Where `rows_are_constant` they do not depend on q.
+        Where `jacobian_is_constant` they do not depend on q.
         """
 
     @abstractmethod
-    def push(self, X: Array, force: Array, q: Array) -> Array:
+    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
         """Return the generalized force (..., dofs) of a spatial force (..., 3) in N on the point X (3,)."""
 
     @abstractmethod
-    def push_nodes(self, forces: Array, q: Array) -> Array:
+    def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return the generalized force (..., dofs) of spatial forces (n, 3) in N on the nodes of the mesh."""
 
     @abstractmethod
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return what a vector (3,) fixed in the body at X points at in space, (..., 3)."""
 
-    def find(self, X: Array) -> None:
+    def locate(self, X: Array) -> None:
         """Raise MeshError unless points X (3,) or (m, 3) all lie in the undeformed body."""
         if self.mesh is not None:
             self.mesh.locate(X).require()
@@ -217,7 +217,7 @@ class Body(ABC):
     def step(self, value: int) -> None:
         self.clock = replace(self.clock, step=int(value))
 
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return what is allowed, but may be a mistake; it is also logged when the body is made."""
         return []
 
@@ -271,21 +271,21 @@ class Body(ABC):
 
     # ---- loads and constraints -------------------------------------------------------------------
 
-    def add(self, load: BodyLoad | Load, factor: Factor = 1.0) -> None:
+    def add(self, load: BodyLoad | Load, amplitude: Factor = 1.0) -> None:
         """Let a load act.
 
         Parameters
         ----------
         load : a load of bodies (`Force`, `Torque`, …), or one of models (`Gravity`, `Traction`, `Pressure`,
             …), which acts on the nodes as on the undeformed mesh and keeps its direction in space.
-        factor : number, `TimeSeries`, or function of the time in s, by which it is multiplied.
+        amplitude : number, `TimeSeries`, or function of the time in s, by which it is multiplied.
         """
         from kratos_lite.bodies.constraints import Constraint
         from kratos_lite.bodies.loads import bind
 
         if isinstance(load, Constraint):
             raise InputError(f"a {type(load).__name__} is a constraint, no load: body.constrain takes it")
-        self.loads.append(bind(load, self, factor))
+        self.loads.append(bind(load, self, amplitude))
         self._constant = None
 
     def constrain(self, constraint: Constraint) -> None:
@@ -307,7 +307,7 @@ class Body(ABC):
             )
         constraint.bind(self)
         self.constraints.append(constraint)
-        self.marched = None
+        self.integrated_velocity = None
 
     def external_load(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None
@@ -327,13 +327,13 @@ class Body(ABC):
         lead = self.q.shape[:-1]
         acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
         for load in self.loads:
-            factor = load.factor(self.time)
+            amplitude = load.amplitude(self.time)
             if load.acceleration is not None:
-                acceleration += factor * load.acceleration
+                acceleration += amplitude * load.acceleration
             if load.spatial is not None:
-                spatial += factor * load.spatial
+                spatial += amplitude * load.spatial
             if load.convected is not None:
-                convected += factor * load.convected
+                convected += amplitude * load.convected
         self._constant = len(self.loads), (acceleration, spatial, convected)
         return self._constant[1]
 

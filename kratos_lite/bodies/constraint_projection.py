@@ -46,7 +46,7 @@ Advance: TypeAlias = Callable[[Array], Step]
 """Gives the end of a step under an additional generalized force."""
 
 
-def close(body: Body, h: float, qh: Array, advance: Advance, solver: Callable[[], Solve]) -> Array:
+def constrained_step(body: Body, h: float, qh: Array, advance: Advance, solver: Callable[[], Solve]) -> Array:
     """Take a step of h s that meets the constraints; return the load with reactions (..., dofs).
 
     Parameters
@@ -66,18 +66,18 @@ def close(body: Body, h: float, qh: Array, advance: Advance, solver: Callable[[]
         return step.load
     for constraint in body.constraints:
         constraint.begin(body, h)
-    H = rows(body, qh)
+    H = constraint_jacobian(body, qh)
     inverse = np.asarray(np.linalg.pinv(h * H @ solver()(H.T), rcond=1e-12, hermitian=True), dtype=float)
     step, multipliers = _corrected(body, h, H, inverse, advance)
     at = 0
     for constraint in body.constraints:
-        constraint.react(body, qh, multipliers[at : at + constraint.count])
+        constraint.set_reactions(body, qh, multipliers[at : at + constraint.count])
         at += constraint.count
     body.q, body.u = step.q, step.u
     return step.load + H.T @ multipliers
 
 
-def start(body: Body, h: float) -> None:
+def project_velocity(body: Body, h: float) -> None:
     """Let a body start as its constraints want it: an impulse takes away the velocities that they forbid.
 
     Without it a point that is fixed would go on with the velocity it had, there and back, for ever.
@@ -89,7 +89,7 @@ def start(body: Body, h: float) -> None:
     SolveError
         If the constraints contradict each other.
     """
-    before, H = float(body.kinetic_energy()), rows(body, body.q)
+    before, H = float(body.kinetic_energy()), constraint_jacobian(body, body.q)
     wanted, size = [], _extent(body)
     for constraint in body.constraints:
         x, v = body.position(constraint.points), body.velocity(constraint.points)
@@ -98,10 +98,10 @@ def start(body: Body, h: float) -> None:
             raise InputError(
                 f"a {type(constraint).__name__} is missed by {gap:.3g} m at t = {body.time:g} s, "
                 "where the body is: it would have to jump; let the motion start there, or bring the body to "
-                "rest with equilibrium"
+                "rest with find_equilibrium"
             )
         along = np.einsum("mri,mi->mr", constraint.directions(x), v)
-        wanted.append(constraint.speeds(along, body.time, h).ravel())
+        wanted.append(constraint.starting_velocities(along, body.time, h).ravel())
     miss = np.concatenate(wanted) - H @ body.u
     if not np.abs(miss).max() > ROUND_OFF * np.abs(H @ np.abs(body.u)).max():
         return
@@ -127,9 +127,9 @@ def _extent(body: Body) -> float:
     return float(max(np.abs(held).max(), np.abs(held - body.mass_center()).max()))
 
 
-def rows(body: Body, q: Array) -> Array:
+def constraint_jacobian(body: Body, q: Array) -> Array:
     """Return H (c, dofs) of all constraints of a body."""
-    return np.concatenate([constraint.rows(body, q) for constraint in body.constraints])
+    return np.concatenate([constraint.jacobian(body, q) for constraint in body.constraints])
 
 
 def allowed(H: Array) -> csr_array[Any, Any]:

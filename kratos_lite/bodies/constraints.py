@@ -45,7 +45,7 @@ class Constraint(ABC):
         self._where = points if isinstance(points, str) or callable(points) else None
         self._hold(np.zeros((1, 3)) if isinstance(points, str) or callable(points) else points_of(points))
         self._body: Body | None = None
-        self._rows: Array | None = None
+        self._jacobian: Array | None = None
 
     def _hold(self, points: Array) -> None:
         """Take note of the points."""
@@ -72,7 +72,7 @@ class Constraint(ABC):
             if body.mesh is None:
                 raise ModelError("nodes are chosen from a mesh, and this body has none; give points (m, 3)")
             self._hold(body.mesh.points[body.mesh.nodes(self._where)])
-        body.find(self.points)
+        body.locate(self.points)
         self._body, self._start = body, body.position(self.points)
 
     def begin(self, body: Body, h: float) -> None:  # noqa: B027 - most have nothing to prepare
@@ -89,19 +89,19 @@ class Constraint(ABC):
         Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
         """
 
-    def speeds(self, v: Array, time: float, h: float) -> Array:
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
         """Return the velocities along the directions with which points start, (m, r) in m/s.
 
         `v` (m, r) are those that they have, at a time, before steps of h s.
         """
         return np.zeros_like(v)
 
-    def entries(self, body: Body, q: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    def jacobian_entries(self, body: Body, q: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return rows, dofs and values of H (m r, dofs): points move along their directions with H u."""
         directions = self.directions(body.position(self.points, q))
         row, dof, value = [], [], []
         for i, X in enumerate(self.points):
-            dofs, matrix = body.rows(X, q)
+            dofs, matrix = body.jacobian(X, q)
             block = directions[i] @ matrix
             r, k = np.nonzero(np.abs(block) > 1e-14 * np.abs(matrix).max())
             row.append(r + i * len(block))
@@ -109,15 +109,15 @@ class Constraint(ABC):
             value.append(block[r, k])
         return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
 
-    def rows(self, body: Body, q: Array) -> Array:
+    def jacobian(self, body: Body, q: Array) -> Array:
         """Return H (m r, dofs) as a full matrix; it is kept where it is always the same."""
-        if self._rows is not None:
-            return self._rows
-        row, dof, value = self.entries(body, q)
+        if self._jacobian is not None:
+            return self._jacobian
+        row, dof, value = self.jacobian_entries(body, q)
         H = np.zeros((self.count, body.dofs))
         H[row, dof] = value
-        if body.rows_are_constant and not self.turning:
-            self._rows = H
+        if body.jacobian_is_constant and not self.turning:
+            self._jacobian = H
         return H
 
     @property
@@ -130,7 +130,7 @@ class Constraint(ABC):
         x, v = body.position(self.points, q), body.velocity(self.points, q, u)
         return self.gap(x, v, time, h).ravel()
 
-    def react(self, body: Body, q: Array, multipliers: Array) -> None:
+    def set_reactions(self, body: Body, q: Array, multipliers: Array) -> None:
         """Note the reactions of multipliers (m r,)."""
         directions = self.directions(body.position(self.points, q))
         self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)
@@ -193,7 +193,7 @@ class FixDirection(Along):
         return self._moved(x) * (2 / h)
 
 
-class SetDisplacement(Along):
+class PrescribedDisplacement(Along):
     """Points that move along a direction as prescribed.
 
     Parameters
@@ -201,7 +201,7 @@ class SetDisplacement(Along):
     points, direction : as for `FixDirection`.
     displacement : m, number, `TimeSeries` or function of the time: by how much the points are moved from
         where they were when the constraint was made.  A motion starts where the body is; a body at rest
-        (`equilibrium`) may be moved by a number.
+        (`find_equilibrium`) may be moved by a number.
     """
 
     def __init__(self, points: Points, direction: ArrayLike, displacement: Factor) -> None:
@@ -212,13 +212,13 @@ class SetDisplacement(Along):
         """Return by how much the points are off; see `Constraint.gap`."""
         return (self._moved(x) - self.displacement(time)) * (2 / h)
 
-    def speeds(self, v: Array, time: float, h: float) -> Array:
-        """Return the slope of the displacement at a time; see `Constraint.speeds`."""
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the slope of the displacement at a time; see `Constraint.starting_velocities`."""
         short = SHORT * h
         return np.full_like(v, (self.displacement(time + short) - self.displacement(time)) / short)
 
 
-class SetVelocity(Along):
+class PrescribedVelocity(Along):
     """Points with a prescribed velocity along a direction at the end of each step.
 
     Parameters
@@ -237,12 +237,12 @@ class SetVelocity(Along):
         """Return the velocity that is missing; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self.speed(time)
 
-    def speeds(self, v: Array, time: float, h: float) -> Array:
-        """Return the velocity at a time; see `Constraint.speeds`."""
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocity at a time; see `Constraint.starting_velocities`."""
         return np.full_like(v, self.speed(time))
 
 
-class SetAcceleration(Along):
+class PrescribedAcceleration(Along):
     """Points with a prescribed acceleration along a direction: it adds up to their velocity.
 
     Parameters
@@ -267,8 +267,8 @@ class SetAcceleration(Along):
         """Return the velocity that is missing; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self._target
 
-    def speeds(self, v: Array, time: float, h: float) -> Array:
-        """Return the velocities as they are; see `Constraint.speeds`."""
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocities as they are; see `Constraint.starting_velocities`."""
         return v
 
 

@@ -32,7 +32,7 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     ----------
     body : a single body with a mesh and a material.
     kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`, or its word such as ``"rigid"``.
-    options : further arguments of the kind, such as ``form="BC"``.
+    options : further arguments of the kind, such as ``formulation="corotational"``.
 
     Raises
     ------
@@ -62,13 +62,13 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     other = kind(body.mesh, body.material, **options)
     if isinstance(other, FiniteElementBody):
         arms = other.points - body.center
-        other.place(arms @ F.T + center - other.points)
+        other.set_configuration(arms @ F.T + center - other.points)
         other.u = (arms @ rate.T + velocity).ravel()
     elif isinstance(other, PseudoRigidBody):
-        other.place(np.concatenate([F.ravel(), center]))
+        other.set_configuration(np.concatenate([F.ravel(), center]))
         other.u = np.concatenate([rate.ravel(), velocity])
     else:
-        other.place(np.concatenate([polar(F).T.ravel(), center]))
+        other.set_configuration(np.concatenate([polar(F).T.ravel(), center]))
         spin = other.rotation.T @ body.angular_momentum()
         other.u = np.concatenate([np.linalg.solve(other.mass_properties.inertia, spin), velocity])
     other.time, other.step = body.time, body.step

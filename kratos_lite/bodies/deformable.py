@@ -23,14 +23,14 @@ class Deformable(Body):
     body that spins.  ``ENERGY_MOMENTUM``: implicit; energy and both momenta exact whatever the step.
     """
 
-    rows_are_constant = True
+    jacobian_is_constant = True
     schemes: ClassVar[tuple[str, ...]] = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
 
     def default_scheme(self) -> str:
         """Return ``ENERGY_MOMENTUM``."""
         return "ENERGY_MOMENTUM"
 
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return materials whose waves are so slow or quick that their units may be wrong."""
         given = self.material
         materials = given.values() if isinstance(given, Mapping) else [] if given is None else [given]

@@ -14,7 +14,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.stiffness import Pattern
 from kratos_lite.bodies.constraint_projection import allowed
 from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.formulations import FORMS, Form, Modal
+from kratos_lite.bodies.formulations import FORMULATIONS, Formulation, Modal
 from kratos_lite.bodies.rotations import check_rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
@@ -39,11 +39,13 @@ class FiniteElementBody(Deformable):
     ----------
     mesh : the shape.
     material : one material, or materials by part name or property id.
-    form : ``TL`` total Lagrangian (Saint Venant–Kirchhoff), ``BC`` body co-rotational (small strains seen
-        from one rotation of the body), ``BC-MODAL`` the same with the lowest modes only.
-    modes : number of modes for ``BC-MODAL``.
+    formulation : ``total_lagrangian`` (Saint Venant–Kirchhoff), ``corotational`` (small strains seen from
+        one rotation of the body), ``modal`` (the same with the lowest modes only); Solfec's acronyms ``TL``,
+        ``BC`` and ``BC-MODAL`` name them too.
+    modes : number of modes for ``modal``.
     lumped : whether the mass stands in the nodes; the consistent mass is exact for rigid motions.
-    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``TL`` and ``DEF_LIM`` for the others if not given.
+    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``total_lagrangian`` and ``DEF_LIM`` for the others
+        if not given.
     damping : η in s.
 
     Raises
@@ -68,7 +70,7 @@ class FiniteElementBody(Deformable):
         mesh: Mesh,
         material: Material,
         *,
-        form: str = "TL",
+        formulation: str = "total_lagrangian",
         modes: int | None = None,
         lumped: bool = False,
         scheme: str | None = None,
@@ -86,25 +88,25 @@ class FiniteElementBody(Deformable):
         pattern = Pattern(mesh.n_nodes, [group.nodes for group in self.groups])
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
-        self.form = self._form(form, modes)
-        self.schemes = self.form.schemes  # type: ignore[misc]
+        self.formulation = self._formulation(formulation, modes)
+        self.schemes = self.formulation.schemes  # type: ignore[misc]
         self._located: dict[bytes, Located] = {}
         self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
         super().__init__(
             mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
         )
 
-    def _form(self, name: str, count: int | None) -> Form:
-        kind = FORMS[name]
+    def _formulation(self, name: str, count: int | None) -> Formulation:
+        kind = FORMULATIONS[name]
         if kind is not Modal and count is not None:
-            raise InputError(f"modes are for form='BC-MODAL'; got form={name!r}")
+            raise InputError(f"modes are for formulation='modal'; got formulation={name!r}")
         if kind is Modal:
             return Modal(self.points, self.groups, self._mass, 12 if count is None else count)
         return kind(self.points, self.groups, self._mass)
 
     def default_scheme(self) -> str:
-        """Return the most robust scheme that the form has."""
-        return self.form.schemes[0]
+        """Return the most robust scheme that the formulation has."""
+        return self.formulation.schemes[0]
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -132,10 +134,10 @@ class FiniteElementBody(Deformable):
         if X is self.points:
             return nodal.copy()
         points = points_of(X)
-        return np.asarray(self._locate(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
+        return np.asarray(self._in_mesh(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
 
-    def place(self, q: ArrayLike) -> None:
-        """Set the displacements (3n,) or (n, 3); see `Body.place`."""
+    def set_configuration(self, q: ArrayLike) -> None:
+        """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`."""
         q = finite(q, "a configuration")
         if q.shape not in ((self.dofs,), self.points.shape):
             raise InputError(f"a configuration of this body has shape ({self.dofs},); got {q.shape}")
@@ -148,8 +150,8 @@ class FiniteElementBody(Deformable):
                     raise InputError(f"these displacements turn element {element} inside out: det J ≤ 0")
         self.q = q.ravel().copy()
 
-    def turn(self, rotation: ArrayLike) -> None:
-        """Set q = (Λ - 1)(X - X̄) and leave the mass center where it is; see `Body.turn`."""
+    def rotate(self, rotation: ArrayLike) -> None:
+        """Set q = (Λ - 1)(X - X̄) and leave the mass center where it is; see `Body.rotate`."""
         R = fitting(check_rotation(rotation), (), 2, "a rotation")
         arms = self.points - self._shares @ self.points
         self.q = (arms @ R.T - arms + self._shares @ self.displacement).ravel()
@@ -161,14 +163,14 @@ class FiniteElementBody(Deformable):
         w = fitting(vector_of(angular, "an angular velocity"), (), 1, "an angular velocity")
         self.u = (v + np.cross(w, arms)).ravel()
 
-    def find(self, X: Array) -> None:
+    def locate(self, X: Array) -> None:
         """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
         points = np.atleast_2d(X)
-        located = self._locate(points)
+        located = self._in_mesh(points)
         for i, point in enumerate(points):
             self._known[point.tobytes()] = located.nodes_and_weights(i)
 
-    def _locate(self, points: Array) -> Located:
+    def _in_mesh(self, points: Array) -> Located:
         """Return where points (m, 3) lie in the mesh; the last sets asked for are kept."""
         key = points.tobytes()
         if key not in self._located:
@@ -180,30 +182,30 @@ class FiniteElementBody(Deformable):
     def _at(self, X: Array) -> tuple[NDArray[np.int64], Array]:
         """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
         if X.tobytes() not in self._known:
-            self.find(X)
+            self.locate(X)
         return self._known[X.tobytes()]
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return dofs of the nodes around X and H = N(X) 1; see `Body.rows`."""
+    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs of the nodes around X and H = N(X) 1; see `Body.jacobian`."""
         nodes, N = self._at(X)
         return (3 * nodes[:, None] + np.arange(3)).ravel(), (np.eye(3)[:, None] * N[:, None]).reshape(3, -1)
 
-    def push(self, X: Array, force: Array, q: Array) -> Array:
-        """Return N_a(X) f at the nodes; see `Body.push`."""
+    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
+        """Return N_a(X) f at the nodes; see `Body.generalized_force`."""
         nodes, N = self._at(X)
         out = np.zeros((len(self.points), 3))
         out[nodes] = N[:, None] * force
         return out.ravel()
 
-    def push_nodes(self, forces: Array, q: Array) -> Array:
-        """Return the nodal forces as (3n,); see `Body.push_nodes`."""
+    def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
+        """Return the nodal forces as (3n,); see `Body.generalized_nodal_force`."""
         return forces.ravel()
 
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `Body.convected`."""
-        located = self._locate(X[None])
+        located = self._in_mesh(X[None])
         block, nodes = self.mesh.blocks[int(located.block[0])], self._at(X)[0]
         assert block.shape is not None
         dN = block.shape.dN(located.xi[0])
@@ -217,43 +219,45 @@ class FiniteElementBody(Deformable):
     # ---- deformation -----------------------------------------------------------------------------
 
     def internal_load(self, q: Array | None = None) -> Array:
-        """Return the internal load of the form, (3n,) in N."""
-        return self.form.load(self.q if q is None else q)
+        """Return the internal load of the formulation, (3n,) in N."""
+        return self.formulation.load(self.q if q is None else q)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load over an increment dq, whose work is the change of strain energy.
 
         `damping` is the ratio η/h, which adds the viscous stress.
         """
-        return self.form.load_over(q, dq, damping)
+        return self.formulation.load_over(q, dq, damping)
 
     def internal_energy(self) -> float:
         """Return the strain energy in J."""
-        return self.form.energy(self.q)
+        return self.formulation.energy(self.q)
 
     def stiffness(self, q: Array | None = None) -> BlockMatrix:
         """Return the tangent (3n, 3n) of the internal load in N/m."""
-        return self.form.stiffness(self.q if q is None else q)
+        return self.formulation.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
         """Return K(q) u, the viscous load for η = 1."""
-        return self.form.damping_load(q, u)
+        return self.formulation.damping_load(q, u)
 
     def mass_solver(self) -> Solve:
-        """Return what solves M x = b, for motions that the form has."""
-        return self.form.solver(self.q, 0.0) if isinstance(self.form, Modal) else self._mass.solve
+        """Return what solves M x = b, for motions that the formulation has."""
+        return (
+            self.formulation.solver(self.q, 0.0) if isinstance(self.formulation, Modal) else self._mass.solve
+        )
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
-        return self.form.solver(q, c)
+        return self.formulation.solver(q, c)
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
-        return self.form.increment_solver(q, dq, damping, c)
+        return self.formulation.increment_solver(q, dq, damping, c)
 
     def highest_frequency(self) -> float:
         """Return an upper bound of the angular frequencies in rad/s: that of the worst element alone."""
-        return self.form.highest_frequency(self.q)
+        return self.formulation.highest_frequency(self.q)
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
         """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
@@ -263,8 +267,8 @@ class FiniteElementBody(Deformable):
         frequencies (count,) in rad/s, ascending; shapes (3n, count) with φ^T M φ = 1.  A body that nothing
         holds has its six rigid motions first.
         """
-        K, M = self.form.K0.scipy().tocsr(), self._mass.matrix()
-        held = [c.rows(self, np.zeros(self.dofs)) for c in self.constraints]
+        K, M = self.formulation.K0.scipy().tocsr(), self._mass.matrix()
+        held = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]
         if not held:
             return modes(K, M, count)
         T = allowed(np.concatenate(held))

@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.bodies.batched import together
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraint_projection import start
+from kratos_lite.bodies.constraint_projection import project_velocity
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
@@ -94,13 +94,15 @@ def _states(
     until: Callable[[State], bool] | None,
     progress: Progress | None,
 ) -> Iterator[State]:
-    if body.constraints and (body.marched is None or not np.array_equal(body.u, body.marched)):
-        start(body, h / parts)
+    if body.constraints and (
+        body.integrated_velocity is None or not np.array_equal(body.u, body.integrated_velocity)
+    ):
+        project_velocity(body, h / parts)
     done = 0
     while done < count:
         chunk = min(every - done % every, count - done)
         _advance(body, h, chunk, parts)
-        body.marched = body.u.copy() if body.constraints else None
+        body.integrated_velocity = body.u.copy() if body.constraints else None
         done += chunk
         if progress:
             progress("march", done / count)
@@ -172,7 +174,7 @@ def _step(body: Body, h: float, parts: int) -> None:
         load = take_step(body, h)
         body.external_work += h / 2 * ((before + body.u) * load).sum(axis=-1)
         if isinstance(body, FiniteElementBody):
-            body.q, body.u = body.form.project(body.q, body.u)
+            body.q, body.u = body.formulation.project(body.q, body.u)
     body.clock.time = start
 
 
@@ -188,5 +190,5 @@ def _advance_compiled(body: Body, h: float, count: int) -> bool:
         return False
     if not isinstance(body, (RigidBody, PseudoRigidBody)):
         return False
-    body.coast(h, count)
+    body.step_free(h, count)
     return True

@@ -105,8 +105,8 @@ class PseudoRigidBody(Deformable):
         x = A @ np.swapaxes(gradient_of(q), -1, -2) + q[..., None, 9:]
         return np.asarray(x if points.ndim == 2 else x[..., 0, :])
 
-    def place(self, q: ArrayLike) -> None:
-        """Set the configuration (..., 12); see `Body.place`."""
+    def set_configuration(self, q: ArrayLike) -> None:
+        """Set the configuration (..., 12); see `Body.set_configuration`."""
         q = finite(q, "a configuration")
         if q.shape != self.q.shape:
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
@@ -117,8 +117,8 @@ class PseudoRigidBody(Deformable):
             )
         self.q[...] = q
 
-    def turn(self, rotation: ArrayLike) -> None:
-        """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
+    def rotate(self, rotation: ArrayLike) -> None:
+        """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
         R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
         self.q[..., :9] = R.reshape(*R.shape[:-2], 9)
 
@@ -131,19 +131,19 @@ class PseudoRigidBody(Deformable):
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.rows`."""
+    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.jacobian`."""
         H = np.hstack([np.kron(np.eye(3), X - self.center), np.eye(3)])
         return np.arange(12), H
 
-    def push(self, X: Array, force: Array, q: Array) -> Array:
-        """Return f_i A_j row by row with A = X - X̄, and the force f; see `Body.push`."""
+    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
+        """Return f_i A_j row by row with A = X - X̄, and the force f; see `Body.generalized_force`."""
         f = np.broadcast_to(force, (*q.shape[:-1], 3))
         moment = f[..., :, None] * (X - self.center)[..., None, :]
         return np.concatenate([moment.reshape(*moment.shape[:-2], 9), f], axis=-1)
 
-    def push_nodes(self, forces: Array, q: Array) -> Array:
-        """Return Σ f_i A_j row by row and Σ f of nodal forces; see `Body.push_nodes`."""
+    def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
+        """Return Σ f_i A_j row by row and Σ f of nodal forces; see `Body.generalized_nodal_force`."""
         assert self.mesh is not None
         moment = forces.T @ (self.mesh.points - self.center[..., None, :])
         resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
@@ -193,7 +193,7 @@ class PseudoRigidBody(Deformable):
         """Return what solves M x = b; see `Body`."""
         return self.solver(self.q, 0.0)
 
-    def coast(self, h: float, count: int) -> None:
+    def step_free(self, h: float, count: int) -> None:
         """Take steps of h s under constant loads alone, all at once."""
         acceleration, spatial, _ = self.constant_loads()
         constant = (*self.step_constants(), acceleration, spatial)

@@ -109,16 +109,16 @@ class RigidBody(Body):
         points = points_of(X)
         return np.atleast_2d(points) - self.center[..., None, :], points.ndim == 2
 
-    def place(self, q: ArrayLike) -> None:
-        """Set the configuration (..., 12); see `Body.place`."""
+    def set_configuration(self, q: ArrayLike) -> None:
+        """Set the configuration (..., 12); see `Body.set_configuration`."""
         q = finite(q, "a configuration")
         if q.shape != self.q.shape:
             raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
         check_rotation(rotation(q), "the rotation of a configuration")
         self.q[...] = q
 
-    def turn(self, rotation: ArrayLike) -> None:
-        """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.turn`."""
+    def rotate(self, rotation: ArrayLike) -> None:
+        """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
         R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
         self.q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
 
@@ -131,18 +131,18 @@ class RigidBody(Body):
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def rows(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.rows`."""
+    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.jacobian`."""
         return np.arange(6), np.hstack([-rotation(q) @ hat(X - self.center), np.eye(3)])
 
-    def push(self, X: Array, force: Array, q: Array) -> Array:
-        """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.push`."""
+    def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
+        """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.generalized_force`."""
         f = np.broadcast_to(force, (*q.shape[:-1], 3))
         referential = (np.swapaxes(rotation(q), -1, -2) @ f[..., None])[..., 0]
         return np.concatenate([np.cross(X - self.center, referential), f], axis=-1)
 
-    def push_nodes(self, forces: Array, q: Array) -> Array:
-        """Return the resultant torque and force of nodal forces; see `Body.push_nodes`."""
+    def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
+        """Return the resultant torque and force of nodal forces; see `Body.generalized_nodal_force`."""
         assert self.mesh is not None
         A = self.mesh.points - self.center[..., None, :]
         moments = np.swapaxes(A, -1, -2) @ (forces @ rotation(q))
@@ -158,7 +158,7 @@ class RigidBody(Body):
         spin = (self.mass_properties.inertia @ v[..., :3, None])[..., 0]
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
-    def coast(self, h: float, count: int) -> None:
+    def step_free(self, h: float, count: int) -> None:
         """Take steps of h s under constant loads alone, all at once."""
         constant = (*self.step_constants(), *self.constant_loads())
         steps.rigid_steps(
@@ -232,8 +232,8 @@ class Obstacle(RigidBody):
         """Return 0: an obstacle carries no mass."""
         return np.zeros_like(self.mass_properties.mass)
 
-    def coast(self, h: float, count: int) -> None:
-        """Move on with the velocity as it is; see `RigidBody.coast`."""
+    def step_free(self, h: float, count: int) -> None:
+        """Move on with the velocity as it is; see `RigidBody.step_free`."""
         for _ in range(count):
             self.q[...] = steps.rigid_half(self.q, self.u, 2 * h)
 
@@ -241,7 +241,7 @@ class Obstacle(RigidBody):
         """Return zeros."""
         return np.zeros_like(v)
 
-    def add(self, load: object, factor: object = 1.0) -> None:
+    def add(self, load: object, amplitude: object = 1.0) -> None:
         """Raise ModelError: nothing pushes an obstacle."""
         raise ModelError(
             "nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody"

@@ -16,7 +16,7 @@ import numpy as np
 
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraint_projection import Solve, Step, close
+from kratos_lite.bodies.constraint_projection import Solve, Step, constrained_step
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import RigidBody
@@ -39,7 +39,7 @@ def rigid_step(body: RigidBody, h: float, v: Array) -> Array:
         steps.rigid_finish(q, u, qh, load + extra, *body.step_constants(), h, body.scheme, body.tolerance)
         return Step(q, u, load)
 
-    return close(body, h, qh, advance, lambda: body.apart)
+    return constrained_step(body, h, qh, advance, lambda: body.apart)
 
 
 def pseudo_rigid_step(body: PseudoRigidBody, h: float, v: Array) -> Array:
@@ -53,7 +53,7 @@ def pseudo_rigid_step(body: PseudoRigidBody, h: float, v: Array) -> Array:
         steps.pseudo_finish(q, u, load + extra, *body.step_constants(), h, body.scheme, body.tolerance)
         return Step(q, u, load)
 
-    return close(body, h, qh, advance, lambda: body.solver(qh, c))
+    return constrained_step(body, h, qh, advance, lambda: body.solver(qh, c))
 
 
 def explicit_step(body: FiniteElementBody, h: float, v: Array) -> Array:
@@ -77,7 +77,7 @@ def _kick(body: FiniteElementBody, h: float, v: Array, qh: Array, solve: Solve) 
         u = body.u + h * solve(force + extra)
         return Step(qh + h / 2 * u, u, load)
 
-    return close(body, h, qh, advance, lambda: solve)
+    return constrained_step(body, h, qh, advance, lambda: solve)
 
 
 def energy_momentum_step(body: FiniteElementBody, h: float, v: Array) -> Array:
@@ -92,7 +92,7 @@ def energy_momentum_step(body: FiniteElementBody, h: float, v: Array) -> Array:
         u, load = _balanced(body, h, v, extra, solve)
         return Step(body.q + h / 2 * (body.u + u), u, load)
 
-    return close(body, h, middle, advance, lambda: solve)
+    return constrained_step(body, h, middle, advance, lambda: solve)
 
 
 def _balanced(

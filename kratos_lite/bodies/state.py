@@ -62,7 +62,7 @@ class State:
             )
         body.q[...], body.u[...] = self.q, self.u  # bodies that advance together share these arrays
         body.time, body.step = self.time, self.step
-        body.marched = self.u.copy() if self.step else None
+        body.integrated_velocity = self.u.copy() if self.step else None
         body.external_work[...] = self.external_work
 
     def save(self, path: str | Path) -> None:

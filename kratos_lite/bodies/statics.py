@@ -26,7 +26,7 @@ UNBALANCED = 1e-8
 """Share of the loads that may be left over."""
 
 
-def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
+def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     """Bring a deformable body to rest under its loads and constraints at its time.
 
     The configuration becomes that of equilibrium, the velocity zero; constraints know their reactions.
@@ -52,27 +52,28 @@ def equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     --------
     >>> import kratos_lite as kl
     >>> mesh = kl.box(cells=(2, 2, 2))
-    >>> body = kl.FiniteElementBody(mesh, kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0), form="BC")
+    >>> steel = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+    >>> body = kl.FiniteElementBody(mesh, steel, formulation="corotational")
     >>> for side, axis in (("x-", 0), ("x+", 0), ("y-", 1), ("y+", 1), ("z-", 2)):
     ...     body.constrain(kl.FixDirection(mesh.points[mesh.nodes(side)], [axis == k for k in range(3)]))
     >>> body.add(kl.Gravity((0, 0, -9.81)))
-    >>> iterations = equilibrium(body)
+    >>> iterations = find_equilibrium(body)
     >>> print(f"{body.displacement[:, 2].min():.6e} m")
     -1.322148e-04 m
     """
     if not isinstance(body, Deformable) or body.q.ndim > 1:
-        raise ModelError(f"equilibrium is for a single deformable body; got {body!r}")
+        raise ModelError(f"find_equilibrium is for a single deformable body; got {body!r}")
     for constraint in body.constraints:
         if not constraint.positional:
             raise ModelError(
-                f"a {type(constraint).__name__} says nothing of a body at rest; use SetDisplacement"
+                f"a {type(constraint).__name__} says nothing of a body at rest; use PrescribedDisplacement"
             )
     start = body.q.copy()
     for count in INCREMENTS:
         body.q = start.copy()
         try:
             iterations = sum(_increment(body, start, k / count, progress) for k in range(1, count + 1))
-            body.place(body.q)  # Newton may end at a shape that is turned inside out
+            body.set_configuration(body.q)  # Newton may end at a shape that is turned inside out
         except (SolveError, InputError, np.linalg.LinAlgError) as error:
             failed = error
             continue
@@ -123,7 +124,7 @@ def _entries(body: Deformable) -> tuple[Ints, Ints, Array]:
     none = np.zeros(0, dtype=np.int64)
     parts, at = [(none, none, np.zeros(0))], 0
     for constraint in body.constraints:
-        row, dof, value = constraint.entries(body, body.q)
+        row, dof, value = constraint.jacobian_entries(body, body.q)
         parts.append((row + at, dof, value))
         at += constraint.count
     row, dof, value = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -192,8 +193,8 @@ def _balance(body: Deformable, share: float, multipliers: Array) -> None:
     reaction, at = np.zeros_like(body.q), 0
     for constraint in body.constraints:
         own = multipliers[at : at + constraint.count]
-        constraint.react(body, body.q, own)
-        row, dof, value = constraint.entries(body, body.q)
+        constraint.set_reactions(body, body.q, own)
+        row, dof, value = constraint.jacobian_entries(body, body.q)
         np.add.at(reaction, dof, own[row] * value)
         at += constraint.count
     load, inner = share * body.external_load(body.q), body.internal_load(body.q)

@@ -1,10 +1,15 @@
-"""Strict JSON: every mistake is an error with its line and column, and every key knows its place."""
+"""JSON files: strict, with comments, and with the line and column of every key and every mistake.
+
+Python's own reader gives the values.  A walk over the words adds what it does not tell: where the keys
+stand, and what it accepts beyond the standard.
+"""
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from bisect import bisect_right
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +20,9 @@ MAX_DEPTH = 64
 """Deepest nesting of objects and lists."""
 MAX_DIGITS = 19
 """Longest integer; more digits do not fit into 64 bits."""
-_SPACE = re.compile(r"(?:[ \t\n\r]+|//[^\n]*|/\*.*?\*/)*", re.DOTALL)
-_STRING = re.compile(r'"(?:[^"\\\x00-\x1f]|\\.)*"')
+_COMMENT = re.compile(r'"(?:[^"\\\n]|\\.)*"|//[^\n]*|/\*.*?(?:\*/|(\Z))', re.DOTALL)
+_TOKEN = re.compile(r'(?P<string>"(?:[^"\\\x00-\x1f]|\\.)*")(?P<colon>\s*:)?|["{}\[\],]|[-+\w.]+')
 _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_WORD = re.compile(r"[-+\w.]+")
-_CONSTANTS = {"true": True, "false": False, "null": None}
 
 
 class Object(dict[str, Any]):
@@ -64,139 +67,126 @@ def parse_json(text: str, source: str = "") -> Any:
     >>> parse_json('{"E": 2.1e11, "free": [null, 1]}  // steel')
     {'E': 210000000000.0, 'free': [None, 1]}
     """
-    reader = _Reader(text, source)
-    value = reader.value(1)
-    if reader.skip():
-        raise reader.error(f"{reader.shown()} after the end of the JSON value; remove it")
-    return value
+    return _Text(text, source).value()
 
 
-class _Reader:
-    """Recursive descent; the limit on nesting keeps the recursion short."""
+class _Text:
+    """A JSON text without its comments."""
 
     def __init__(self, text: str, source: str) -> None:
-        self.text, self.source, self.at = text, source, 0
+        self.source = source
         self.starts = [0, *(m.end() for m in re.finditer("\n", text))]
+        self.text = _COMMENT.sub(self._blank, text)
 
     def place(self, at: int) -> tuple[int, int]:
         line = bisect_right(self.starts, at)
         return line, at - self.starts[line - 1] + 1
 
-    def error(self, message: str, at: int | None = None) -> InputError:
-        line, column = self.place(self.at if at is None else at)
+    def error(self, at: int, message: str) -> InputError:
+        line, column = self.place(at)
         return InputError(f"{self.source}:{line}:{column}: {message}")
 
-    def shown(self) -> str:
-        """Return what stands here for a message, shortened."""
-        if self.at >= len(self.text):
-            return "end of file"
-        word = _WORD.match(self.text, self.at)
-        return repr(word.group()[:20] if word else self.text[self.at])
+    def _blank(self, match: re.Match[str]) -> str:
+        """Blank a comment, keeping its length and line ends; keep a string as it is."""
+        if match.group(1) is not None:
+            raise self.error(match.start(), "comment '/*' is never closed; add '*/'")
+        word = match.group()
+        return word if word[0] == '"' else re.sub(r"[^\n]", " ", word)
 
-    def skip(self) -> str:
-        """Skip blanks and comments; return the next character, or an empty string at the end."""
-        match = _SPACE.match(self.text, self.at)
-        self.at = match.end() if match else self.at
-        if self.text.startswith("/*", self.at):
-            raise self.error("comment '/*' is never closed; add '*/'")
-        return self.text[self.at : self.at + 1]
+    def value(self) -> Any:
+        objects = iter(self._walk(len(self.text))[0])
 
-    def value(self, depth: int) -> Any:
-        first = self.skip()
-        if depth > MAX_DEPTH and first in ("{", "["):
-            raise self.error(f"nesting deeper than {MAX_DEPTH}; flatten the file")
-        if first == "{":
+        def make(pairs: list[tuple[str, Any]]) -> Object:
             found = Object()
-            self._items("}", lambda: self._member(found, depth))
+            for (key, value), at in zip(pairs, next(objects), strict=True):
+                if key in found:
+                    line, _ = found.places[key]
+                    raise self.error(at, f"duplicate key {key!r}, first given in line {line}; keep one")
+                found[key], found.places[key] = value, self.place(at)
             return found
-        if first == "[":
-            entries: list[Any] = []
-            self._items("]", lambda: entries.append(self.value(depth + 1)))
-            return entries
-        if first == '"':
-            return self._string()
-        if first == "-" or "0" <= first <= "9":
-            return self._number()
-        return self._constant()
 
-    def _items(self, close: str, read: Callable[[], None]) -> None:
-        """Read comma-separated items up to the closing bracket."""
-        opened = self.at
-        self.at += 1
-        after_comma = False
-        while True:
-            mark = self.skip()
-            if mark == close:
-                if after_comma:
-                    raise self.error(f"trailing comma before {close!r}; remove the comma")
-                break
-            read()
-            mark = self.skip()
-            after_comma = mark == ","
-            if after_comma:
-                self.at += 1
-            elif mark != close:
-                line, _ = self.place(opened)
-                raise self.error(f"{self.shown()} where ',' or {close!r} is expected (opened in line {line})")
-        self.at += 1
+        try:
+            return json.loads(self.text, object_pairs_hook=make)
+        except json.JSONDecodeError as error:
+            raise self.error(error.pos, self._explained(error.msg, error.pos)) from None
 
-    def _member(self, found: Object, depth: int) -> None:
-        start = self.at
-        if self.text[start : start + 1] != '"':
-            raise self.error(f'{self.shown()} where a key in double quotes is expected, as in "model": …')
-        key = self._string()
-        if key in found:
-            line, _ = found.places[key]
-            raise self.error(f"duplicate key {key!r}, first given in line {line}; keep one", start)
-        if self.skip() != ":":
-            raise self.error(f"{self.shown()} where ':' after the key {key!r} is expected")
-        self.at += 1
-        found.places[key] = self.place(start)
-        found[key] = self.value(depth + 1)
+    def _refuse(self, at: int, message: str) -> InputError:
+        """Return the error of the walk, or of what Python's reader finds wrong before it."""
+        try:
+            json.loads(self.text[:at])
+        except json.JSONDecodeError as error:
+            if self.text[error.pos : at].strip():
+                return self.error(error.pos, self._explained(error.msg, error.pos))
+        return self.error(at, message)
 
-    def _string(self) -> str:
-        match = _STRING.match(self.text, self.at)
-        if match is None:
-            raise self.error("string without its closing quote on the same line; add '\"'")
-        token = match.group()
-        text = token[1:-1]
-        if "\\" in token:
-            import json
+    def _walk(self, end: int) -> tuple[list[list[int]], list[int], str]:
+        """Return where the keys of each object stand, in the order in which the objects close.
 
-            try:
-                text = str(json.loads(token))
-                text.encode("utf-8")
-            except (ValueError, UnicodeEncodeError):
-                raise self.error(
-                    f"string {token[:40]} has an invalid escape; write \\\\ for a backslash"
-                ) from None
-        self.at = match.end()
-        return text
+        Also what is open at the end, and the last word before it.  Refuse what Python's reader accepts.
+        """
+        closed: list[list[int]] = []
+        opened: list[tuple[int, list[int]]] = []
+        before = word = ""
+        for match in _TOKEN.finditer(self.text, 0, end):
+            before, word, at = word, match.group(), match.start()
+            if word in ("{", "["):
+                opened.append((at, []))
+                if len(opened) > MAX_DEPTH:
+                    raise self._refuse(at, f"nesting deeper than {MAX_DEPTH}; flatten the file")
+            elif word in ("}", "]"):
+                if before == ",":
+                    raise self._refuse(at, f"trailing comma before {word!r}; remove the comma")
+                keys = opened.pop()[1] if opened else []
+                closed += [keys] if word == "}" else []
+            elif problem := _problem(match):
+                raise self._refuse(at, problem)
+            elif match.group("colon") and opened:
+                opened[-1][1].append(at)
+        return closed, [at for at, _ in opened], word
 
-    def _number(self) -> int | float:
-        match = _NUMBER.match(self.text, self.at)
-        word = _WORD.match(self.text, self.at)
-        if match is None or word is None or word.end() != match.end():
-            raise self.error(f"{self.shown()} is not a number in JSON; write it like -1.5e-3")
-        token = match.group()
-        if match.group(1) is None and match.group(2) is None:
-            digits = len(token.lstrip("-"))
-            if digits > MAX_DIGITS:
-                raise self.error(f"integer of {digits} digits is too long; at most {MAX_DIGITS} digits")
-            value: int | float = int(token)
-        else:
-            value = float(token)
-            if value in (float("inf"), float("-inf")):
-                raise self.error(f"{token[:20]} is too large for a number; at most 1.79e308")
-        self.at = match.end()
-        return value
+    def _explained(self, message: str, at: int) -> str:
+        """Return what Python's reader found wrong in words of our own."""
+        _, opened, last = self._walk(at)
+        found = _TOKEN.match(self.text, at)
+        shown = repr(found.group()[:20] if found else self.text[at]) if at < len(self.text) else "end of file"
+        if message == "Extra data":
+            return f"{shown} after the end of the JSON value; remove it"
+        if message.startswith("Expecting property name"):
+            return f'{shown} where a key in double quotes is expected, as in "model": …'
+        if message.startswith("Expecting ':'"):
+            return f"{shown} where ':' after the key {last[1:-1]!r} is expected"
+        if message.startswith("Expecting ','"):
+            close = "]" if self.text[opened[-1]] == "[" else "}"
+            line, _ = self.place(opened[-1])
+            return f"{shown} where ',' or {close!r} is expected (opened in line {line})"
+        return f"{shown} where a value is expected; strings need double quotes"
 
-    def _constant(self) -> bool | None:
-        word = _WORD.match(self.text, self.at)
-        token = word.group() if word else ""
-        if word and token in _CONSTANTS:
-            self.at = word.end()
-            return _CONSTANTS[token]
-        if token.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-            raise self.error(f"{token} is not a number in JSON; write a finite number, or leave the key out")
-        raise self.error(f"{self.shown()} where a value is expected; strings need double quotes")
+
+def _problem(match: re.Match[str]) -> str:
+    """Return what is wrong with a string or a number that Python's reader takes, or would cut short."""
+    word = match.group()
+    if word[0] == '"':
+        return _string_problem(match.group("string"))
+    if word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+        return f"{word[:20]} is not a number in JSON; write a finite number, or leave the key out"
+    return _number_problem(word) if word[0] == "-" or word[0].isdigit() else ""
+
+
+def _string_problem(word: str | None) -> str:
+    if word is None:
+        return "string without its closing quote on the same line; add '\"'"
+    try:
+        if "\\" in word:
+            json.loads(word).encode("utf-8")
+    except ValueError:
+        return f"string {word[:40]} has an invalid escape; write \\\\ for a backslash"
+    return ""
+
+
+def _number_problem(word: str) -> str:
+    number, digits = _NUMBER.fullmatch(word), len(word.lstrip("-"))
+    if number is None:
+        return f"{word[:20]!r} is not a number in JSON; write it like -1.5e-3"
+    if not number[1] and not number[2] and digits > MAX_DIGITS:
+        return f"integer of {digits} digits is too long; at most {MAX_DIGITS} digits"
+    return f"{word[:20]} is too large for a number; at most 1.79e308" if math.isinf(float(word)) else ""

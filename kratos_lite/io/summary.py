@@ -18,9 +18,9 @@ def line(name: str, value: str) -> str:
 def body_lines(scene: BodyScene) -> list[str]:
     """Return the lines that say what the body of a scene is."""
     body = scene.body
-    form = f" {body.form.name}" if isinstance(body, FiniteElementBody) else ""
+    formulation = f" {body.formulation.name}" if isinstance(body, FiniteElementBody) else ""
     many = f"{len(body.q)} × " if body.q.ndim > 1 else ""
-    lines = [line("body", f"{many}{body.kind}{form}, {body.dofs} velocities, {body.scheme}")]
+    lines = [line("body", f"{many}{body.kind}{formulation}, {body.dofs} velocities, {body.scheme}")]
     if body.mesh is not None:
         elements = ", ".join(f"{len(block)} {block.name}" for block in body.mesh.blocks if len(block))
         lines.append(line("mesh", f"{body.mesh.n_nodes} nodes, {elements}"))
@@ -28,7 +28,7 @@ def body_lines(scene: BodyScene) -> list[str]:
         lines.append(line("mass", f"{float(body.mass):.7g} kg"))
     if isinstance(body, Deformable) and body.damping:
         lines.append(line("damping", f"{body.damping:g} s"))
-    return lines + [line("doubtful", doubt) for doubt in body.doubts()]
+    return lines + [line("doubtful", warning) for warning in body.warnings()]
 
 
 def describe_scene(scene: BodyScene) -> str:

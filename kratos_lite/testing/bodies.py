@@ -59,7 +59,7 @@ def check_body(kind: type[Body]) -> list[Finding]:
 
 def _moving(make: Make) -> Body:
     body = make()
-    body.turn(TURN)
+    body.rotate(TURN)
     body.set_velocity(FLIGHT, SPIN)
     return body
 
@@ -68,7 +68,7 @@ def _stirred(make: Make) -> Body:
     """Return a body with a velocity without symmetry, and so a configuration if it deforms."""
     body, rng = _moving(make), np.random.default_rng(0)
     if isinstance(body, Deformable):
-        body.place(body.q + 0.01 * rng.uniform(-1, 1, body.q.shape))
+        body.set_configuration(body.q + 0.01 * rng.uniform(-1, 1, body.q.shape))
     body.u[...] = rng.uniform(-1, 1, body.u.shape)
     return body
 
@@ -115,11 +115,13 @@ def conjugacy(make: Make) -> Measured:
     body, error = _stirred(make), 0.0
     forces = np.random.default_rng(2).uniform(-1, 1, (5, 3))
     for X, f in zip(_points(body), forces, strict=True):
-        dofs, H = body.rows(X, body.q)
+        dofs, H = body.jacobian(X, body.q)
         v = body.velocity(X)
-        power = float(body.push(X, f, body.q) @ body.u)
+        power = float(body.generalized_force(X, f, body.q) @ body.u)
         error = max(error, abs(power - f @ v) / np.linalg.norm(v), difference(H @ body.u[dofs], v))
-    return Measured(error, 1e-12, "push(X, f) · u, or rows(X) u, is not what velocity(X) says")
+    return Measured(
+        error, 1e-12, "generalized_force(X, f) · u, or jacobian(X) u, is not what velocity(X) says"
+    )
 
 
 def free_flight(make: Make) -> Measured:
@@ -138,7 +140,7 @@ def free_flight(make: Make) -> Measured:
 def rigid_motions(make: Make) -> Measured:
     """Check that a rotation needs no load and stores no energy."""
     body = make()
-    body.turn(TURN)
+    body.rotate(TURN)
     moved = _stirred(make)
     scale = float(np.abs(moved.internal_load()).max())
     load = float(np.abs(body.internal_load()).max()) / scale
@@ -170,7 +172,7 @@ def energy(make: Make) -> Measured:
     q, v, h = body.q.copy(), body.u.copy(), 1e-5
     slope, energies = float(body.internal_load() @ v), []
     for side in (1, -1):
-        body.place(q + side * h * v)
+        body.set_configuration(q + side * h * v)
         energies.append(float(body.internal_energy()))
     numeric = (energies[0] - energies[1]) / (2 * h)
     return Measured(

@@ -121,19 +121,19 @@ def test_a_scheme_of_another_kind(kind, scheme, words, refused):
     refused(body_of(kind), lambda body: setattr(body, "scheme", scheme), kl.InputError, words)
 
 
-@pytest.mark.parametrize("form", ["BC", "BC-MODAL"])
-def test_energy_momentum_is_for_the_total_lagrangian_form(form):
+@pytest.mark.parametrize("formulation", ["corotational", "modal"])
+def test_energy_momentum_is_for_the_total_lagrangian_formulation(formulation):
     with pytest.raises(kl.InputError, match="schemes of a finite-element body are DEF_LIM, DEF_EXP"):
-        body_of(kl.FiniteElementBody, form=form, scheme="ENERGY_MOMENTUM")
+        body_of(kl.FiniteElementBody, formulation=formulation, scheme="ENERGY_MOMENTUM")
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"form": "TLL"}, "(?s)form of a finite-element body.*TLL"),
-        ({"modes": 9}, "modes are for form='BC-MODAL'"),
-        ({"form": "BC-MODAL", "modes": 5}, "modes must be at least 6"),
-        ({"form": "BC-MODAL", "modes": 99}, r"1 … 24 modes; got 99"),
+        ({"formulation": "TLL"}, "(?s)formulation of a finite-element body.*TLL"),
+        ({"modes": 9}, "modes are for formulation='modal'"),
+        ({"formulation": "modal", "modes": 5}, "modes must be at least 6"),
+        ({"formulation": "modal", "modes": 99}, r"1 … 24 modes; got 99"),
         ({"damping": -1.0}, "a damping must be one number of seconds, ≥ 0"),
         ({"damping": NAN}, "a damping"),
         ({"damping": [0.1, 0.2]}, "a damping"),
@@ -164,13 +164,13 @@ def test_options_that_make_no_sense(options, words):
     ],
 )
 def test_a_configuration_that_is_none(kind, q, words, refused):
-    refused(body_of(kind), lambda body: body.place(q), kl.InputError, words)
+    refused(body_of(kind), lambda body: body.set_configuration(q), kl.InputError, words)
 
 
 def test_a_rotation_that_is_none(refused):
     body = body_of(kl.RigidBody)
     for R in (2 * np.eye(3), np.diag([1.0, 1, -1]), np.full((3, 3), NAN), np.eye(2)):
-        refused(body, lambda body, R=R: body.turn(R), kl.InputError, "rotation")
+        refused(body, lambda body, R=R: body.rotate(R), kl.InputError, "rotation")
 
 
 @each_kind
@@ -227,10 +227,12 @@ def test_loads_that_are_refused(kind, load, error, words, refused):
     refused(body_of(kind), lambda body: body.add(load()), error, words)
 
 
-@pytest.mark.parametrize("factor", [NAN, "big", [1.0, 2.0], None])
-def test_factors_that_are_refused(factor, refused):
+@pytest.mark.parametrize("amplitude", [NAN, "big", [1.0, 2.0], None])
+def test_amplitudes_that_are_refused(amplitude, refused):
     body = body_of(kl.RigidBody)
-    refused(body, lambda body: body.add(kl.Gravity((0, 0, 1)), factor), kl.InputError, "factor of a load")
+    refused(
+        body, lambda body: body.add(kl.Gravity((0, 0, 1)), amplitude), kl.InputError, "amplitude of a load"
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])
@@ -305,9 +307,9 @@ def test_series_that_are_none(times, values, words):
         (lambda: kl.FixPoint((0, NAN, 0)), kl.InputError, "material points"),
         (lambda: kl.FixDirection((0, 0, 0), (0, 0, 0)), kl.InputError, "a direction needs three components"),
         (lambda: kl.FixDirection((0, 0, 0), (0, NAN, 0)), kl.InputError, "a direction must be finite"),
-        (lambda: kl.SetVelocity((0, 0, 0), (1, 0, 0), NAN), kl.InputError, "a velocity"),
-        (lambda: kl.SetDisplacement((0, 0, 0), (1, 0, 0), "up"), kl.InputError, "a displacement"),
-        (lambda: kl.SetAcceleration((0, 0, 0), (1, 0, 0), [1, 2]), kl.InputError, "an acceleration"),
+        (lambda: kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), NAN), kl.InputError, "a velocity"),
+        (lambda: kl.PrescribedDisplacement((0, 0, 0), (1, 0, 0), "up"), kl.InputError, "a displacement"),
+        (lambda: kl.PrescribedAcceleration((0, 0, 0), (1, 0, 0), [1, 2]), kl.InputError, "an acceleration"),
         (lambda: kl.RigidLink((0, 0, 0), (0, 0, 0)), kl.InputError, "a rigid link needs a length"),
         (lambda: kl.RigidLink([[0, 0, 0]], (1, 0, 0)), kl.InputError, r"one point \(3,\) is needed"),
         (lambda: kl.RigidLink((9, 0, 0), (1, 0, 0)), kl.MeshError, "outside the mesh"),
@@ -338,7 +340,7 @@ def test_units_that_may_be_wrong_are_told(kind, E, density, speed, caplog):
         assert not caplog.records
         return
     assert re.search(f"is {speed} in Isotropic3D.* E in Pa and the density in kg/m³", caplog.messages[0])
-    assert body.doubts() == caplog.messages
+    assert body.warnings() == caplog.messages
 
 
 @pytest.mark.parametrize(("E", "density"), [(1e3, 1000.0), (1050e9, 3510.0), (1.0, 0.0)])  # jelly, diamond
@@ -363,8 +365,8 @@ def test_many_bodies_take_no_constraint(refused):
 def test_constraints_that_contradict_each_other(kind, refused):
     body = body_of(kind)
     body.set_velocity()
-    body.constrain(kl.SetVelocity((0, 0, 0), (1, 0, 0), 1.0))
-    body.constrain(kl.SetVelocity((0, 0, 0), (1, 0, 0), 2.0))
+    body.constrain(kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), 1.0))
+    body.constrain(kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), 2.0))
     refused(body, lambda body: list(kl.march(body, 1e-3, 2)), kl.SolveError, "they contradict each other")
 
 
@@ -429,3 +431,9 @@ def test_a_motion_that_blows_up_stops(kind, scheme):
         np.errstate(all="ignore"),
     ):
         list(kl.march(body, 1.0, 5))
+
+
+def test_the_acronyms_of_solfec_name_the_same_formulations():
+    for acronym, word in (("TL", "total_lagrangian"), ("BC", "corotational"), ("BC-MODAL", "modal")):
+        body = kl.FiniteElementBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1.0), formulation=acronym)
+        assert body.formulation.name == word

@@ -49,10 +49,10 @@ def test_there_and_back_is_the_same(kind, between, brick):
 
 def test_a_turned_rigid_body_becomes_turned_elements(brick):
     body = brick(kl.RigidBody)
-    body.turn(exp([0.5, 1.5, -0.7]))
+    body.rotate(exp([0.5, 1.5, -0.7]))
     body.set_velocity(FLIGHT, SPIN)
-    soft = kl.convert(body, kl.FiniteElementBody, form="BC", damping=1e-3)
-    assert (soft.form.name, soft.damping) == ("BC", 1e-3)
+    soft = kl.convert(body, kl.FiniteElementBody, formulation="corotational", damping=1e-3)
+    assert (soft.formulation.name, soft.damping) == ("corotational", 1e-3)
     X = body.mesh.points
     np.testing.assert_allclose(soft.position(X), body.position(X), atol=1e-14)
     np.testing.assert_allclose(soft.velocity(X), body.velocity(X), atol=1e-13)
@@ -64,7 +64,7 @@ def test_what_elements_do_beyond_an_affine_motion_is_left_out(brick):
     """The nearest affine motion with respect to mass: its rest carries no momentum and no moment."""
     rng = np.random.default_rng(2)
     body = brick(cells=(2, 2, 2))
-    body.place(0.02 * rng.uniform(-1, 1, body.q.shape))
+    body.set_configuration(0.02 * rng.uniform(-1, 1, body.q.shape))
     body.u[...] = rng.uniform(-1, 1, body.u.shape)
     whole = kl.convert(body, kl.PseudoRigidBody)
     X = body.points

@@ -151,13 +151,13 @@ def test_consistent_mass_is_exact_for_rigid_motion(cells, scheme, brick, drift):
     assert total(body) == pytest.approx(energy, rel=1e-12 if scheme == "ENERGY_MOMENTUM" else 3e-4)
 
 
-@pytest.mark.parametrize("form", ["BC", "BC-MODAL"])
-def test_corotational_forms_follow_the_total_lagrangian_one_for_small_strains(form, brick):
+@pytest.mark.parametrize("formulation", ["corotational", "modal"])
+def test_corotational_formulations_follow_the_total_lagrangian_one_for_small_strains(formulation, brick):
     """A stiffer box at a moderate spin: strains of 1e-4."""
     spin = np.array([0.3, 2.0, 0.4])
     one, other = brick(E=1e7, cells=(2, 2, 2), scheme="DEF_LIM"), None
-    options = {"modes": 81} if form == "BC-MODAL" else {}
-    other = brick(E=1e7, cells=(2, 2, 2), scheme="DEF_LIM", form=form, **options)
+    options = {"modes": 81} if formulation == "modal" else {}
+    other = brick(E=1e7, cells=(2, 2, 2), scheme="DEF_LIM", formulation=formulation, **options)
     for body in (one, other):
         body.set_velocity(FLIGHT, spin)
         end(body, 5e-3, 60)
@@ -171,8 +171,8 @@ def test_corotational_forms_follow_the_total_lagrangian_one_for_small_strains(fo
 @pytest.mark.parametrize("scheme", ["DEF_EXP", "DEF_LIM"])
 def test_all_modes_are_the_corotational_form(scheme, brick):
     bodies = [
-        brick(E=1e6, cells=(1, 1, 2), scheme=scheme, form="BC"),
-        brick(E=1e6, cells=(1, 1, 2), scheme=scheme, form="BC-MODAL", modes=36),
+        brick(E=1e6, cells=(1, 1, 2), scheme=scheme, formulation="corotational"),
+        brick(E=1e6, cells=(1, 1, 2), scheme=scheme, formulation="modal", modes=36),
     ]
     for body in bodies:
         body.set_velocity(FLIGHT, SPIN)
@@ -184,7 +184,7 @@ def test_all_modes_are_the_corotational_form(scheme, brick):
 
 @pytest.mark.parametrize("modes", [6, 9, 12])
 def test_few_modes_leave_rigid_motion_exact(modes, brick, drift):
-    body = brick(E=1e9, cells=(2, 2, 3), form="BC-MODAL", modes=modes)
+    body = brick(E=1e9, cells=(2, 2, 3), formulation="modal", modes=modes)
     body.set_velocity(FLIGHT, SPIN)
     np.testing.assert_allclose(body.angular_momentum(), MOMENTUM, rtol=1e-10)
     p, start = body.linear_momentum(), float(body.kinetic_energy())
@@ -309,7 +309,7 @@ def test_stiffness_and_lumped_mass_of_single_elements(name):
     if name.endswith("5N"):
         X = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]])
     body = one_element(name, X, lumped=True)
-    K = body.form.K0.scipy().toarray()
+    K = body.formulation.K0.scipy().toarray()
     values = np.linalg.eigvalsh(K)
     assert np.abs(values[:6]).max() < 1e-14
     np.testing.assert_allclose(values[6:], PARENTS[name], rtol=2e-8)
@@ -321,7 +321,9 @@ def test_stiffness_and_lumped_mass_of_single_elements(name):
 @pytest.mark.parametrize("name", PARENTS)
 def test_the_stiffness_of_a_body_at_rest_is_that_of_small_strains(name):
     body = one_element(name, ELEMENTS[name].nodes)
-    np.testing.assert_allclose(body.stiffness().scipy().toarray(), body.form.K0.scipy().toarray(), atol=1e-14)
+    np.testing.assert_allclose(
+        body.stiffness().scipy().toarray(), body.formulation.K0.scipy().toarray(), atol=1e-14
+    )
 
 
 def unit_cube(n, name="KinematicLinear3D8N", **options):
@@ -400,7 +402,7 @@ def confined(n, lumped):
     held = np.column_stack([x[:, 0] >= 0, x[:, 1] >= 0, x[:, 2] == 0])
     held[:, 0] &= (x[:, 0] == 0) | (x[:, 0] == 1)
     held[:, 1] &= (x[:, 1] == 0) | (x[:, 1] == 1)
-    K, M = body.form.K0.scipy().toarray(), body._mass.matrix().toarray()
+    K, M = body.formulation.K0.scipy().toarray(), body._mass.matrix().toarray()
     return body, ~held.ravel(), K, M
 
 
@@ -436,7 +438,7 @@ def test_the_confined_column_swings_with_that_frequency(scheme, lumped):
     omega = n * c * (2 * np.sin(kh / 2) if lumped else np.sqrt(6 * (1 - np.cos(kh)) / (2 + np.cos(kh))))
     q = np.zeros_like(body.points)
     q[:, 2] = size * np.sin(np.pi / 2 * body.points[:, 2])
-    body.place(q)
+    body.set_configuration(q)
     for constraint in body.constraints:
         constraint.bind(body)
     top = int(np.argmax(body.points.sum(axis=1)))
@@ -457,16 +459,16 @@ def elongations(body, q):
 
 
 @pytest.mark.parametrize(
-    ("form", "h", "low", "high", "longest"),
+    ("formulation", "h", "low", "high", "longest"),
     [
-        ("TL", 1 / 64, 3.30957, 3.31503, 7.038e-4),
-        ("BC", 1 / 64, 3.30955, 3.31503, 7.035e-4),
-        ("BC", 1 / 256, 3.30992, 3.31500, 6.542e-4),
+        ("total_lagrangian", 1 / 64, 3.30957, 3.31503, 7.038e-4),
+        ("corotational", 1 / 64, 3.30955, 3.31503, 7.035e-4),
+        ("corotational", 1 / 256, 3.30992, 3.31500, 6.542e-4),
     ],
 )
-def test_a_rotating_bar(form, h, low, high, longest):
+def test_a_rotating_bar(formulation, h, low, high, longest):
     """The window is that of the kinetic energy; Solfec-1.0 shows the same."""
-    body = bar(form=form, scheme="DEF_LIM", lumped=True)
+    body = bar(formulation=formulation, scheme="DEF_LIM", lumped=True)
     body.set_velocity(angular=(1, 0, 0))
     kinetic, whole, most = [], [float(body.energy())], 0.0
     for state in kl.march(body, h, round(1 / h)):
@@ -502,7 +504,7 @@ def test_a_turned_body_does_as_the_body(brick):
     """The co-rotational load turns with the body, whatever it looks like."""
     R = exp([0.4, -1.2, 0.7])
     rng = np.random.default_rng(5)
-    for options in ({}, {"form": "BC"}, {"form": "BC-MODAL", "modes": 20}):
+    for options in ({}, {"formulation": "corotational"}, {"formulation": "modal", "modes": 20}):
         body = brick(cells=(1, 2, 2), **options)
         d = 1e-2 * rng.uniform(-1, 1, body.points.shape)
         turned = (body.points + d) @ R.T - body.points

@@ -11,8 +11,8 @@ SOFT = (
     (kl.PseudoRigidBody, {}),
     (kl.FiniteElementBody, {}),
     (kl.FiniteElementBody, {"lumped": True}),
-    (kl.FiniteElementBody, {"form": "BC"}),
-    (kl.FiniteElementBody, {"form": "BC-MODAL"}),
+    (kl.FiniteElementBody, {"formulation": "corotational"}),
+    (kl.FiniteElementBody, {"formulation": "modal"}),
 )
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 each_kind = pytest.mark.parametrize("kind", KINDS)
@@ -114,7 +114,7 @@ X = (0.5, 0.5, 0.5)
 WRONG = [
     (lambda b: b.set_velocity(linear=np.ones((8, 3))), r"a velocity of shape .* does not fit a single body"),
     (lambda b: b.set_velocity(angular=np.ones((8, 3))), "an angular velocity of shape"),
-    (lambda b: b.turn(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
+    (lambda b: b.rotate(np.broadcast_to(np.eye(3), (4, 3, 3))), "a rotation of shape"),
     (lambda b: b.add(kl.Force(X, np.ones((2, 3)))), "a force of shape"),
     (lambda b: b.add(kl.Spring(X, (1, 0, 0), [1, 2])), "the stiffness of a spring must be one number"),
     (lambda b: b.add(kl.Spring(X, (1, 0, 0), 1, damping=[1, 2])), "the damping of a spring must be one"),
@@ -154,12 +154,12 @@ def test_a_callback_that_returns_no_numbers_is_told(value):
 @pytest.mark.parametrize("modes", [6.5, "many", True])
 def test_modes_are_counted(modes):
     with pytest.raises(InputError, match="modes must be a whole number"):
-        kl.FiniteElementBody(kl.box(), RUBBER, form="BC-MODAL", modes=modes)
+        kl.FiniteElementBody(kl.box(), RUBBER, formulation="modal", modes=modes)
 
 
 def test_a_form_is_named():
-    with pytest.raises(InputError, match="unknown form of a finite-element body 3"):
-        kl.FiniteElementBody(kl.box(), RUBBER, form=3)
+    with pytest.raises(InputError, match="unknown formulation of a finite-element body 3"):
+        kl.FiniteElementBody(kl.box(), RUBBER, formulation=3)
 
 
 def test_an_obstacle_has_a_mesh_and_stays_one():

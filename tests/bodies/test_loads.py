@@ -28,11 +28,11 @@ def moved(body, F=TURN, shift=SHIFT):
     """Let a body be at x = F (X - X̄) + X̄ + shift."""
     center = body.center + shift
     if isinstance(body, kl.RigidBody):
-        body.place(np.concatenate([F.T.ravel(), center]))
+        body.set_configuration(np.concatenate([F.T.ravel(), center]))
     elif isinstance(body, kl.PseudoRigidBody):
-        body.place(np.concatenate([F.ravel(), center]))
+        body.set_configuration(np.concatenate([F.ravel(), center]))
     else:
-        body.place((body.points - body.center) @ F.T + center - body.points)
+        body.set_configuration((body.points - body.center) @ F.T + center - body.points)
     return body
 
 
@@ -41,7 +41,7 @@ def stirred(kind, seed=3):
     rng = np.random.default_rng(seed)
     body = moved(block(kind), TURN if kind is kl.RigidBody else TURN @ (np.eye(3) + 0.1 * rng.random((3, 3))))
     if kind is kl.FiniteElementBody:
-        body.place(body.q + 0.02 * rng.uniform(-1, 1, body.q.shape))
+        body.set_configuration(body.q + 0.02 * rng.uniform(-1, 1, body.q.shape))
     body.u[...] = rng.uniform(-1, 1, body.u.shape)
     return body
 
@@ -65,15 +65,15 @@ def test_the_power_of_a_force_is_force_times_velocity(kind, seed):
     body, rng = stirred(kind, seed), np.random.default_rng(seed + 50)
     for X in CENTER + rng.uniform(-1, 1, (5, 3)) * (0.2, 0.3, 0.5):
         f = rng.uniform(-1, 1, 3)
-        assert body.push(X, f, body.q) @ body.u == pytest.approx(f @ body.velocity(X), rel=1e-11)
-        dofs, H = body.rows(X, body.q)
+        assert body.generalized_force(X, f, body.q) @ body.u == pytest.approx(f @ body.velocity(X), rel=1e-11)
+        dofs, H = body.jacobian(X, body.q)
         np.testing.assert_allclose(H @ body.u[dofs], body.velocity(X), atol=1e-13)
         dense = np.zeros(body.dofs)
         np.add.at(dense, dofs, f @ H)
-        np.testing.assert_allclose(dense, body.push(X, f, body.q), atol=1e-13)
+        np.testing.assert_allclose(dense, body.generalized_force(X, f, body.q), atol=1e-13)
     forces = rng.uniform(-1, 1, body.mesh.points.shape)
     power = (forces * body.velocity(body.mesh.points)).sum()
-    assert body.push_nodes(forces, body.q) @ body.u == pytest.approx(power, rel=1e-11)
+    assert body.generalized_nodal_force(forces, body.q) @ body.u == pytest.approx(power, rel=1e-11)
 
 
 @each_kind
@@ -156,7 +156,7 @@ def test_weight_that_changes_in_time_accelerates_by_its_integral(kind):
 
 
 @each_kind
-def test_loads_add_up_and_a_factor_multiplies(kind):
+def test_loads_add_up_and_an_amplitude_multiplies(kind):
     body, single = moved(block(kind)), moved(block(kind))
     X = at(0.2, 0.3, 0.5)
     body.add(kl.Force(X, (1.0, 2, 3)), 2.0)
@@ -303,7 +303,7 @@ def test_a_load_is_the_slope_of_its_potential(kind, load):
     slope = body.external_load() @ v
     potentials = []
     for side in (1, -1):
-        body.place(q + side * 1e-5 * v)
+        body.set_configuration(q + side * 1e-5 * v)
         potentials.append(float(body.potential_energy()))
     assert (potentials[1] - potentials[0]) / 2e-5 == pytest.approx(slope, rel=1e-7)
 
@@ -316,7 +316,7 @@ def test_the_potential_of_a_rigid_body_too(load):
     potentials = []
     for t in (1e-5, -1e-5):
         turned = R @ exp(t * body.u[:3])
-        body.place(np.concatenate([turned.T.ravel(), q[9:] + t * body.u[3:]]))
+        body.set_configuration(np.concatenate([turned.T.ravel(), q[9:] + t * body.u[3:]]))
         potentials.append(float(body.potential_energy()))
     assert (potentials[1] - potentials[0]) / 2e-5 == pytest.approx(slope, rel=1e-7)
 
@@ -337,7 +337,7 @@ def test_opposite_forces_strain_a_pseudo_rigid_body_as_a_bar():
     body = block(kl.PseudoRigidBody)
     for face, sign in (("z+", 1), ("z-", -1)):
         body.add(kl.Traction(face, (0, 0, sign * 1.0)))
-    kl.equilibrium(body)
+    kl.find_equilibrium(body)
     strain = np.diag(body.deformation) - 1
     np.testing.assert_allclose(strain, 1e-5 * np.array([-0.3, -0.3, 1.0]), rtol=1e-4)
 

@@ -45,7 +45,7 @@ def cube(scheme, damping=0.0):
 def deformed(body, F):
     q = body.q.copy()
     q[:9] = np.ravel(F)
-    body.place(q)
+    body.set_configuration(q)
     return body
 
 

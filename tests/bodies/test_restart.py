@@ -9,12 +9,14 @@ BODIES = [
     *((kl.RigidBody, scheme, {}) for scheme in ("RIG_POS", "RIG_NEG", "RIG_IMP")),
     *((kl.PseudoRigidBody, scheme, {}) for scheme in ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")),
     *((kl.FiniteElementBody, scheme, {}) for scheme in ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")),
-    *((kl.FiniteElementBody, scheme, {"form": "BC"}) for scheme in ("DEF_EXP", "DEF_LIM")),
-    (kl.FiniteElementBody, "DEF_LIM", {"form": "BC-MODAL", "modes": 15}),
+    *((kl.FiniteElementBody, scheme, {"formulation": "corotational"}) for scheme in ("DEF_EXP", "DEF_LIM")),
+    (kl.FiniteElementBody, "DEF_LIM", {"formulation": "modal", "modes": 15}),
 ]
 LOADS = ("free", "constant", "changing", "held")
 each = pytest.mark.parametrize(
-    ("kind", "scheme", "options"), BODIES, ids=[f"{k.__name__}-{s}-{o.get('form', '')}" for k, s, o in BODIES]
+    ("kind", "scheme", "options"),
+    BODIES,
+    ids=[f"{k.__name__}-{s}-{o.get('formulation', '')}" for k, s, o in BODIES],
 )
 
 
@@ -32,7 +34,9 @@ def body_of(brick, kind, scheme, options, loads):
     if loads == "held":
         body.set_velocity()
         body.constrain(kl.FixPoint((0.2, 0.3, 0.5)))
-        body.constrain(kl.SetDisplacement((-0.2, 0.3, 0.5), (0, 0, 1), kl.TimeSeries([0, 0.02], [0, 0.004])))
+        body.constrain(
+            kl.PrescribedDisplacement((-0.2, 0.3, 0.5), (0, 0, 1), kl.TimeSeries([0, 0.02], [0, 0.004]))
+        )
     return body
 
 

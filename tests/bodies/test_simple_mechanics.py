@@ -181,7 +181,7 @@ def test_reactions_are_those_of_statics(kind):
     if kind is kl.RigidBody:
         end(body, 1e-3, 3)
     else:
-        kl.equilibrium(body)
+        kl.find_equilibrium(body)
     load = np.array([0, 0, -8 * G]) + push
     np.testing.assert_allclose(stand.reactions.sum(axis=0), -load, atol=1e-6)
     moment = np.cross(body.position(feet), stand.reactions).sum(axis=0)
@@ -195,8 +195,8 @@ def test_a_prescribed_displacement_is_met_at_every_step(kind, scheme):
     body = cube(kind, scheme)
     corners = body.mesh.points
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 0.004, 0.001])
-    body.constrain(kl.SetDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
-    body.constrain(kl.SetDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
+    body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
+    body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
     for state in kl.march(body, 1e-3, 60):
         moved = body.position(corners[:4]) - corners[:4]
         np.testing.assert_allclose(moved[:, 2], path(state.time), atol=1e-13)
@@ -208,7 +208,7 @@ def test_a_prescribed_velocity_is_met_at_every_step(kind, scheme):
     body = cube(kind, scheme)
     corner = body.mesh.points[[0, 6]]
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 2.0, -1.0])
-    body.constrain(kl.SetVelocity(corner, (0, 3, 4), path))
+    body.constrain(kl.PrescribedVelocity(corner, (0, 3, 4), path))
     for state in kl.march(body, 1e-3, 60):
         np.testing.assert_allclose(body.velocity(corner) @ [0, 0.6, 0.8], path(state.time), atol=1e-12)
 
@@ -217,7 +217,9 @@ def test_a_prescribed_velocity_is_met_at_every_step(kind, scheme):
 def test_a_prescribed_acceleration_adds_up(kind, scheme):
     body = cube(kind, scheme)
     body.set_velocity((0.5, 0, 0))
-    body.constrain(kl.SetAcceleration(body.mesh.points[:4], (1, 0, 0), kl.TimeSeries([0, 0.04], [0, 8.0])))
+    body.constrain(
+        kl.PrescribedAcceleration(body.mesh.points[:4], (1, 0, 0), kl.TimeSeries([0, 0.04], [0, 8.0]))
+    )
     for state in kl.march(body, 1e-3, 60):
         t = state.time
         gained = 100 * t * t if t < 0.04 else 0.16 + 8 * (t - 0.04)
@@ -227,8 +229,8 @@ def test_a_prescribed_acceleration_adds_up(kind, scheme):
 def test_an_acceleration_by_a_function_is_that_by_a_series():
     one, other = cube(kl.RigidBody), cube(kl.RigidBody)
     X = one.mesh.points[0]
-    one.constrain(kl.SetAcceleration(X, (1, 0, 0), kl.TimeSeries([0, 1], [0, 3])))
-    other.constrain(kl.SetAcceleration(X, (1, 0, 0), lambda t: 3 * t))
+    one.constrain(kl.PrescribedAcceleration(X, (1, 0, 0), kl.TimeSeries([0, 1], [0, 3])))
+    other.constrain(kl.PrescribedAcceleration(X, (1, 0, 0), lambda t: 3 * t))
     end(one, 1e-2, 20)
     end(other, 1e-2, 20)
     np.testing.assert_allclose(one.u, other.u, atol=1e-13)
@@ -253,7 +255,9 @@ def test_work_of_reactions_counts():
     """A lift: the reaction does the work that raises the body."""
     body = cube(kl.RigidBody)
     body.add(kl.Gravity((0, 0, -G)))
-    body.constrain(kl.SetVelocity(body.center, (0, 0, 1), kl.TimeSeries([0, 0.1, 0.4, 0.5], [0, 1, 1, 0])))
+    body.constrain(
+        kl.PrescribedVelocity(body.center, (0, 0, 1), kl.TimeSeries([0, 0.1, 0.4, 0.5], [0, 1, 1, 0]))
+    )
     end(body, 1e-3, 500)
     assert body.mass_center()[2] == pytest.approx(0.4, rel=1e-9)
     assert body.kinetic_energy() == pytest.approx(0, abs=1e-12)

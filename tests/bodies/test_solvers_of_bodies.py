@@ -4,37 +4,37 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.bodies.formulations import base as forms
+from kratos_lite.bodies.formulations import base
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
 
-def spinning(form, scheme, damping=0.0):
+def spinning(formulation, scheme, damping=0.0):
     body = kl.FiniteElementBody(
-        kl.box((0.4, 0.6, 1.0), (2, 3, 4)), RUBBER, form=form, scheme=scheme, damping=damping
+        kl.box((0.4, 0.6, 1.0), (2, 3, 4)), RUBBER, formulation=formulation, scheme=scheme, damping=damping
     )
     body.set_velocity((1.0, 2.0, 3.0), (2.0, 10.0, 1.0))
     return body
 
 
 @pytest.mark.parametrize(
-    ("form", "scheme", "damping"),
+    ("formulation", "scheme", "damping"),
     [
-        ("TL", "DEF_LIM", 1e-3),
-        ("TL", "ENERGY_MOMENTUM", 0.0),
-        ("TL", "ENERGY_MOMENTUM", 1e-3),
-        ("BC", "DEF_LIM", 0.0),
+        ("total_lagrangian", "DEF_LIM", 1e-3),
+        ("total_lagrangian", "ENERGY_MOMENTUM", 0.0),
+        ("total_lagrangian", "ENERGY_MOMENTUM", 1e-3),
+        ("corotational", "DEF_LIM", 0.0),
     ],
 )
-def test_large_bodies_iterate_and_move_alike(form, scheme, damping, monkeypatch):
-    factorized = spinning(form, scheme, damping)
+def test_large_bodies_iterate_and_move_alike(formulation, scheme, damping, monkeypatch):
+    factorized = spinning(formulation, scheme, damping)
     list(kl.march(factorized, 5e-3, 10))
-    monkeypatch.setattr(forms, "FACTORIZED_MAX", 10)
-    monkeypatch.setattr(forms, "FACTORIZED_ONCE_MAX", 10)
+    monkeypatch.setattr(base, "FACTORIZED_MAX", 10)
+    monkeypatch.setattr(base, "FACTORIZED_ONCE_MAX", 10)
     made = []
-    iterated = forms.Form._iterated
-    monkeypatch.setattr(forms.Form, "_iterated", lambda self, A: made.append(A) or iterated(self, A))
-    large = spinning(form, scheme, damping)
+    iterated = base.Formulation._iterated
+    monkeypatch.setattr(base.Formulation, "_iterated", lambda self, A: made.append(A) or iterated(self, A))
+    large = spinning(formulation, scheme, damping)
     list(kl.march(large, 5e-3, 10))
     assert made
     np.testing.assert_allclose(large.q, factorized.q, rtol=0, atol=1e-11)
@@ -43,11 +43,11 @@ def test_large_bodies_iterate_and_move_alike(form, scheme, damping, monkeypatch)
 
 def test_constant_matrices_are_factorized_once(monkeypatch):
     made = []
-    factorize = forms.Factorizer.factorize
-    monkeypatch.setattr(forms.Factorizer, "factorize", lambda self, A: made.append(A) or factorize(self, A))
-    for form, count in (("BC", 1), ("TL", 7)):
+    factorize = base.Factorizer.factorize
+    monkeypatch.setattr(base.Factorizer, "factorize", lambda self, A: made.append(A) or factorize(self, A))
+    for formulation, count in (("corotational", 1), ("total_lagrangian", 7)):
         made.clear()
-        list(kl.march(spinning(form, "DEF_LIM"), 1e-3, 7))
+        list(kl.march(spinning(formulation, "DEF_LIM"), 1e-3, 7))
         assert len(made) == count
 
 
@@ -56,7 +56,7 @@ def test_a_body_at_rest_builds_no_mass_matrix():
     body = kl.FiniteElementBody(mesh, RUBBER)
     body.constrain(kl.FixPoint(mesh.points[mesh.nodes("x-")]))
     body.add(kl.Traction("x+", (1e3, 0, 0)))
-    kl.equilibrium(body)
+    kl.find_equilibrium(body)
     assert not {"scalar", "nodal"} & set(vars(body._mass))
     body.kinetic_energy()
     assert "scalar" in vars(body._mass)

@@ -30,7 +30,7 @@ def top(J, W, scheme, rotation=None):
         mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag(np.array(J, dtype=float))), scheme=scheme
     )
     if rotation is not None:
-        body.turn(rotation)
+        body.rotate(rotation)
     body.u[:3] = W
     return body
 

@@ -797,7 +797,7 @@ DESCRIBED = {
 
 
 @pytest.fixture
-def bad(shared, tmp_path, monkeypatch):
+def bad(malformed, tmp_path, monkeypatch):
     """Return the folder of bad files; a command on one of them that takes 5 s is an error."""
 
     def late(*_):
@@ -806,13 +806,13 @@ def bad(shared, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     old = signal.signal(signal.SIGALRM, late)
     signal.setitimer(signal.ITIMER_REAL, 5)
-    yield shared / "bad"
+    yield malformed
     signal.setitimer(signal.ITIMER_REAL, 0)
     signal.signal(signal.SIGALRM, old)
 
 
-def test_every_bad_file_is_in_a_table(shared):
-    names = {path.name for path in (shared / "bad").iterdir() if path.is_file()}
+def test_every_bad_file_is_in_a_table(malformed):
+    names = {path.name for path in malformed.iterdir() if path.is_file()}
     assert names == ACCEPTED.keys() | REFUSED.keys() | DESCRIBED.keys()
 
 

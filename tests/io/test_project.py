@@ -382,16 +382,16 @@ def test_run_without_supports_is_read_and_refused_when_solved(shared):
         ("70", "integer of 5001 digits is too long"),
     ],
 )
-def test_malformed_run_file_is_refused_with_the_problem(shared, name, words):
-    (path,) = (shared / "bad").glob(f"{name}_*.json")
+def test_malformed_run_file_is_refused_with_the_problem(malformed, name, words):
+    (path,) = malformed.glob(f"{name}_*.json")
     with pytest.raises(InputError) as caught:
         read_project(path)
     assert words in str(caught.value)
     assert str(caught.value).startswith(f"{path}:1:")
 
 
-def test_small_good_run_file_is_read(shared):
-    project = read_project(shared / "bad" / "60_good.json")
+def test_small_good_run_file_is_read(malformed):
+    project = read_project(malformed / "60_good.json")
     assert project.solver == "direct"
     assert project.model.mesh.n_elements == 1
 

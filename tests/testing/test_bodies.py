@@ -23,8 +23,8 @@ def test_every_kind_conforms(kind):
 
 def test_a_force_without_its_moment_is_found():
     class Broken(kl.RigidBody):
-        def push(self, X, force, q):
-            return super().push(self.center, force, q)
+        def generalized_force(self, X, force, q):
+            return super().generalized_force(self.center, force, q)
 
     assert failed(Broken) == {"conjugacy"}
 

@@ -1,4 +1,4 @@
-"""Forms: how the deformation of a finite-element body becomes a load.
+"""Formulations: how the deformation of a finite-element body becomes a load.
 
 `TotalLagrangian`: Green's strain at every Gauss point.  `Corotational`: one rotation for the whole body, and
 small strains seen from it.  `Modal`: the same, with the lowest modes only.
@@ -35,11 +35,11 @@ FACTORIZED_ONCE_MAX = 30_000
 RESIDUAL = 1e-13
 """Relative residual at which an iteration stops: momentum is as exact."""
 
-FORMS: Registry[type[Form]] = Registry("form of a finite-element body")
-"""Every form by its class name and by its `name`."""
+FORMULATIONS: Registry[type[Formulation]] = Registry("formulation of a finite-element body")
+"""Every formulation by its class name and by its `name`."""
 
 
-class Form(ABC):
+class Formulation(ABC):
     """Internal load of nodal displacements q (3n,), and solutions with its tangent.
 
     Parameters
@@ -50,12 +50,13 @@ class Form(ABC):
     """
 
     name: ClassVar[str]
+    aliases: ClassVar[tuple[str, ...]] = ()
     schemes: ClassVar[tuple[str, ...]]
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if "name" in cls.__dict__:
-            FORMS.add(cls.__name__, cls, [cls.name])
+            FORMULATIONS.add(cls.__name__, cls, [cls.name, *cls.aliases])
 
     def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:
         self.points, self.groups, self.mass = points, groups, mass
@@ -126,16 +127,20 @@ class Form(ABC):
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+        raise ModelError(
+            f"the formulation {self.name} has no energy–momentum scheme; use formulation='total_lagrangian'"
+        )
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
-        raise ModelError(f"the form {self.name} has no energy–momentum scheme; use form='TL'")
+        raise ModelError(
+            f"the formulation {self.name} has no energy–momentum scheme; use formulation='total_lagrangian'"
+        )
 
     def highest_frequency(self, q: Array) -> float:
         """Return an upper bound of the angular frequencies in rad/s."""
         return finite_strain.highest_frequency(self.points, self.groups, lumped=self.mass.lumped)
 
     def project(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """Return configuration and velocity as the form can represent them."""
+        """Return configuration and velocity as the formulation can represent them."""
         return q, u

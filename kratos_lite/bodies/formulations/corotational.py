@@ -11,20 +11,21 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.bodies.constraint_projection import Solve
 from kratos_lite.bodies.formulations import base
-from kratos_lite.bodies.formulations.base import Form
+from kratos_lite.bodies.formulations.base import Formulation
 from kratos_lite.bodies.rotations import polar
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
 
-class Corotational(Form):
+class Corotational(Formulation):
     """Small strains seen from one rotation R of the body, that of its mean deformation gradient.
 
     f = R K0 R^T d with d = (Z + q) - R Z, Z = X less a point amid the body; K0 is constant, and so are the
     factors of M + c K0.
     """
 
-    name = "BC"
+    name = "corotational"
+    aliases = ("BC",)
     schemes = ("DEF_LIM", "DEF_EXP")
 
     def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:

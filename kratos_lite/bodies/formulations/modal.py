@@ -1,4 +1,4 @@
-"""Modal: the co-rotational form with the lowest modes only."""
+"""Modal: the co-rotational formulation with the lowest modes only."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from kratos_lite.typing import Array
 
 
 class Modal(Corotational):
-    """The co-rotational form with the lowest modes of the free body, the six rigid ones among them.
+    """The co-rotational formulation with the lowest modes of the free body, the six rigid ones among them.
 
     Parameters
     ----------
     count : number of modes, at least 6.
     """
 
-    name = "BC-MODAL"
+    name = "modal"
+    aliases = ("BC-MODAL",)
 
     def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass, count: int) -> None:
         super().__init__(points, groups, mass)

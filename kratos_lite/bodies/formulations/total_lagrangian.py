@@ -5,14 +5,15 @@ from __future__ import annotations
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.constraint_projection import Solve
-from kratos_lite.bodies.formulations.base import Form
+from kratos_lite.bodies.formulations.base import Formulation
 from kratos_lite.typing import Array
 
 
-class TotalLagrangian(Form):
+class TotalLagrangian(Formulation):
     """Green's strain and Saint Venant–Kirchhoff's law at every Gauss point."""
 
-    name = "TL"
+    name = "total_lagrangian"
+    aliases = ("TL",)
     schemes = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
 
     def load(self, q: Array) -> Array:
@@ -45,6 +46,6 @@ class TotalLagrangian(Form):
         return self._factorized(D, c, symmetric=False)
 
     def highest_frequency(self, q: Array) -> float:
-        """Return the bound of the tangent at q; see `Form`."""
+        """Return the bound of the tangent at q; see `Formulation`."""
         q = q.reshape(-1, 3)
         return finite_strain.highest_frequency(self.points, self.groups, q, lumped=self.mass.lumped)

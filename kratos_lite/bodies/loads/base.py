@@ -35,17 +35,17 @@ class Bound:
 
     Attributes
     ----------
-    generalized : the generalized force for the factor 1.
-    factor : function of the time in s.
-    steady : whether the factor never changes.
+    generalized : the generalized force for the amplitude 1.
+    amplitude : function of the time in s.
+    steady : whether the amplitude never changes.
     acceleration : (3,) m/s² if the load is gravity, alike everywhere.
     spatial, convected : generalized force (..., dofs) fixed in space, or in a rigid body, if that is all.
-    potential_energy : of a conservative load for the factor 1, (...) in J.
+    potential_energy : of a conservative load for the amplitude 1, (...) in J.
     follows_velocity : whether it may depend on the velocity.
     """
 
     generalized: Generalized
-    factor: Callable[[float], float]
+    amplitude: Callable[[float], float]
     steady: bool
     acceleration: Array | None = None
     spatial: Array | None = None
@@ -67,7 +67,7 @@ class Bound:
 
     def __call__(self, q: Array, u: Array, time: float) -> Array:
         """Return the generalized force (..., dofs) at a configuration, a velocity and a time."""
-        return self.factor(time) * self.generalized(q, u, time)
+        return self.amplitude(time) * self.generalized(q, u, time)
 
     @property
     def is_constant(self) -> bool:
@@ -75,22 +75,22 @@ class Bound:
         return self.steady and any(x is not None for x in (self.acceleration, self.spatial, self.convected))
 
     def potential(self, q: Array) -> Array:
-        """Return the potential energy (...) in J; 0 for loads without one, or whose factor changes."""
-        return self.factor(0.0) * self.potential_energy(q) if self.steady else no_potential(q)
+        """Return the potential energy (...) in J; 0 for loads without one, or whose amplitude changes."""
+        return self.amplitude(0.0) * self.potential_energy(q) if self.steady else no_potential(q)
 
 
 class BodyLoad(ABC):
     """Something that pushes a body."""
 
     @abstractmethod
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body."""
 
 
-def bind(load: BodyLoad | Load, body: Body, factor: Factor) -> Bound:
-    """Return a load on a body, multiplied by a factor that may depend on the time."""
-    function = function_of(factor, "the factor of a load")
-    steady = not callable(factor)
+def bind(load: BodyLoad | Load, body: Body, amplitude: Factor) -> Bound:
+    """Return a load on a body, multiplied by an amplitude that may depend on the time."""
+    function = function_of(amplitude, "the amplitude of a load")
+    steady = not callable(amplitude)
     if isinstance(load, BodyLoad):
         return load.bind(body, function, steady)
     if not isinstance(load, Load):
@@ -100,7 +100,7 @@ def bind(load: BodyLoad | Load, body: Body, factor: Factor) -> Bound:
     return _dead(load, body, function, steady)
 
 
-def _gravity(g: Array, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+def _gravity(g: Array, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
     """Return the weight: no torque about the mass center, whatever the body does."""
     pull = body.times_mass(uniform(body, g))
     mass = body.mass
@@ -110,7 +110,7 @@ def _gravity(g: Array, body: Body, factor: Callable[[float], float], steady: boo
             return np.asarray(-(pull @ q) - mass * (g @ body.center))
         return np.asarray(-mass * (q[..., 9:] @ g))
 
-    return Bound(lambda q, u, t: pull, factor, steady, acceleration=g, potential_energy=potential)
+    return Bound(lambda q, u, t: pull, amplitude, steady, acceleration=g, potential_energy=potential)
 
 
 def uniform(body: Body, v: Array) -> Array:
@@ -122,7 +122,7 @@ def uniform(body: Body, v: Array) -> Array:
     return out
 
 
-def _dead(load: Load, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+def _dead(load: Load, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
     if body.mesh is None:
         raise ModelError(f"a {type(load).__name__} acts on a mesh; this body has none: use Force or Torque")
@@ -139,9 +139,13 @@ def _dead(load: Load, body: Body, factor: Callable[[float], float], steady: bool
         assert body.mesh is not None
         return np.asarray(-(f * body.position(body.mesh.points, q)).sum(axis=(-2, -1)))
 
-    spatial = None if isinstance(body, RigidBody) else body.push_nodes(f, body.q)
+    spatial = None if isinstance(body, RigidBody) else body.generalized_nodal_force(f, body.q)
     return Bound(
-        lambda q, u, t: body.push_nodes(f, q), factor, steady, spatial=spatial, potential_energy=potential
+        lambda q, u, t: body.generalized_nodal_force(f, q),
+        amplitude,
+        steady,
+        spatial=spatial,
+        potential_energy=potential,
     )
 
 

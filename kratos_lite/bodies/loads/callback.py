@@ -39,7 +39,7 @@ class Callback(BodyLoad):
             raise InputError(f"a callback is a function of q, u and t; got {function!r}")
         self.function, self.of_velocity = function, bool(of_velocity)
 
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body."""
 
         def generalized(q: Array, u: Array, time: float) -> Array:
@@ -55,4 +55,4 @@ class Callback(BodyLoad):
                 )
             return out
 
-        return Bound(generalized, factor, steady, follows_velocity=self.of_velocity)
+        return Bound(generalized, amplitude, steady, follows_velocity=self.of_velocity)

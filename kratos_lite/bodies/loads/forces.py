@@ -31,23 +31,30 @@ class Force(BodyLoad):
         self.point, self.force = one_point(point), vector_of(force, "a force")
         self.frame = checked_frame(frame)
 
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, fitting(self.force, body.q.shape[:-1], 1, "a force")
-        body.find(X)
+        body.locate(X)
         if self.frame == "convected":
-            fixed = body.push(X, f, upright(body)) if isinstance(body, RigidBody) else None
+            fixed = body.generalized_force(X, f, upright(body)) if isinstance(body, RigidBody) else None
             return Bound(
-                lambda q, u, t: body.push(X, body.convected(f, X, q), q), factor, steady, convected=fixed
+                lambda q, u, t: body.generalized_force(X, body.convected(f, X, q), q),
+                amplitude,
+                steady,
+                convected=fixed,
             )
 
         def potential(q: Array) -> Array:
             return np.asarray(-(f * body.position(X, q)).sum(axis=-1))
 
         central = not isinstance(body, RigidBody) or bool((np.abs(X - body.center) == 0).all())
-        fixed = body.push(X, f, body.q) if central else None
+        fixed = body.generalized_force(X, f, body.q) if central else None
         return Bound(
-            lambda q, u, t: body.push(X, f, q), factor, steady, spatial=fixed, potential_energy=potential
+            lambda q, u, t: body.generalized_force(X, f, q),
+            amplitude,
+            steady,
+            spatial=fixed,
+            potential_energy=potential,
         )
 
 
@@ -63,7 +70,7 @@ class Torque(BodyLoad):
     def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
         self.torque, self.frame = vector_of(torque, "a torque"), checked_frame(frame)
 
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; ModelError unless it is rigid."""
         if not isinstance(body, RigidBody):
             raise ModelError(
@@ -72,13 +79,13 @@ class Torque(BodyLoad):
         t = fitting(self.torque, body.q.shape[:-1], 1, "a torque")
         fixed = np.broadcast_to(np.concatenate([t, np.zeros_like(t)], axis=-1), body.u.shape)
         if self.frame == "convected":
-            return Bound(lambda q, u, time: fixed, factor, steady, convected=fixed)
+            return Bound(lambda q, u, time: fixed, amplitude, steady, convected=fixed)
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             T = (np.swapaxes(rotation(q), -1, -2) @ t[..., None])[..., 0]
             return np.concatenate([T, np.zeros_like(T)], axis=-1)
 
-        return Bound(generalized, factor, steady, spatial=fixed)
+        return Bound(generalized, amplitude, steady, spatial=fixed)
 
 
 class Spring(BodyLoad):
@@ -106,10 +113,10 @@ class Spring(BodyLoad):
         self.damping = _not_negative(damping, "damping", "N s/m")
         self.length = None if length is None else _not_negative(length, "length", "m")
 
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; MeshError if the point lies outside."""
         X, anchor = self.point, self.anchor
-        body.find(X)
+        body.locate(X)
         L = float(np.linalg.norm(body.position(X) - anchor)) if self.length is None else self.length
 
         def generalized(q: Array, u: Array, time: float) -> Array:
@@ -118,9 +125,9 @@ class Spring(BodyLoad):
             y = body.position(X, q) - anchor
             distance = float(np.linalg.norm(y))
             direction = y / distance if distance > 0 else np.zeros(3)
-            dofs, H = body.rows(X, q)
+            dofs, H = body.jacobian(X, q)
             rate = float(direction @ (H @ u[dofs]))
-            return body.push(X, -self._pull(distance - L, rate) * direction, q)
+            return body.generalized_force(X, -self._pull(distance - L, rate) * direction, q)
 
         def potential(q: Array) -> Array:
             if callable(self.stiffness):
@@ -129,7 +136,7 @@ class Spring(BodyLoad):
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
-        return Bound(generalized, factor, steady, potential_energy=potential, follows_velocity=damped)
+        return Bound(generalized, amplitude, steady, potential_energy=potential, follows_velocity=damped)
 
     def _pull(self, elongation: float, rate: float) -> float:
         if callable(self.stiffness):

@@ -35,7 +35,7 @@ class FollowerPressure(BodyLoad):
             raise InputError(f"a pressure must be one number in Pa; got {pressure}")
         self.where, self.pressure = where, float(value)
 
-    def bind(self, body: Body, factor: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
         """Return the load on a body; ModelError if there are no such faces."""
         mesh = body.mesh
         if mesh is None:
@@ -54,6 +54,6 @@ class FollowerPressure(BodyLoad):
         def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
                 raise ModelError("a following pressure acts on single bodies; march them one by one")
-            return body.push_nodes(nodal(body.position(mesh.points, q)), q)
+            return body.generalized_nodal_force(nodal(body.position(mesh.points, q)), q)
 
-        return Bound(generalized, factor, steady)
+        return Bound(generalized, amplitude, steady)

@@ -7,9 +7,11 @@ check processes state the expected values.  Measured against Kratos 10.4.4.
 
 from __future__ import annotations
 
+import ast
 import operator
 import re
 from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -18,34 +20,27 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.errors import nearest
 
 MAX_DEPTH = 50
-"""Deepest nesting of brackets and signs."""
+"""Deepest nesting of brackets."""
 _TOKEN = re.compile(
     r"\s*((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?![\w.])|[A-Za-z_]\w*|\*\*|[<>=!]=|[-+*/^%(),<>])",
     re.ASCII,
 )
-_ONE = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "sqrt", "log10", "floor", "ceil", "abs")
-_TWO: dict[str, Callable[..., Any]] = {
-    "pow": np.power, "atan2": np.arctan2, "min": np.minimum, "max": np.maximum,
+_BRACKET = "ä"
+"""Stands before a bracket that calls no function: the syntax tree of Python would forget the bracket."""
+_NUMPY = "sin cos tan sinh cosh tanh exp sqrt log10 floor ceil abs".split()
+_FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
+    **{name: (1, getattr(np, name)) for name in _NUMPY},
+    **{name: (1, getattr(np, "arc" + name[1:])) for name in ("asin", "acos", "atan")},
+    "pow": (2, np.power), "atan2": (2, np.arctan2), "min": (2, np.minimum), "max": (2, np.maximum),
 }  # fmt: skip
-_COMPARE: dict[str, Callable[..., Any]] = {
-    "<": operator.lt,
-    ">": operator.gt,
-    "<=": operator.le,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
+    ast.Pow: np.power, ast.UAdd: operator.pos, ast.USub: operator.neg,
+    ast.Lt: operator.lt, ast.Gt: operator.gt, ast.LtE: operator.le, ast.GtE: operator.ge,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+}  # fmt: skip
+ONE_IF = "Kratos takes one 'if' at the outermost level only"
 _CONSTANTS = {"pi": np.pi, "e": np.e}
-
-
-def _functions(python: bool) -> dict[str, tuple[int, Callable[..., Any]]]:
-    found: dict[str, tuple[int, Callable[..., Any]]] = {name: (1, getattr(np, name)) for name in _ONE}
-    found |= {name: (1, getattr(np, "arc" + name[1:])) for name in ("asin", "acos", "atan")}
-    found |= {name: (2, function) for name, function in _TWO.items()}
-    found |= (
-        {"log": (1, np.log), "fabs": (1, np.abs)} if python else {"log": (1, np.log10), "ln": (1, np.log)}
-    )
-    return found
 
 
 def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False) -> NDArray[np.float64]:
@@ -68,133 +63,91 @@ def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False
     >>> evaluate("0.5*x^2 + t", {"x": [1.0, 2.0], "t": 1.0})
     array([1.5, 3. ])
     """
-    parser = _Parser(text, variables, python)
-    with np.errstate(all="ignore"):
-        value = np.asarray(parser.choice(0), dtype=float)
-    if parser.tokens[parser.at]:
-        raise parser.wrong()
+    try:
+        expression = _Expression(text, variables, python)
+        with np.errstate(all="ignore"):
+            value = np.asarray(expression.value(expression.root), dtype=float)
+    except (SyntaxError, MemoryError, RecursionError):
+        raise ValueError(f"expression {text[:100]!r} is not understood") from None
     if not np.isfinite(value).all():
         raise ValueError(f"expression {text!r} is not finite everywhere it is used")
     return value
 
 
-class _Parser:
-    """Recursive descent that computes while it reads."""
+class _Expression:
+    """The syntax tree of an expression."""
 
     def __init__(self, text: str, variables: Mapping[str, ArrayLike], python: bool) -> None:
-        self.text, self.python, self.at = text, python, 0
-        self.variables = {name: np.asarray(value, dtype=float) for name, value in variables.items()}
-        self.functions = _functions(python)
-        self.tokens: list[str] = []
-        place = 0
-        while match := _TOKEN.match(text, place):
-            self.tokens.append(match.group(1))
-            place = match.end()
-        if text[place:].strip():
-            raise ValueError(f"expression {text!r}: {text[place:].strip()[:20]!r} is not understood")
-        self.tokens.append("")
+        self.text, self.python = text, python
+        self.names = _CONSTANTS | {name: np.asarray(value, dtype=float) for name, value in variables.items()}
+        logarithms = {"log": np.log, "fabs": np.abs} if python else {"log": np.log10, "ln": np.log}
+        self.functions = _FUNCTIONS | {name: (1, function) for name, function in logarithms.items()}
+        self.operators = _OPERATORS | {ast.Mod: np.mod if python else np.fmod}
+        self.root = ast.parse(self._in_python(), mode="eval").body
 
-    def wrong(self) -> ValueError:
-        found = repr(self.tokens[self.at]) if self.tokens[self.at] else "the end"
-        return ValueError(f"expression {self.text!r}: {found} is not expected there")
+    def _in_python(self) -> str:
+        """Return the words as Python writes them, with a mark before each bracket that calls no function."""
+        words, place, depth = [""], 0, 0
+        while match := _TOKEN.match(self.text, place):
+            word, place = match.group(1), match.end()
+            depth += {"(": 1, ")": -1}.get(word, 0)
+            if depth > MAX_DEPTH:
+                raise ValueError(f"expression {self.text[:40]!r}…: nested deeper than {MAX_DEPTH}")
+            if word == "(" and (not words[-1].isidentifier() or words[-1] in ("if", "else")):
+                words.append(_BRACKET)
+            is_number = word[0].isdigit() or word[0] == "."
+            words.append(
+                repr(float(word)) if is_number else "**" if word == "^" and not self.python else word
+            )
+        if rest := self.text[place:].strip():
+            raise ValueError(f"expression {self.text!r}: {rest[:20]!r} is not understood")
+        return " ".join(words).strip()
 
-    def take(self, *words: str) -> str:
-        """Step over one of the words and return it, or return an empty string."""
-        token = self.tokens[self.at]
-        if token and token in words:
-            self.at += 1
-            return token
-        return ""
+    def value(self, node: ast.expr) -> Any:
+        match node:
+            case ast.Constant(value=float(number)):
+                found: Any = np.float64(number)
+            case ast.Name():
+                found = self._named(node.id, self.names)
+            case ast.BinOp(op=ast.Pow()) | ast.UnaryOp() if not self.python:
+                found = reduce(np.power, self._powers(node))
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op):
+                found = self.operators[type(op)](self.value(node.operand))
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in self.operators:
+                found = self.operators[type(op)](self.value(left), self.value(right))
+            case ast.Call(func=ast.Name(id=name), keywords=[]):
+                found = self._call(name, [self.value(argument) for argument in node.args])
+            case ast.IfExp(test=ast.Compare(left=left, ops=[op], comparators=[right])) if (
+                type(op) in self.operators
+            ):
+                if node is not self.root and not self.python:
+                    raise ValueError(f"expression {self.text!r}: {ONE_IF}")
+                condition = self.operators[type(op)](self.value(left), self.value(right))
+                found = np.where(condition, self.value(node.body), self.value(node.orelse))
+            case _:
+                raise SyntaxError
+        return found
 
-    def need(self, word: str) -> None:
-        if not self.take(word):
-            raise self.wrong()
+    def _powers(self, node: ast.expr) -> list[Any]:
+        """Return what Kratos raises to each other from the left, each with the signs before it."""
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            return [self.value(node.left), *self._powers(node.right)]
+        if isinstance(node, ast.UnaryOp) and type(node.op) in self.operators:
+            first, *others = self._powers(node.operand)
+            return [self.operators[type(node.op)](first), *others]
+        return [self.value(node)]
 
-    def choice(self, depth: int) -> Any:
-        if depth > MAX_DEPTH:
-            raise ValueError(f"expression {self.text[:40]!r}…: nested deeper than {MAX_DEPTH}")
-        value = self.sum(depth)
-        if not self.take("if"):
-            return value
-        if depth and not self.python:
-            raise ValueError(f"expression {self.text!r}: Kratos takes one 'if' at the outermost level only")
-        left = self.sum(depth)
-        sign = self.take(*_COMPARE)
-        if not sign:
-            raise self.wrong()
-        condition = _COMPARE[sign](left, self.sum(depth))
-        self.need("else")
-        return np.where(condition, value, self.choice(depth + 1))
-
-    def sum(self, depth: int) -> Any:
-        value = self.product(depth)
-        while sign := self.take("+", "-"):
-            other = self.product(depth)
-            value = value + other if sign == "+" else value - other
-        return value
-
-    def product(self, depth: int) -> Any:
-        factor = self.python_factor if self.python else self.kratos_factor
-        value = factor(depth)
-        while sign := self.take("*", "/", "%"):
-            other = factor(depth)
-            if sign == "%":
-                value = np.mod(value, other) if self.python else np.fmod(value, other)
-            else:
-                value = value * other if sign == "*" else np.divide(value, other)
-        return value
-
-    def kratos_factor(self, depth: int) -> Any:
-        value = self.signed(depth)
-        while self.take("^", "**"):
-            value = np.power(value, self.signed(depth))
-        return value
-
-    def signed(self, depth: int) -> Any:
-        factor = 1.0
-        while sign := self.take("+", "-"):
-            factor = -factor if sign == "-" else factor
-        return factor * self.atom(depth)
-
-    def python_factor(self, depth: int) -> Any:
-        if depth > MAX_DEPTH:
-            raise ValueError(f"expression {self.text[:40]!r}…: nested deeper than {MAX_DEPTH}")
-        if sign := self.take("+", "-"):
-            value = self.python_factor(depth + 1)
-            return -value if sign == "-" else value
-        value = self.atom(depth)
-        return np.power(value, self.python_factor(depth + 1)) if self.take("**") else value
-
-    def atom(self, depth: int) -> Any:
-        if self.take("("):
-            value = self.choice(depth + 1)
-            self.need(")")
-            return value
-        token = self.tokens[self.at]
-        if token[:1].isdigit() or token[:1] == ".":
-            self.at += 1
-            return np.float64(token)
-        if not token or not (token[0].isalpha() or token[0] == "_") or token in ("if", "else"):
-            raise self.wrong()
-        self.at += 1
-        if token in self.functions and self.take("("):
-            return self.call(token, depth)
-        if token in self.variables:
-            return self.variables[token]
-        if token in _CONSTANTS:
-            return np.float64(_CONSTANTS[token])
-        known = [*self.variables, *_CONSTANTS, *self.functions]
-        raise ValueError(
-            f"expression {self.text!r}: {token!r} is not known.{nearest(token, known)} "
-            f"Known are {', '.join(known)}"
-        )
-
-    def call(self, name: str, depth: int) -> Any:
-        count, function = self.functions[name]
-        values = [self.choice(depth + 1)]
-        while self.take(","):
-            values.append(self.choice(depth + 1))
-        self.need(")")
+    def _call(self, name: str, values: list[Any]) -> Any:
+        count, function = (1, operator.pos) if name == _BRACKET else self._named(name, self.functions)
         if len(values) != count:
             raise ValueError(f"expression {self.text!r}: {name} takes {count} value(s); got {len(values)}")
         return function(*values)
+
+    def _named(self, name: str, among: Mapping[str, Any]) -> Any:
+        if name not in among:
+            known = [*self.names, *self.functions]
+            raise ValueError(
+                f"expression {self.text!r}: {name!r} is not known.{nearest(name, known)} "
+                f"Known are {', '.join(known)}"
+            )
+        return among[name]

@@ -179,7 +179,7 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     owner, key = (settings, "body") if whole else (section, "kind")
     kind = owner.placed(key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
-    names = {"formulation": "form", "integrator": "scheme"}
+    names = {"integrator": "scheme"}
     options = [name for name in (*OPTIONS, "mass_properties") if names.get(name, name) in arguments]
     section.check_keys(("kind", *options))
     given: dict[str, Any] = {
@@ -212,7 +212,7 @@ def _start(settings: Settings, body: Body) -> None:
     start = settings.section("start")
     start.check_keys(("rotation", "velocity", "angular_velocity"))
     if "rotation" in start:
-        start.placed("rotation", body.turn, exp(np.array(start.vector("rotation"))))
+        start.placed("rotation", body.rotate, exp(np.array(start.vector("rotation"))))
     keys = {"linear": "velocity", "angular": "angular_velocity"}
     given = {name: start.vector(key) for name, key in keys.items() if key in start}
     if given:

@@ -45,9 +45,9 @@ LOADS = {
 CONSTRAINTS = {
     "fix_point": Kind(bodies.FixPoint, ("points",)),
     "fix_direction": Kind(bodies.FixDirection, ("points", "direction")),
-    "prescribed_displacement": Kind(bodies.SetDisplacement, ("points", "direction", "displacement")),
-    "prescribed_velocity": Kind(bodies.SetVelocity, ("points", "direction", "velocity")),
-    "prescribed_acceleration": Kind(bodies.SetAcceleration, ("points", "direction", "acceleration")),
+    "prescribed_displacement": Kind(bodies.PrescribedDisplacement, ("points", "direction", "displacement")),
+    "prescribed_velocity": Kind(bodies.PrescribedVelocity, ("points", "direction", "velocity")),
+    "prescribed_acceleration": Kind(bodies.PrescribedAcceleration, ("points", "direction", "acceleration")),
     "rigid_link": Kind(bodies.RigidLink, ("point", "anchor")),
 }
 OF_LOADS: dict[str, Read] = {

@@ -142,9 +142,9 @@ def test_contact_faces_of_the_real_set_are_kept_and_noted(shared):
 
 
 @pytest.mark.parametrize("name", ["80_ragged", "81_unknown_keyword"])
-def test_malformed_file_is_refused_at_its_statement(shared, name):
+def test_malformed_file_is_refused_at_its_statement(malformed, name):
     with pytest.raises(InputError) as caught:
-        read_elem(shared / "bad" / f"{name}.elem")
+        read_elem(malformed / f"{name}.elem")
     text = str(caught.value)
     assert f"{name}.elem:1:1: unknown statement" in text
     assert f"{name}.node: there is no such file" in text

@@ -117,34 +117,34 @@ def outcome(path, data, **options):
 
 
 @pytest.mark.parametrize(("name", "message"), REFUSED.items())
-def test_malformed_file_is_refused_with_place_and_reason(shared, name, message):
+def test_malformed_file_is_refused_with_place_and_reason(malformed, name, message):
     with pytest.raises(InputError) as raised:
-        read_mdpa(shared / "bad" / f"{name}.mdpa")
+        read_mdpa(malformed / f"{name}.mdpa")
     assert re.search(message, str(raised.value))
     assert len(str(raised.value).splitlines()) == 1
-    assert str(raised.value).startswith(f"{shared / 'bad' / name}.mdpa:")
+    assert str(raised.value).startswith(f"{malformed / name}.mdpa:")
 
 
 @pytest.mark.parametrize(("name", "notes"), ACCEPTED.items())
-def test_odd_file_is_accepted_with_its_notes(shared, name, notes):
-    document = read_mdpa(shared / "bad" / f"{name}.mdpa")
+def test_odd_file_is_accepted_with_its_notes(malformed, name, notes):
+    document = read_mdpa(malformed / f"{name}.mdpa")
     assert [n.text[: len(text)] for n, text in zip(document.notes, notes, strict=True)] == notes
     more = name in ("47_unreferenced_node", "48_coincident_nodes")
     assert (document.mesh.n_nodes, document.mesh.n_elements) == (8 + more, 1)
 
 
-def test_every_malformed_file_has_its_expectation(shared):
-    names = {path.stem for path in (shared / "bad").glob("*.mdpa")}
+def test_every_malformed_file_has_its_expectation(malformed):
+    names = {path.stem for path in malformed.glob("*.mdpa")}
     assert names == REFUSED.keys() | ACCEPTED.keys()
 
 
-def test_two_nodes_on_a_line_are_read_without_strict(shared):
-    document = read_mdpa(shared / "bad" / "40_two_values_on_line.mdpa", strict=False)
+def test_two_nodes_on_a_line_are_read_without_strict(malformed):
+    document = read_mdpa(malformed / "40_two_values_on_line.mdpa", strict=False)
     assert document.mesh.n_nodes == 8
 
 
-def test_unknown_element_is_kept_for_the_next_stage(shared):
-    (block,) = read_mdpa(shared / "bad" / "04_unknown_element.mdpa").mesh.blocks
+def test_unknown_element_is_kept_for_the_next_stage(malformed):
+    (block,) = read_mdpa(malformed / "04_unknown_element.mdpa").mesh.blocks
     assert (block.name, block.shape, block.nodes.shape) == ("SmallDisplacementElement3D9N", None, (1, 8))
 
 

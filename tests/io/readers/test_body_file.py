@@ -60,7 +60,13 @@ def test_one_word_is_the_kind(scene, word, kind):
 
 def test_a_march_is_that_of_python(scene):
     found = scene(
-        body={"kind": "finite-element", "form": "TL", "lumped": True, "scheme": "DEF_LIM", "damping": 1e-4},
+        body={
+            "kind": "finite-element",
+            "formulation": "total_lagrangian",
+            "lumped": True,
+            "scheme": "DEF_LIM",
+            "damping": 1e-4,
+        },
         start={"rotation": [0, 0, np.pi / 6], "angular_velocity": [0.05, 10, 0.05]},
         loads=[{"type": "gravity", "acceleration": [0, 0, -9.81]}],
         time={"step": 0.001, "steps": 6, "every": 2, "substeps": 2},
@@ -70,7 +76,7 @@ def test_a_march_is_that_of_python(scene):
     body = kl.FiniteElementBody(
         kl.box((0.4, 0.6, 1.0), (1, 2, 2)), RUBBER, lumped=True, scheme="DEF_LIM", damping=1e-4
     )
-    body.turn(exp(np.array([0, 0, np.pi / 6])))
+    body.rotate(exp(np.array([0, 0, np.pi / 6])))
     body.set_velocity(angular=(0.05, 10, 0.05))
     body.add(kl.Gravity((0, 0, -9.81)))
     expected = list(kl.march(body, 0.001, 6, every=2, substeps=2))
@@ -80,6 +86,7 @@ def test_a_march_is_that_of_python(scene):
 
 
 RAMP = {"times": [0.0, 1.0], "values": [0.0, 2.0]}
+DESCENDING = {"times": [1, 0], "values": [0, 0]}
 POINT, CORNER = [0.2, 0.3, 0.5], [0.4, 0.6, 1.0]
 LOADS = {
     "gravity": ({"acceleration": [0, 0, -10]}, kl.Gravity((0, 0, -10))),
@@ -97,13 +104,13 @@ LOADS = {
 
 
 @pytest.mark.parametrize("name", LOADS)
-@pytest.mark.parametrize("factor", [None, 3.0, RAMP])
-def test_every_load_is_that_of_python(scene, name, factor):
+@pytest.mark.parametrize("amplitude", [None, 3.0, RAMP])
+def test_every_load_is_that_of_python(scene, name, amplitude):
     values, load = LOADS[name]
-    more = {} if factor is None else {"factor": factor}
+    more = {} if amplitude is None else {"amplitude": amplitude}
     body = scene(loads=[{"type": name, **values, **more}]).body
     twin = kl.RigidBody(body.mesh, RUBBER)
-    twin.add(load, 1.0 if factor is None else 3.0 if factor == 3.0 else kl.TimeSeries([0, 1], [0, 2]))
+    twin.add(load, 1.0 if amplitude is None else 3.0 if amplitude == 3.0 else kl.TimeSeries([0, 1], [0, 2]))
     found = body.external_load(time=0.25)
     np.testing.assert_array_equal(found, twin.external_load(time=0.25))
     assert np.abs(found).max() > 0
@@ -112,9 +119,9 @@ def test_every_load_is_that_of_python(scene, name, factor):
 CONSTRAINTS = {
     "fix_point": {"points": [[0, 0, 0], [0, 0.6, 0]]},
     "fix_direction": {"points": "z-", "direction": [0, 0, 2]},
-    "set_displacement": {"points": POINT, "direction": [1, 0, 0], "displacement": RAMP},
-    "set_velocity": {"points": POINT, "direction": [1, 0, 0], "velocity": 2.0},
-    "set_acceleration": {"points": POINT, "direction": [1, 0, 0], "acceleration": 2.0},
+    "prescribed_displacement": {"points": POINT, "direction": [1, 0, 0], "displacement": RAMP},
+    "prescribed_velocity": {"points": POINT, "direction": [1, 0, 0], "velocity": 2.0},
+    "prescribed_acceleration": {"points": POINT, "direction": [1, 0, 0], "acceleration": 2.0},
     "rigid_link": {"point": CORNER, "anchor": [0.4, 0.6, 3.0]},
 }
 
@@ -135,10 +142,12 @@ def test_every_constraint_holds(scene, name):
         assert np.abs(body.position(body.mesh.points[body.mesh.nodes("z-")])[:, 2]).max() < 1e-12
     elif name == "rigid_link":
         assert np.linalg.norm(body.position(CORNER) - [0.4, 0.6, 3.0]) == pytest.approx(2.0, abs=1e-12)
-    elif name == "set_displacement":
+    elif name == "prescribed_displacement":
         assert moved[0] == pytest.approx(2 * t, abs=1e-12)
     else:
-        assert body.velocity(POINT)[0] == pytest.approx(2.0 if name == "set_velocity" else 2 * t, abs=1e-12)
+        assert body.velocity(POINT)[0] == pytest.approx(
+            2.0 if name == "prescribed_velocity" else 2 * t, abs=1e-12
+        )
 
 
 def test_a_body_without_mesh_has_characteristics(scene):
@@ -198,9 +207,12 @@ MISTAKES = [
     ({"body": None}, "key 'body' is missing"),
     ({"body": "rigit"}, "unknown kind of body 'rigit'. Did you mean rigid"),
     ({"body": "car"}, r"unknown kind of body 'car'. There are (?=.*, rigid\b)(?=.*, finite-element\b)"),
-    ({"body": {"kind": "rigid", "form": "TL"}}, r"unknown key 'body\.form'"),
+    ({"body": {"kind": "rigid", "formulation": "total_lagrangian"}}, r"unknown key 'body\.formulation'"),
     ({"body": {"kind": "rigid", "scheme": "DEF_LIM"}}, "schemes of a rigid body are RIG_NEG"),
-    ({"body": {"kind": "finite-element", "form": "TLL"}}, "unknown form of a finite-element body 'TLL'"),
+    (
+        {"body": {"kind": "finite-element", "formulation": "TLL"}},
+        "unknown formulation of a finite-element body 'TLL'",
+    ),
     ({"body": {"kind": "rigid", "mass_properties": {"mas": 1}}}, r"unknown key 'body\.mass_properties\.mas'"),
     ({"body": {"kind": "rigid", "mass_properties": {"inertia": [1, 2]}}}, "three rows of three numbers"),
     ({"mesh": None}, "key 'mesh' is missing: it is the shape of the body"),
@@ -222,12 +234,12 @@ MISTAKES = [
     ({"loads": [{"type": "pressure", "on": "top", "pressure": 1}]}, "there is no part 'top'"),
     ({"loads": [{"type": "torque", "torque": [1, 0, 0], "frame": "body"}]}, "'spatial' or 'convected'"),
     (
-        {"loads": [{"type": "gravity", "acceleration": [0, 0, 1], "factor": "x"}]},
+        {"loads": [{"type": "gravity", "acceleration": [0, 0, 1], "amplitude": "x"}]},
         r'must be a number or \{"times": \[…\], "values": \[…\]\}',
     ),
     (
-        {"loads": [{"type": "torque", "torque": [0, 0, 1], "factor": {"times": [1, 0], "values": [0, 0]}}]},
-        r"loads\[0\]\.factor: times of a series must ascend",
+        {"loads": [{"type": "torque", "torque": [0, 0, 1], "amplitude": DESCENDING}]},
+        r"loads\[0\]\.amplitude: times of a series must ascend",
     ),
     ({"constraints": [{"type": "fix_point", "points": [1, 2]}]}, r"must be a point \[x, y, z\]"),
     ({"constraints": [{"type": "fix_point", "points": "top"}]}, "there is no part 'top'"),
@@ -250,10 +262,10 @@ def test_a_mistake_is_named_with_its_line(tmp_path, change, message):
 
 
 def test_the_line_is_that_of_the_key(tmp_path):
-    path = written(tmp_path, loads=[{"type": "gravity", "acceleration": [0, 0, 1], "fctor": 1}])
-    line = next(i for i, text in enumerate(path.read_text().splitlines(), 1) if "fctor" in text)
+    path = written(tmp_path, loads=[{"type": "gravity", "acceleration": [0, 0, 1], "amplitud": 1}])
+    line = next(i for i, text in enumerate(path.read_text().splitlines(), 1) if "amplitud" in text)
     with pytest.raises(
-        kl.InputError, match=rf":{line}:\d+: unknown key 'loads\[0\]\.fctor'. Did you mean factor"
+        kl.InputError, match=rf":{line}:\d+: unknown key 'loads\[0\]\.amplitud'. Did you mean amplitude"
     ):
         read_scene(path)
 

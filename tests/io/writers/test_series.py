@@ -180,7 +180,7 @@ def test_turning_points_are_among_the_positions_drawn():
     from kratos_lite.io.writers.pictures import _telling
 
     body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
-    body.constrain(kl.SetDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
+    body.constrain(kl.PrescribedDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
     q = [kl.State.of(body).q, *(state.q for state in kl.march(body, 0.01, 100))]
     assert _telling(body, q, 4) == [0, 25, 75, 100]
     assert _telling(body, q[:1], 6) == [0]
@@ -197,14 +197,14 @@ def test_a_picture_without_states_is_refused(tmp_path):
 @kinds
 def test_a_body_is_turned_about_its_mass_center(kind):
     body = kind(kl.box((0.4, 0.6, 1.0), cells=(1, 2, 2)), RUBBER)
-    body.turn(exp(np.array([0.0, 0.0, np.pi / 2])))
+    body.rotate(exp(np.array([0.0, 0.0, np.pi / 2])))
     X = body.mesh.points
     A = X - body.center
     turned = body.center + np.stack([-A[:, 1], A[:, 0], A[:, 2]], axis=1)
     np.testing.assert_allclose(body.position(X), turned, atol=1e-15)
     assert abs(body.internal_energy()) < 1e-9
     with pytest.raises(kl.InputError, match="must be orthogonal"):
-        body.turn(2 * np.eye(3))
+        body.rotate(2 * np.eye(3))
 
 
 def test_a_body_comes_back_from_a_state():
