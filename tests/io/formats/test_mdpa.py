@@ -9,8 +9,6 @@ import pytest
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
-from kratos_lite.io.formats.mdpa.rows import Layout, _exact, _fast
-from kratos_lite.io.formats.mdpa.scan import Source
 from kratos_lite.io.names import condition_shape, element_shape
 
 COUNTED = [
@@ -268,26 +266,6 @@ def test_malformed_ids_are_refused(read, token):
                 "Begin Properties 1\nEnd", "Begin Properties 1 End"
             )
         )
-
-
-def test_fast_and_exact_reader_agree_on_random_tokens():
-    rng = np.random.default_rng(7)
-    letters = np.array([*b"0 1 1 2 9 . - + e D".split(), b" ", b" ", b" ", b" ", b"\n"])
-    layouts = [Layout("node", "irr"), Layout("id", "i"), Layout("node", "ibr"), Layout("element", "ip")]
-    taken = 0
-    for round_ in range(20000):
-        layout = layouts[round_ % 4]
-        data = b"".join(rng.choice(letters, 3 + round_ % 12)) + b"\n"
-        source = Source("a", data, strict=bool(round_ % 3))
-        fast = _fast(source, (0, len(data)), layout)
-        if fast is not None:
-            taken += 1
-            exact = _exact(source, (0, len(data)), layout)
-            assert not source.problems, data
-            assert fast.ints.tolist() == exact.ints.tolist(), data
-            assert fast.reals.tobytes() == exact.reals.tobytes(), data
-            assert fast.lines.tolist() == exact.lines.tolist(), data
-    assert taken > 300
 
 
 # ---- values --------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import pytest
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.mdpa import scan
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
-from kratos_lite.io.formats.mdpa.rows import Layout, _compiled, _exact, _fast
+from kratos_lite.io.formats.mdpa.rows import Layout, _compiled, _exact
 from kratos_lite.io.formats.mdpa.scan import Source
 from kratos_lite.native import kernels, threads
 
@@ -64,7 +64,7 @@ def test_anything_unusual_is_left_to_python(row):
 @pytest.mark.parametrize("word", ["0", "1", "00", "01", "001"])
 def test_truth_may_have_leading_zeros_for_every_reader(word):
     data = f"7 {word} 1.5\n".encode()
-    for reader in (_compiled, _fast, _exact):
+    for reader in (_compiled, _exact):
         source = Source("a", data)
         rows = reader(source, (0, len(data)), Layout("node", "ibr"))
         assert (rows.ints.tolist(), rows.reals.tolist()) == ([[7, int(word)]], [[1.5]])
@@ -81,7 +81,7 @@ def big():
 def test_pieces_and_threads():
     data = b"Begin Nodes\n" + big()
     span, layout = (11, len(data)), Layout("node", "irrr")
-    expected = _fast(Source("a", data), span, layout)
+    expected = _exact(Source("a", data), span, layout)
     try:
         for count in (1, 2, 3, 5):
             TEXT.set_threads(count)

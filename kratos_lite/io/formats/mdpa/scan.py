@@ -16,7 +16,7 @@ from kratos_lite.io.text import shown
 from kratos_lite.native import kernels
 
 Span = tuple[int, int]
-SMALL = 200_000
+SMALL = 2_000
 """Bytes below which the compiled kernels are not worth loading."""
 MAX_DEPTH = 64
 """Deepest nesting of blocks."""
