@@ -59,7 +59,8 @@ class TimeIntegration:
         flag(self.lumped, "lumped")
 
     def __str__(self) -> str:
-        return f"{self.steps} steps of {self.step:g} s"
+        by = f" by {self.integrator.name}" if self.integrator else ""
+        return f"{self.steps} steps of {self.step:g} s{by}"
 
 
 @dataclass

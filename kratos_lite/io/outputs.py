@@ -11,7 +11,6 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.documents import ELEM_SET, ending
 from kratos_lite.io.writers.endings import check_ending, check_result, check_series
-from kratos_lite.io.writers.pictures import check_picture, draw
 from kratos_lite.io.writers.results import write_result
 
 
@@ -33,22 +32,28 @@ def check_outputs(case: Case) -> None:
         raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o {kind}")
     if outputs.mode and case.time and not any(ending(path) == ".pvd" for path in outputs.results):
         raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o OUT.pvd")
-    for path, wanted in ((outputs.json, ".json"), (outputs.state, ".npz")):
-        if path is not None:
-            check_ending(path, wanted)
+    for single, wanted in ((outputs.json, ".json"), (outputs.state, ".npz")):
+        if single is not None:
+            check_ending(single, wanted)
     if outputs.picture is not None:
+        from kratos_lite.io.writers.pictures import check_picture  # rarely needed
+
         check_picture(outputs.picture)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
 
 
 def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
-    """Write what the end of a model gives: results unless they are states in time, summary, picture."""
-    for path in () if in_time else outputs.results:
-        write_result(path, result, outputs.mode)
+    """Write what the end of a model gives: its summary and, at rest, results and picture."""
     if outputs.json is not None:
         write_result(outputs.json, result)
+    if in_time:
+        return
+    for path in outputs.results:
+        write_result(path, result, outputs.mode)
     if outputs.picture is not None:
+        from kratos_lite.io.writers.pictures import draw
+
         draw(outputs.picture, result)
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
+from typing import Any
 
+from kratos_lite.errors import ModelError
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
@@ -50,5 +53,18 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     0.001 m
     """
     check_outputs(case)
-    runner = import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis]}")
-    return runner.run(case, progress)  # type: ignore[no-any-return]
+    outcome: Outcome = runner_of(case).run(case, progress)
+    return outcome
+
+
+def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:
+    """Return the transient or body of a case in time and its states, checked; no step is taken yet."""
+    if case.time is None:
+        raise ModelError("this case is not in time; give its file a section 'time'")
+    subject, states = runner_of(case).prepare(case, progress)
+    return subject, states
+
+
+def runner_of(case: Case) -> Any:
+    """Return the module that runs the analysis of a case."""
+    return import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis]}")

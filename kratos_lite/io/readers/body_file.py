@@ -14,16 +14,16 @@ from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import Problems
+from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.documents import read_document
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
-from kratos_lite.io.settings import Settings, shown
-from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.readers.body_loads import add_constraint, add_load
 from kratos_lite.io.readers.run_file import mesh_file_of, output_of
 from kratos_lite.io.readers.time import read_time_of_body, restart_of
 from kratos_lite.io.readers.values import Read, is_by_part, matrix, number, read_material, vector
+from kratos_lite.io.settings import Settings, shown
 from kratos_lite.io.writers.endings import SERIES, check_ending
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import annulus, box
@@ -114,9 +114,7 @@ def _outputs(settings: Settings, folder: Path) -> Outputs:
 # ---- mesh and material -----------------------------------------------------------------------------
 
 
-def _mesh_and_material(
-    settings: Settings, folder: Path, strict: bool
-) -> tuple[Mesh | None, Material | None]:
+def _mesh_and_material(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh | None, Material | None]:
     mesh, material = _mesh(settings, folder, strict) if "mesh" in settings else (None, None)
     if "material" in settings:
         material = _material(settings.section("material"), mesh)

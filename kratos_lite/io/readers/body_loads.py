@@ -9,7 +9,6 @@ from typing import Any
 from kratos_lite import bodies
 from kratos_lite.bodies import Body
 from kratos_lite.errors import nearest
-from kratos_lite.io.settings import Settings
 from kratos_lite.io.readers.values import (
     Read,
     function,
@@ -20,6 +19,7 @@ from kratos_lite.io.readers.values import (
     text,
     vector,
 )
+from kratos_lite.io.settings import Settings
 from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
 
 

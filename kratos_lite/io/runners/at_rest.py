@@ -9,5 +9,4 @@ from kratos_lite.typing import Progress
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Solve the model."""
-    result = case.model.solve(case.solver, case.tolerance, progress)
-    return Outcome(case, result.table(), result)
+    return Outcome(case, [], case.model.solve(case.solver, case.tolerance, progress))

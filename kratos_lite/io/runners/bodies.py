@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -27,8 +26,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
         State.load(time.restart).put_into(body)
     for path in case.outputs.results:
         SeriesWriter(path, body)
-    options = {"every": time.every, "substeps": time.substeps, "progress": progress}
-    return body, placed(time, lambda: march(body, time.step, time.steps, **options))
+
+    def steps() -> Iterator[State]:
+        return march(body, time.step, time.steps, every=time.every, substeps=time.substeps, progress=progress)
+
+    return body, placed(time, steps)
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:

@@ -38,7 +38,7 @@ def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor:
         make_folder(path)
     with ExitStack() as stack:
         if outputs.state is not None:
-            stack.callback(lambda path: last[0].save(path), outputs.state)
+            stack.callback(_save, last, outputs.state)
         series = [
             stack.enter_context(SeriesWriter(path, subject, mode=outputs.mode or "binary"))
             for path in outputs.results
@@ -49,3 +49,7 @@ def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor:
         for last[0] in states:
             for recorder in (*series, monitor):
                 recorder.add(last[0])
+
+
+def _save(last: list[Any], path: str) -> None:
+    last[0].save(path)

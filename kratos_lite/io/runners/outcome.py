@@ -19,7 +19,7 @@ class Outcome:
     Attributes
     ----------
     case : what was run.
-    rows : the summary: labels and values.
+    rows : the summary: labels and values; those of the result where there are none.
     result : of a model at its end, or None.
     lines : a table instead of the summary, as of natural frequencies.
     """
@@ -30,7 +30,23 @@ class Outcome:
     lines: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
-        return "\n".join([*self.lines, *(f"{name:<{WIDTH}}{text}" for name, text in self.rows)])
+        return "\n".join(self.summary())
+
+    def summary(self, *, verbose: bool = False) -> list[str]:
+        """Return the lines of the summary.
+
+        Parameters
+        ----------
+        verbose : say also what the solution did without.
+
+        Returns
+        -------
+        list of str
+            A label and a value each.
+        """
+        rows = self.rows or (self.result.table() if self.result else [])
+        shown = [(name, text) for name, text in rows if verbose or name != "skipped"]
+        return [*self.lines, *(f"{name:<{WIDTH}}{text}" for name, text in shown)]
 
     def compare(self) -> list[str]:
         """Return a line for each expected value of the case: passed, failed or not evaluated.

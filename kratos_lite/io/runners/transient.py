@@ -16,6 +16,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import draw
+from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import NodalForces, Timed
 from kratos_lite.typing import Progress
 
@@ -52,13 +53,14 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     summary, clock = _Summary(transient), perf_counter()
     follow(case, transient, start, states, summary)
     rows = summary.rows(case, perf_counter() - clock)
+    if case.outputs.picture is not None:
+        _draw(case.outputs.picture, case.model.mesh, summary.last)
     return Outcome(case, rows, transient.result(summary.last))
 
 
-def draw_end(path: str, case: Case, state: Moment) -> None:
-    """Draw the displacement of a state."""
+def _draw(path: str, mesh: Mesh, state: Moment) -> None:
     title = f"displacement at t = {state.time:g} s"
-    draw(path, case.model.mesh, state.u, np.linalg.norm(state.u, axis=1), title=title, unit="m")
+    draw(path, mesh, state.u, np.linalg.norm(state.u, axis=1), title=title, unit="m")
 
 
 class _Summary:

@@ -68,8 +68,8 @@ class Recorded(Protocol):
 class RecordedBody:
     """A body, or many as arrays only."""
 
-    columns = OF_BODIES
-    names = ("time", "step", "q", "u", "external_work")
+    columns: tuple[str, ...] = OF_BODIES
+    names: tuple[str, ...] = ("time", "step", "q", "u", "external_work")
 
     def __init__(self, body: Body, path: str | Path) -> None:
         self.body, self.path = body, path
@@ -112,8 +112,8 @@ class RecordedBody:
 class RecordedModel:
     """A transient of a model."""
 
-    columns = OF_MODELS
-    names = ("time", "step", "u", "v", "a", "reactions")
+    columns: tuple[str, ...] = OF_MODELS
+    names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
 
     def __init__(self, transient: Transient) -> None:
         self.transient = transient

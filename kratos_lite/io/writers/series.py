@@ -44,8 +44,8 @@ class Frames(Writer):
     def add(self, state: Any) -> None:
         """Write the frame of a state."""
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
-        points, cells = self.subject.fields(state)
-        points["NODE_ID"] = self.mesh.node_ids
+        fields, cells = self.subject.fields(state)
+        points: dict[str, Any] = {**fields, "NODE_ID": self.mesh.node_ids}
         write_vtu(self.path.with_name(name), self.mesh, points, cells, mode=self.mode)
         self.frames.append((state.time, name))
 

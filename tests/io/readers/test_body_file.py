@@ -5,11 +5,11 @@ import re
 
 import numpy as np
 import pytest
-
-import kratos_lite as kl
 from kratos_lite.io.scenes.describe import describe_scene
 from kratos_lite.io.scenes.kinds import is_scene
 from kratos_lite.io.scenes.scene import read_scene
+
+import kratos_lite as kl
 
 BOX = {
     "mesh": {"box": {"size": [0.4, 0.6, 1.0], "cells": [1, 2, 2]}},
