@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks import cases, curves, report, scenes, sets
-from benchmarks.driver import ROOT, Driver, Run, results, scratch
+from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
 
 RESULTS = Path(__file__).with_name("results")
@@ -100,7 +100,7 @@ def main(words: Sequence[str] | None = None) -> int:
     print("\n" + report.text(rows))
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(json.dumps(results(driver, options.command, rows), indent=1) + "\n")
+        options.out.write_text(as_json(results(driver, options.command, rows)))
         print(f"wrote {options.out}")
     return 0 if any("failed" not in row for row in rows) else 1
 

@@ -50,7 +50,8 @@ def work(job: Job, kl: Any) -> Array:
     from kratos_lite.ale import Rotation
     from kratos_lite.ale.matrices import exact_rule
     from kratos_lite.assembly.inertia import inertia_matrices
-    from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+    from kratos_lite.assembly.sparsity_pattern import Pattern
+    from kratos_lite.assembly.stiffness import assemble_stiffness
 
     with job.phase("read"):
         model = wheel(kl, job.kind, job.given["n"])

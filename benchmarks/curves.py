@@ -64,8 +64,7 @@ def starts(rows: Iterable[Row]) -> str:
     """Return what each program needs before its work: interpreter and imports, the median over its rows."""
     found: dict[str, list[float]] = defaultdict(list)
     for row in rows:
-        inside = sum(s for name, s in row["phases"].items() if name not in ("import", "answer"))
-        found[row["program"]].append(row["process"] - inside)
+        found[row["program"]].append(row["start"])
     return table(["program", "start, s"], [[name, seconds(float(np.median(t)))] for name, t in found.items()])
 
 

@@ -251,6 +251,8 @@ class Driver:
         row["process"] = round(statistics.median(a["process"] for a in answers), 6)
         row["spread"] = [round(pick(a["process"] for a in answers), 6) for pick in (min, max)]
         row["work"] = round(sum(s for name, s in median.items() if name not in OVERHEAD), 6)
+        inside = sum(s for name, s in median.items() if name not in ("import", "answer"))
+        row["start"] = round(row["process"] - inside, 6)
         row["peak"] = int(statistics.median(a["peak"] for a in answers))
         row["runs"] = len(answers)
         for word in ("unknowns", "iterations", "residual", "solver", "version", "errors", "drift"):
@@ -288,8 +290,36 @@ def results(driver: Driver, command: str, rows: Iterable[dict[str, Any]]) -> dic
         "versions": versions,
         "absent": driver.absent,
         "repeats": driver.repeats,
-        "rows": [{key: value for key, value in row.items() if key != "version"} for row in rows],
+        "rows": [kept(row) for row in rows],
     }
+
+
+def kept(row: dict[str, Any]) -> dict[str, Any]:
+    """Return what is kept of a row: all of it, but of run time against error only what the page shows."""
+    dropped = {"version"}
+    if row["group"] == "error":
+        dropped |= {"task", "phases", "process", "spread", "peak", "runs", "unknowns", "iterations"}
+        dropped |= {"residual", "solver"}
+        errors = {k: v for k, v in row.get("errors", {}).items() if k in ("difference", "displacement")}
+        row = row | {"errors": {name: float(f"{value:.6g}") for name, value in errors.items()}}
+    return {key: value for key, value in row.items() if key not in dropped}
+
+
+def as_json(found: dict[str, Any]) -> str:
+    """Return results as the text of a file with one row a line.
+
+    >>> print(as_json({"command": "error", "rows": [{"n": 1}, {"n": 2}]}), end="")
+    {
+     "command": "error",
+     "rows": [
+      {"n": 1},
+      {"n": 2}
+     ]
+    }
+    """
+    head = json.dumps(found | {"rows": []}, indent=1)
+    rows = ",\n".join(f"  {json.dumps(row)}" for row in found["rows"])
+    return head.replace('"rows": []', f'"rows": [\n{rows}\n ]') + "\n"
 
 
 def scratch() -> tempfile.TemporaryDirectory[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-import kratos_lite as kl
 from benchmarks import fields
 from benchmarks.scenes import Scene
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.quadrature import rule_for
 
@@ -41,7 +41,7 @@ def errors(scene: Scene, u: Array) -> dict[str, float]:
     return {"displacement": float(l2), "energy": float(energy), "nodal": float(nodal)}
 
 
-def _integrals(scene: Scene, group: kl.groups.ElementGroup, nodes: NDArray[np.int32], u: Array) -> Array:
+def _integrals(scene: Scene, group: ElementGroup, nodes: NDArray[np.int32], u: Array) -> Array:
     """Return ∫ |u_h - u|², ∫ |u|², ∫ e:C:e of the error and of the exact strain, over some elements."""
     shape = group.element.shape
     fine = len(group) >= FINE and len(shape.nodes) == shape.corners

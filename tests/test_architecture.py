@@ -6,40 +6,17 @@ import sys
 from pathlib import Path
 
 import pytest
+import structure
+from structure import FLOORS
 
 import kratos_lite
 
 PACKAGE = Path(kratos_lite.__file__).parent
-FLOORS = [
-    {"errors", "typing", "validation", "registry", "voigt", "time_series"},
-    {"native", "shapes", "quadrature"},
-    {"elements", "materials"},
-    {"mesh"},
-    {"assembly", "view"},
-    {"solvers"},
-    {"model"},
-    {"ale", "bodies"},
-    {"analysis"},
-    {"io", "testing"},
-    {"cli"},
-    {"__main__"},
-]
-"""Each module (or package) imports only from floors above it in this list."""
-
 
 UPWARDS = {("ale", "analysis"), ("analysis", "io"), ("bodies", "io"), ("view", "io")}
 """Rooms of which the first still imports from the second, a floor above; take out what is gone."""
 CIRCULAR = {"ale", "analysis", "bodies", "io"}
 """Rooms with files that still import each other; take out those without."""
-
-
-def modules():
-    for path in sorted(PACKAGE.rglob("*.py")):
-        parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
-        if parts[-1] == "__init__":
-            parts.pop()
-        if parts:
-            yield ".".join(parts), path
 
 
 def floor(module):
@@ -48,26 +25,24 @@ def floor(module):
         for name in names:
             if module == name or module.startswith(name + "."):
                 return number, name
-    pytest.fail(f"{module} has no floor; give it one in FLOORS and in docs/architecture.md")
+    pytest.fail(f"{module} has no floor; give it one in docs/structure.py and docs/architecture.md")
+
+
+MODULES = list(structure.modules())
+NAMES = {name for name, _ in MODULES}
 
 
 def imports(path):
-    """Yield the modules of the package that a file imports: at the top, in functions, for types alone."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path.name}: relative import"
-            if node.module and node.module.startswith("kratos_lite"):
-                for alias in node.names:
-                    one = f"{node.module}.{alias.name}".removeprefix("kratos_lite.")
-                    home = node.module.removeprefix("kratos_lite").removeprefix(".")
-                    if one in NAMES or home:
-                        yield one if one in NAMES else home
-        elif isinstance(node, ast.Import):
-            assert not any(alias.name.startswith("kratos_lite.") for alias in node.names)
+    return structure.imports(path, NAMES)
 
 
-MODULES = list(modules())
-NAMES = {name for name, _ in MODULES}
+def test_imports_are_written_in_full():
+    """Neither relative nor ``import kratos_lite.…``, which the other tests would not see."""
+    for _, path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            assert not getattr(node, "level", 0), f"{path.name}: relative import"
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("kratos_lite.") for alias in node.names)
 
 
 @pytest.mark.parametrize(("module", "path"), MODULES, ids=[name for name, _ in MODULES])
@@ -96,6 +71,11 @@ def circles():
 def test_no_files_import_each_other():
     found = [circle for circle in circles() if not {name.split(".")[0] for name in circle} & CIRCULAR]
     assert [sorted(circle) for circle in found] == []
+
+
+def test_the_picture_of_the_structure_is_current():
+    message = "run python docs/structure.py"
+    assert structure.PICTURE.read_text(encoding="utf-8") == structure.picture(), message
 
 
 def test_few_floors_and_few_modules_at_the_root():

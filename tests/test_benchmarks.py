@@ -280,7 +280,7 @@ def test_command_writes_results_and_the_page(tmp_path, monkeypatch, capsys):
 def rows_of(times):
     return [
         {"group": "error", "scene": "s", "program": "kratos_lite", "kind": kind, "n": n, "work": t,
-         "errors": {"displacement": e}, "phases": {"solve": t}, "process": t + 1}
+         "errors": {"displacement": e}, "start": 1.0}
         for kind, points in times.items()
         for n, (t, e) in enumerate(points)
     ]  # fmt: skip

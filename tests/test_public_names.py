@@ -79,7 +79,6 @@ INCOMPLETE = {
     "KinematicLinear.scalar_mass",
     "KinematicLinear.stiffness",
     "KinematicLinear.stiffness_by_axis",
-    "KinematicLinear.stiffness_from_tables",
     "KinematicLinear.strain",
     "KinematicLinear.stress",
     "KinematicLinear.volume",

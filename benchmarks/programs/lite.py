@@ -69,7 +69,7 @@ def assembly(job: Job, model: Any) -> None:
     points, connectivity = model.mesh.points, [group.nodes for group in groups]
 
     def pattern() -> Any:
-        from kratos_lite.assembly.stiffness import PatternCache
+        from kratos_lite.assembly.sparsity_pattern import PatternCache
 
         return PatternCache().get(len(points), connectivity)
 

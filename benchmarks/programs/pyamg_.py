@@ -14,7 +14,8 @@ def work(job: Job) -> Array | None:
         import scipy.sparse as sp
 
         import kratos_lite as kl
-        from kratos_lite.assembly.stiffness import PatternCache, assemble_stiffness
+        from kratos_lite.assembly.sparsity_pattern import PatternCache
+        from kratos_lite.assembly.stiffness import assemble_stiffness
     job.answer["version"] = pyamg.__version__
     job.read()
     with job.phase("matrix"):

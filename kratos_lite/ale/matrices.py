@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from kratos_lite.ale.motion import Motion, Rotation
-from kratos_lite.assembly import fields
+from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
@@ -130,7 +130,7 @@ class MotionMatrices:
         """Return ∫ σ(u0) : (grad N_i ⊗ grad N_j) as data (nnz,) in N/m, of displacements u0 (n, 3)."""
         data = np.zeros(len(self.pattern.indices))
         for number, group in enumerate(self.groups):
-            stress = tensor(fields.at_gauss(self.points, group, u0))
+            stress = tensor(gauss_point_fields.at_gauss(self.points, group, u0))
             for chunk in group.chunks():
                 dV, D = group.at(self.points, chunk)._gauss
                 weighted = stress[chunk] * dV[..., None, None]

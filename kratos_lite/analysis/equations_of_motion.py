@@ -20,7 +20,6 @@ from kratos_lite.analysis.time_dependent_loads import AppliedLoads, Prescribed
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.rigid_body_modes import check_supports
-from kratos_lite.solvers.banded import add_scalar
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.solvers.supports import resolve
@@ -265,7 +264,7 @@ class EquationsOfMotion:
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
             if factor and (terms := made(time)) is not None:
                 scalar = scalar + factor * terms
-        add_scalar(A, scalar)
+        A.add_scalar(scalar)
         if c and self.dashpots is not None:
             A.data += c * self.dashpots.data
         return A

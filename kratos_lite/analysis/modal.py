@@ -10,7 +10,6 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.banded import add_scalar
 from kratos_lite.solvers.eigen import DENSE_MODES, modes
 from kratos_lite.typing import Array, Complexes
 from kratos_lite.validation import whole_number
@@ -143,7 +142,7 @@ def _critical_pencil(e: EquationsOfMotion) -> tuple[Any, Any]:
     """Return K and H, less what stiffens, on the free degrees of freedom."""
     assert e.terms is not None
     H = BlockMatrix(np.zeros_like(e.K.data), e.K.indices, e.K.indptr)
-    add_scalar(H, e.terms.H - (e.stiffening if e.stiffened else 0.0))
+    H.add_scalar(e.terms.H - (e.stiffening if e.stiffened else 0.0))
     return reduced(e, e.K), reduced(e, H)
 
 

@@ -12,9 +12,8 @@ from kratos_lite.ale.checks import attach
 from kratos_lite.ale.motion import Motion
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis, solve_static
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.grouping import element_class, element_groups_of
-from kratos_lite.assembly.stiffness import PatternCache
+from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements

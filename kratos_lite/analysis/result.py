@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly import fields
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import at_gauss, totals
+from kratos_lite.assembly.nodal_values import averages
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.native import described
@@ -142,7 +143,7 @@ class Result:
     def _by_element(self, stress: bool) -> Any:
         """Return (m, g, 6), or a list of (g, 6) where elements have different numbers of points."""
         points, m = self.mesh.points, self.mesh.n_elements
-        parts = [fields.at_gauss(points, group, self._strained, stress=stress) for group in self.groups]
+        parts = [at_gauss(points, group, self._strained, stress=stress) for group in self.groups]
         if len(parts) == 1 and (self.groups[0].rows == np.arange(m)).all():
             return parts[0]
         if len({part.shape[1] for part in parts}) > 1:
@@ -159,7 +160,7 @@ class Result:
     def _averages(self, stress: bool) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and nodal values (n, 6)."""
         m = self.mesh.n_elements
-        return fields.averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
+        return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
 
     def stress_at_nodes_and_elements(self) -> tuple[Array, Array]:
         """Return nodal stresses (n, 6) and element means (m, 6) in Pa from one pass over the elements."""
@@ -196,7 +197,7 @@ class Result:
     @cached_property
     def _totals(self) -> tuple[float, float, int]:
         """Strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
-        return fields.totals(self.mesh.points, self.groups, self._strained)
+        return totals(self.mesh.points, self.groups, self._strained)
 
     def totals(self) -> tuple[float, float, int]:
         """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, its element row."""

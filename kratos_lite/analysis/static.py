@@ -13,7 +13,7 @@ import numpy as np
 from kratos_lite import solvers
 from kratos_lite.analysis.result import Report, Result
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.fields import internal_load
+from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks

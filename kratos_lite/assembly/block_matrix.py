@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.native import kernels
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints, Rows
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array
 
-Ints = NDArray[np.int32]
+
+def block_rows(indptr: Rows) -> Ints:
+    """Return the row of each block of rows that start at indptr (n + 1,), as (nnz,).
+
+    >>> block_rows(np.array([0, 2, 3], np.int32)).tolist()
+    [0, 0, 1]
+    """
+    return np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
 
 
 class BlockMatrix:
@@ -37,7 +42,7 @@ class BlockMatrix:
     array([2., 4., 6.])
     """
 
-    def __init__(self, data: Array, indices: Ints, indptr: Ints) -> None:
+    def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr
 
     @property
@@ -50,9 +55,9 @@ class BlockMatrix:
         """Return A x of a vector (3n,)."""
         compiled = kernels("sparse")
         if compiled is None or x.ndim != 1:
-            return np.asarray(self.scipy() @ x)
+            return self.scipy() @ x
         x = np.ascontiguousarray(x, dtype=float)
-        return np.asarray(compiled.multiply(self.indptr, self.indices, self.data, x))
+        return compiled.multiply(self.indptr, self.indices, self.data, x)
 
     def scipy(self) -> bsr_array:
         """Return the matrix as a scipy.sparse.bsr_array on the same memory."""
@@ -62,9 +67,9 @@ class BlockMatrix:
 
     def rows(self) -> Ints:
         """Return the row of each block, (nnz,)."""
-        return np.repeat(np.arange(len(self.indptr) - 1, dtype=np.int32), np.diff(self.indptr))
+        return block_rows(self.indptr)
 
-    def diagonal_blocks(self) -> NDArray[np.int64]:
+    def diagonal_blocks(self) -> Ints:
         """Return the place in `data` of the diagonal block of each row, (n,)."""
         return np.flatnonzero(self.rows() == self.indices)
 
@@ -79,20 +84,16 @@ class BlockMatrix:
         starts = self.indptr[:-1][np.diff(self.indptr) > 0]
         return float(np.add.reduceat(sums, starts, axis=0).max(initial=0.0))
 
+    def add_scalar(self, m: Array, at: Ints | None = None) -> None:
+        """Add numbers to the diagonals of blocks: A += m 1, in place.
 
-@dataclass(eq=False)
-class LinearLevel:
-    """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
-
-    Attributes
-    ----------
-    K : (3m, 3m) stiffness matrix of the linear elements on the corner nodes.
-    nodes : (m,) int, row among all n nodes of each corner node.
-    indptr, indices, weights : interpolation (n, m) from corner nodes to all nodes in rows (CSR).
-    """
-
-    K: BlockMatrix
-    nodes: NDArray[np.int64]
-    indptr: Ints
-    indices: Ints
-    weights: Array
+        Parameters
+        ----------
+        m : (nnz,), the data of a scalar matrix on the same pattern, or one number for each block of `at`.
+        at : blocks that take the numbers; `diagonal_blocks()` where m (n,) is a lumped mass.
+        """
+        diagonals = self.data.reshape(-1, 9)[:, ::4]
+        if at is None:
+            diagonals += m[:, None]
+        else:
+            diagonals[at] += m[:, None]

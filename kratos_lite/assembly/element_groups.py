@@ -1,20 +1,41 @@
-"""Batches: elements of one kind, rule and material, computed together."""
+"""Element groups: elements of one kind, rule and material, computed together, compiled or in NumPy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements import ELEMENTS, KinematicLinear
+from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.quadrature import Rule
-from kratos_lite.typing import Array, Ints
+from kratos_lite.mesh import Block, Mesh, with_rows
+from kratos_lite.native import kernels
+from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
+
+
+GEOMETRY = ("__init__", "_jacobian", "_gauss", "dV")
+"""Methods of an element that kernels of Gauss points stand for."""
+
+
+def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
+    """Return the kernels of a name, or None where they do not stand for these methods of an element class.
+
+    They stand for those of `KinematicLinear`; a class that overrides one is computed by its own, in NumPy.
+    """
+    return kernels(name) if element.inherits(*methods) else None
+
+
+def floats(values: Any) -> Array:
+    """Return numbers as kernels take them."""
+    return np.ascontiguousarray(values, dtype=float)
 
 
 @dataclass(eq=False)
@@ -34,18 +55,28 @@ class ElementGroup:
     element: type[KinematicLinear]
     rule: Rule
     material: LinearMaterial
-    nodes: NDArray[np.int32]
+    nodes: Rows
     rows: Ints
     prestress: Array | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
 
+    def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
+        """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
+        rule = self.rule if rule is None else rule
+        N, dN = tabulate(self.element.shape, rule)
+        return np.ascontiguousarray(self.nodes, dtype=np.int32), floats(N), floats(dN), floats(rule.weights)
+
+    def law(self) -> tuple[Array, Array | None]:
+        """Return C (6, 6) and the prestress, as kernels take them."""
+        return floats(self.material.C), None if self.prestress is None else floats(self.prestress)
+
     def at(self, points: Array, chunk: slice = slice(None)) -> KinematicLinear:
         """Return the elements of a chunk, placed at `points` (n, 3)."""
         return self.element(points[self.nodes[chunk]], self.rule)
 
-    def take(self, chosen: NDArray[np.bool_]) -> ElementGroup:
+    def take(self, chosen: Mask) -> ElementGroup:
         """Return the group of the chosen elements, a mask (m,)."""
         if chosen.all():
             return self
@@ -66,8 +97,93 @@ class ElementGroup:
         return 0.0 if self.prestress is None else self.prestress[chunk, None, :]
 
 
-def add_nodal(total: Array, nodes: NDArray[np.int32], values: Array) -> None:
+def add_nodal(total: Array, nodes: Rows, values: Array) -> None:
     """Add element vectors (m, k, 3) to nodal vectors `total` (n, 3)."""
     flat = nodes.ravel()
     for axis in range(total.shape[1]):
         total[:, axis] += np.bincount(flat, weights=values[..., axis].ravel(), minlength=len(total))
+
+
+# ---- grouping --------------------------------------------------------------------------------------
+
+
+def element_groups_of(
+    mesh: Mesh,
+    materials: Sequence[LinearMaterial],
+    material_of: Ints | None = None,
+    rules: Mapping[int, Rule | int] | None = None,
+    rule_of: Ints | None = None,
+    prestress: Array | None = None,
+) -> list[ElementGroup]:
+    """Return the elements of a mesh grouped by kind, rule and material.
+
+    Parameters
+    ----------
+    mesh : the elements.
+    materials : all materials.
+    material_of : (m,) number of the material of each element, -1 for none; the first for all if not given.
+    rules : rules or orders of integration 1 … 5 that replace those of the elements, by number.
+    rule_of : (m,) number of the rule of each element, -1 for its own; its own for all if not given.
+    prestress : (m, 6) Pa.
+
+    Raises
+    ------
+    ModelError, InputError
+        For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
+
+    Examples
+    --------
+    >>> from kratos_lite import Isotropic3D, box
+    >>> [len(group) for group in element_groups_of(box(cells=(2, 2, 2)), [Isotropic3D(E=1e9, nu=0.3)])]
+    [8]
+    """
+    m, found = mesh.n_elements, []
+    material_of = np.zeros(m, dtype=np.int64) if material_of is None else material_of
+    rule_of = np.full(m, -1) if rule_of is None else rule_of
+    for block, at in with_rows(mesh.blocks):
+        if not len(block):
+            continue
+        element = element_class(mesh, block)
+        for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+            rows = at.start + mine
+            chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
+            nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
+            stress = None if prestress is None else prestress[rows]
+            found.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
+    if not found:
+        raise ModelError("the model has no elements; nothing can be solved")
+    return found
+
+
+def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[int, int, Ints]]:
+    """Return number of material, number of rule and cells of each group in a block."""
+    if material.min() < 0:
+        e = int(np.argmax(material < 0))
+        raise ModelError(
+            f"{mesh.place(block, e)} has no material (property {block.properties[e]}); "
+            "give one with Model(mesh, material), model.assign or --material"
+        )
+    if material.min() == material.max() and rule.min() == rule.max():
+        return [(int(material[0]), int(rule[0]), np.arange(len(block)))]
+    code = material * (int(rule.max()) + 2) + rule
+    order = np.argsort(code, kind="stable")
+    alike = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
+    return [(int(material[mine[0]]), int(rule[mine[0]]), mine) for mine in alike]
+
+
+def _rule(element: type[KinematicLinear], chosen: Rule | int) -> Rule:
+    """Return a rule or an order of integration as a rule that fits an element."""
+    rule = by_order(element.shape.cell, chosen) if isinstance(chosen, int) else chosen
+    if abs(rule.weights.sum() / element.rule.weights.sum() - 1) > 1e-9:
+        raise InputError(f"{rule} does not fit {element.__name__}: its weights miss the volume of the cell")
+    return rule
+
+
+def element_class(mesh: Mesh, block: Block) -> Any:
+    """Return the element class of a block; raise InputError for unknown kinds."""
+    if block.name not in ELEMENTS:
+        try:
+            ELEMENTS[block.name]
+        except InputError as error:
+            raise InputError(f"{mesh.place(block, 0)}: {error}") from None
+    return ELEMENTS[block.name]

@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.assembly.fields import GEOMETRY
-from kratos_lite.assembly.stiffness import SCATTER_BYTES, Pattern
+from kratos_lite.assembly.element_groups import GEOMETRY, ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
-from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MaterialError
-from kratos_lite.native import kernels
 from kratos_lite.typing import Array
 
 SAME_SHAPE = 1e-10
@@ -32,30 +30,18 @@ SAME_SHAPE = 1e-10
 
 def _compiled(group: ElementGroup) -> Any:
     """Return the kernels if they stand for the geometry of an element class, else None."""
-    if all(getattr(group.element, name) is getattr(KinematicLinear, name) for name in GEOMETRY):
-        return kernels("lagrange")
-    return None
-
-
-def _floats(values: Any) -> Array:
-    return np.ascontiguousarray(values, dtype=float)
+    return compiled("lagrange", group.element, *GEOMETRY)
 
 
 def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
     """Return points, nodes, dN and weights of a group, as kernels take them."""
-    dN = _floats(tabulate(group.element.shape, group.rule)[1])
-    nodes = np.ascontiguousarray(group.nodes, dtype=np.int32)
-    return _floats(points), nodes, dN, _floats(group.rule.weights)
+    nodes, _, dN, weights = group.tables()
+    return floats(points), nodes, dN, weights
 
 
 def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
     """Return displacements, increment and damping, as kernels take them."""
-    return _floats(q), None if dq is None else _floats(dq), damping
-
-
-def _law(group: ElementGroup) -> tuple[Any, ...]:
-    """Return C and prestress of a group, as kernels take them."""
-    return _floats(group.material.C), None if group.prestress is None else _floats(group.prestress)
+    return floats(q), None if dq is None else floats(dq), damping
 
 
 def internal_load(
@@ -85,7 +71,7 @@ def internal_load(
     for group in groups:
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *_law(group))
+            total += module.internal_load(*_placed(points, group), *step, *group.law())
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
@@ -125,65 +111,30 @@ def stiffness(
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
             rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *_law(group), *rows, data)
-        else:
-            _add_stiffness(data, points, group, pattern, number, (q, dq, damping))
+            module.add_stiffness(*_placed(points, group), *step, *group.law(), *rows, data)
+            continue
+
+        def tangent(chunk: slice, group: ElementGroup = group) -> Array:
+            element, at = _moved(points, group, chunk, q, dq, damping)
+            return lagrange.stiffness_by_axis(element, group.material.C, at)
+
+        for _ in add_in_parts(data, group, pattern, number, tangent):
+            pass
     return BlockMatrix(data, pattern.indices, pattern.indptr)
-
-
-def _add_stiffness(
-    data: Array,
-    points: Array,
-    group: ElementGroup,
-    pattern: Pattern,
-    number: int,
-    step: tuple[Array, Array | None, float],
-) -> None:
-    """Add the stiffness of a group in NumPy, in parts."""
-    k = group.nodes.shape[1]
-    for window in group.chunks(SCATTER_BYTES):
-        blocks = np.empty((window.stop - window.start, k, k, 3, 3))
-        for chunk in group.chunks(within=window):
-            element, at = _moved(points, group, chunk, *step)
-            K = lagrange.stiffness_by_axis(element, group.material.C, at)
-            place = slice(chunk.start - window.start, chunk.stop - window.start)
-            blocks[place] = K.transpose(0, 2, 4, 1, 3)
-        pattern.add(data, number, window, blocks)
 
 
 def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> float:
     """Return ∫ (½ E:C:E + S0:E) dV in J of nodal displacements q (n, 3) in m."""
-    return _totals(points, groups, q)[0]
-
-
-def largest_strain(points: Array, groups: Sequence[ElementGroup], q: Array) -> float:
-    """Return the largest |E| = √(E:E) at a Gauss point of nodal displacements q (n, 3) in m."""
-    return _totals(points, groups, q)[1]
-
-
-def _totals(points: Array, groups: Sequence[ElementGroup], q: Array) -> tuple[float, float]:
-    """Return the strain energy and the largest strain."""
-    energy, largest = 0.0, 0.0
+    energy = 0.0
     for group in groups:
-        module = _compiled(group)
-        parts = (
-            [module.totals(*_placed(points, group), _floats(q), *_law(group))]
-            if module
-            else [_totals_of(points, group, q, chunk) for chunk in group.chunks()]
-        )
-        for share, strain in parts:
-            energy += share
-            largest = max(largest, strain)
-    return energy, largest
-
-
-def _totals_of(points: Array, group: ElementGroup, q: Array, chunk: slice) -> tuple[float, float]:
-    element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
-    initial = group.initial_stress(chunk)
-    energy = lagrange.strain_energy(element, group.material.C, displaced, initial).sum()
-    E = lagrange.green_strain(element, displaced)
-    E[..., 3:] /= np.sqrt(2)  # E:E counts the two tensor shears, each half the engineering shear
-    return float(energy), float(np.sqrt((E**2).sum(axis=-1)).max())
+        if module := _compiled(group):
+            energy += module.totals(*_placed(points, group), floats(q), *group.law())[0]
+            continue
+        for chunk in group.chunks():
+            element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
+            initial = group.initial_stress(chunk)
+            energy += float(lagrange.strain_energy(element, group.material.C, displaced, initial).sum())
+    return energy
 
 
 def nodal_gradients(points: Array, groups: Sequence[ElementGroup]) -> tuple[Array, float]:

@@ -9,15 +9,15 @@ over the elements makes all that are asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
-from kratos_lite.native import kernels
+from kratos_lite.elements.kinematic_linear import has_positive_row_sums, tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 
@@ -56,41 +56,16 @@ def inertia_matrices(
     7620.0
     """
     data = {name: np.zeros(len(pattern.indices)) for name in names}
-    points = np.ascontiguousarray(points, dtype=float)
+    points = floats(points)
     for number, group in enumerate(groups):
-        add = _add_compiled if _from_tables(group.element) and kernels("inertia") else _add_computed
-        add(data, points, group, pattern, number, rule_of(group.element), velocity)
+        rule = rule_of(group.element)
+        if module := compiled("inertia", group.element, *STEPS):
+            nodes, N, dN, weights = group.tables(rule)
+            tables = (N, dN, group.material.density * weights, floats(velocity))
+            module.add(points, nodes, *tables, pattern.indptr, pattern.indices, **data)
+        else:
+            _add_computed(data, points, group, pattern, number, rule, velocity)
     return data
-
-
-def _from_tables(element: type[KinematicLinear]) -> bool:
-    """Return whether tables of shape and rule give the matrices: their steps are not redefined."""
-    return all(getattr(element, name) is getattr(KinematicLinear, name) for name in STEPS)
-
-
-def _add_compiled(
-    data: dict[str, Array],
-    points: Array,
-    group: ElementGroup,
-    pattern: Pattern,
-    number: int,
-    rule: Rule,
-    velocity: Array,
-) -> None:
-    """Add the matrices of a group in one pass."""
-    tables: list[Any] = [
-        *tabulate(group.element.shape, rule),
-        group.material.density * rule.weights,
-        velocity,
-    ]
-    kernels("inertia").add(
-        points,
-        pattern.connectivity[number],
-        *(np.ascontiguousarray(table, dtype=float) for table in tables),
-        pattern.indptr,
-        pattern.indices,
-        **data,
-    )
 
 
 def _add_computed(
@@ -102,7 +77,7 @@ def _add_computed(
     rule: Rule,
     velocity: Array,
 ) -> None:
-    """Do the same in NumPy, in parts."""
+    """Add the matrices of a group in NumPy, in parts."""
     for chunk in group.chunks():
         element = group.element(points[group.nodes[chunk]], rule)
         element.mass_rule = rule
@@ -123,3 +98,29 @@ def _computed(element: KinematicLinear, density: float, names: Any, velocity: Ar
         if "H" in names:
             found["H"] = (np.swapaxes(along, -1, -2) * weights) @ along
     return found
+
+
+# ---- lumped mass -----------------------------------------------------------------------------------
+
+
+def lumped_mass(points: Array, groups: Sequence[ElementGroup]) -> Array:
+    """Return the mass of each node, (n,) in kg: `KinematicLinear.lumped_mass` of all elements."""
+    total = np.zeros((len(points), 1))
+    for group in groups:
+        for chunk in group.chunks():
+            part = replace(group, nodes=group.nodes[chunk], rows=group.rows[chunk], prestress=None)
+            add_nodal(total, part.nodes, _element_masses(points, part)[..., None])
+    return total[:, 0]
+
+
+def _element_masses(points: Array, group: ElementGroup) -> Array:
+    """Return the lumped masses (m, k) of the elements of a group in kg."""
+    density, rule = group.material.density, group.element.mass_rule
+    module = compiled("gauss", group.element, "__init__", "_jacobian", "scalar_mass", "lumped_mass")
+    if module is None:
+        return group.at(points).lumped_mass(density)
+    sums, diagonal = module.mass_sums(floats(points), *group.tables(rule))
+    scaled = diagonal * (sums.sum(axis=1) / diagonal.sum(axis=1))[:, None]
+    if has_positive_row_sums(group.element.shape, rule):
+        scaled = np.where((sums > 0).all(axis=1)[:, None], sums, scaled)
+    return density * scaled

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.bodies.constraint_projection import allowed
 from kratos_lite.bodies.deformable import Deformable, Solve
 from kratos_lite.bodies.formulations import FORMULATIONS, Formulation, Modal

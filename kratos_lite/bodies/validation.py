@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.grouping import element_class, element_groups_of
+from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh

@@ -251,7 +251,7 @@ class KinematicLinear:
         K_iajb = λ P_iajb + μ P_jaib + μ δ_ij P_kakb with P_iajb = Σ dN_a/dX_i dN_b/dX_j dV.
         """
         C = np.asarray(C, dtype=float)
-        if C.ndim == 2 and self.stiffness_from_tables() and self.constant_jacobian:
+        if C.ndim == 2 and self.inherits(*STIFFNESS_STEPS) and self.constant_jacobian:
             return self._affine_stiffness(C)
         dV, D = self._gauss
         g, n = D.shape[-3], D.shape[-1]
@@ -298,9 +298,19 @@ class KinematicLinear:
         return bool((change <= 8 * np.finfo(float).eps * size).all())
 
     @classmethod
-    def stiffness_from_tables(cls) -> bool:
-        """Return whether tables of shape and rule give the stiffness: its steps are not redefined."""
-        return all(getattr(cls, name) is getattr(KinematicLinear, name) for name in STIFFNESS_STEPS)
+    def inherits(cls, *methods: str) -> bool:
+        """Return whether a class has these methods from `KinematicLinear`, so that kernels may replace them.
+
+        Parameters
+        ----------
+        methods : names of methods.
+
+        Returns
+        -------
+        bool
+            False if the class overrides one of them.
+        """
+        return all(getattr(cls, name) is getattr(KinematicLinear, name) for name in methods)
 
     # ---- mass ----------------------------------------------------------------------------------
 

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import re
 import stat
+from functools import cached_property
 from pathlib import Path
 
-from kratos_lite.errors import InputError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.errors import InputError, Problems
+from kratos_lite.io.document import Note
 
 MAX_LINE = 1_000_000
 """Longest line that is read, in bytes."""
@@ -98,6 +103,52 @@ def blank_comments(data: bytes, source: str = "") -> bytes:
         return b"\n".join(b" " * len(piece) for piece in match.group().split(b"\n"))
 
     return _COMMENT.sub(blank, data)
+
+
+class Source:
+    """Text of an input file without its comments, and where in it something is wrong or odd.
+
+    Parameters
+    ----------
+    name : the file, for messages.
+    data : its text, see `read_bytes` and `blank_comments`.
+    problems, notes : collect what is wrong and what is odd.
+    origin : name of the file in notes; none for the main file of a document.
+    """
+
+    def __init__(
+        self, name: str, data: bytes, problems: Problems, notes: list[Note], origin: str = ""
+    ) -> None:
+        self.name, self.data, self.problems, self.notes, self.origin = name, data, problems, notes, origin
+
+    @cached_property
+    def _line_ends(self) -> NDArray[np.int64]:
+        return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == ord("\n"))
+
+    def lines(self, offsets: ArrayLike) -> NDArray[np.int32]:
+        """Return the lines, from 1, of offsets."""
+        return (np.searchsorted(self._line_ends, offsets) + 1).astype(np.int32)
+
+    def line(self, offset: int) -> int:
+        """Return the line, from 1, of an offset."""
+        return int(self.lines(offset))
+
+    def problem(self, text: str, offset: int) -> None:
+        """Note what is wrong at an offset."""
+        column = offset - self.data.rfind(b"\n", 0, offset)
+        self.problems.add(f"{self.name}:{self.line(offset)}:{column}: {text}")
+
+    def problem_in_line(self, text: str, line: int) -> None:
+        """Note what is wrong in a line."""
+        self.problems.add(f"{self.name}:{line}: {text}")
+
+    def note(self, text: str, offset: int) -> None:
+        """Note what was kept without use, skipped or found odd at an offset."""
+        self.note_in_line(text, self.line(offset))
+
+    def note_in_line(self, text: str, line: int) -> None:
+        """Note what was kept without use, skipped or found odd in a line."""
+        self.notes.append(Note(line, text, self.origin))
 
 
 def shown(token: bytes) -> str:

@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.mesh.blocks import Block
-from kratos_lite.shapes import Hexahedron8, Pyramid5, Shape, Tetrahedron4, Wedge6
+from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
 
 BRANCHES = 8
 """Boxes that one box of the next level encloses."""
 BULGE = 3.0
 """Most that the functions of the nodes beyond the corners sum up to in any shape, absolute values taken."""
-LINEAR: dict[str, type[Shape]] = {
-    shape.cell: shape for shape in (Hexahedron8, Pyramid5, Tetrahedron4, Wedge6)
-}
-"""The shape of the corners alone, by family of cells."""
 
 
 def is_solid(block: Block) -> bool:

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.assembly import fields
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, MeshError, SolveError
@@ -85,7 +85,7 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
         _, dN = tabulate(shape, kind.rule)
         dN = np.concatenate([dN, [shape.dN(xi) for xi in shape.nodes]])
         limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
-        doubtful = np.flatnonzero(~fields.clearly_positive(mesh.points, block.nodes, kind, dN, g))
+        doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, kind, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))
         for start in range(0, len(doubtful), step):
             cells = doubtful[start : start + step]
@@ -137,7 +137,7 @@ def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     replaced = [group for group in groups if group.rule is not group.element.rule]
     for group in replaced:
         _, dN = tabulate(group.element.shape, group.rule)
-        part = group.take(~fields.clearly_positive(mesh.points, group.nodes, group.element, dN, len(dN)))
+        part = group.take(~clearly_positive(mesh.points, group.nodes, group.element, dN, len(dN)))
         for chunk in part.chunks():
             bad = (part.at(mesh.points, chunk).determinants(dN) <= 0).any(axis=1)
             if bad.any():

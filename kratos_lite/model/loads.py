@@ -9,7 +9,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly import fields
+from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
@@ -63,7 +63,7 @@ class BodyForce(Load):
         for group in groups:
             b, part = self.per_volume(group), group.take(chosen[group.rows])
             if b.any() and len(part):
-                total += fields.body_force(mesh.points, part, b)
+                total += gauss_point_fields.body_force(mesh.points, part, b)
         return total
 
 

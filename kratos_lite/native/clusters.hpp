@@ -7,7 +7,6 @@
 
 #pragma once
 #include <cmath>
-#include <numeric>
 
 #include "aggregation.hpp"
 #include "skyline.hpp"
@@ -17,7 +16,7 @@ namespace kl {
 constexpr double NEAR = 9, FAR = 16;     // squares of distances, to that of the nearest node
 constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
 constexpr double FILL = 4;               // nodes in the envelope of a cluster, to its blocks in A
-constexpr double UNLIKE = 1e3;           // stiffness of one node to that of another
+constexpr double CONTRAST = 1e3;           // largest stiffness of one node to that of another
 constexpr int64_t SAMPLE = 2000;         // nodes that show whether a mesh is stretched
 
 inline double squared_distance(const double* X, int64_t i, int64_t j) {
@@ -26,7 +25,7 @@ inline double squared_distance(const double* X, int64_t i, int64_t j) {
     return sum;
 }
 
-// Squares of the distances to the nearest and to the farthest linked node; nodes at the same place
+// Squares of the distances to the nearest and to the farthest linked node; nodes at the same point
 // do not count.
 inline std::pair<double, double> extent(const Graph& g, const double* X, int64_t i) {
     double low = INFINITY, high = 0;
@@ -80,41 +79,37 @@ public:
             if (n < 0) n = found++;
             of[i] = n;
         }
-        starts.assign(found + 1, 0);
-        for (int32_t c : of) ++starts[c + 1];
-        std::partial_sum(starts.begin(), starts.end(), starts.begin());
-        members.resize(g.rows);
-        Ints next(starts.begin(), starts.end() - 1);
-        for (int64_t i = 0; i < g.rows; ++i) members[next[of[i]]++] = static_cast<int32_t>(i);
-        Ints place(g.rows);
+        members_of(of, found, starts, members);
+        Ints position(g.rows);
         over(1024, [&](int64_t first, int64_t last) {
-            for (int64_t c = first; c < last; ++c) arrange(g, c, place);
+            for (int64_t c = first; c < last; ++c) arrange(g, c, position);
         });
     }
 
-    // Nodes of the envelope of cluster c, where each node has its place.
-    int64_t envelope(const Graph& g, int64_t c, Ints& place) const {
+    // Nodes of the envelope of cluster c, with the position of each node.
+    int64_t envelope(const Graph& g, int64_t c, Ints& position) const {
         int64_t sum = 0;
-        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) place[members[p]] = p;
-        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) sum += p - leftmost(g, p, place) + 1;
+        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) position[members[p]] = p;
+        for (int32_t p = starts[c]; p < starts[c + 1]; ++p) sum += p - leftmost(g, p, position) + 1;
         return sum;
     }
 
-    // Factorise the part of each cluster of A, of b x b blocks, where fixed components stand alone.
-    void factorise(const Graph& g, const double* A, int b, const std::vector<uint8_t>& fixed) {
-        Ints place(g.rows);
-        for (int64_t p = 0; p < g.rows; ++p) place[members[p]] = static_cast<int32_t>(p);
+    // Factorize the part of each cluster of A, of b x b blocks, where fixed components stand alone.
+    void factorize(const Graph& g, const double* A, int b, const Bytes& fixed) {
+        Ints position(g.rows);
+        for (int64_t p = 0; p < g.rows; ++p) position[members[p]] = static_cast<int32_t>(p);
         exact.at.assign(g.rows * b + 1, 0);
         for (int64_t p = 0; p < g.rows; ++p) {
-            const int64_t before = p - leftmost(g, p, place);
+            const int64_t before = p - leftmost(g, p, position);
             for (int r = 0; r < b; ++r) exact.at[p * b + r + 1] = exact.at[p * b + r] + before * b + r;
         }
         exact.rows.assign(exact.at.back(), 0.0);
         exact.pivots.assign(g.rows * b, 0.0);
         over(256, [&](int64_t first, int64_t last) {
             for (int64_t c = first; c < last; ++c) {
-                for (int32_t p = starts[c]; p < starts[c + 1]; ++p) fill(g, A, b, fixed, place, p);
-                factorise_some(Factor{exact, int64_t{starts[c]} * b, int64_t{starts[c + 1]} * b});
+                for (int32_t p = starts[c]; p < starts[c + 1]; ++p) fill(g, A, b, fixed, position, p);
+                const int64_t from = int64_t{starts[c]} * b, to = int64_t{starts[c + 1]} * b;
+                dispatch<double>([&](auto V) KL_INLINE_LAMBDA { factorize_rows<V>(exact, from, to); });
             }
         });
         factor.at = exact.at;
@@ -129,7 +124,8 @@ public:
             const int64_t start = starts[first];
             for (int64_t p = start; p < starts[last]; ++p)
                 for (int c = 0; c < b; ++c) z[(p - start) * b + c] = r[int64_t{members[p]} * b + c];
-            substitute_some(Substitution{factor, start * b, int64_t{starts[last]} * b, z.data()});
+            const int64_t end = int64_t{starts[last]} * b;
+            dispatch<float>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(factor, start * b, end, z.data()); });
             for (int64_t p = start; p < starts[last]; ++p)
                 for (int c = 0; c < b; ++c) {
                     const int64_t i = int64_t{members[p]} * b + c;
@@ -140,53 +136,53 @@ public:
     }
 
 private:
-    // The first place that a node of the same cluster linked to that at place p has.
-    int64_t leftmost(const Graph& g, int64_t p, const Ints& place) const {
+    // The first position of a node of the same cluster linked to that at position p.
+    int64_t leftmost(const Graph& g, int64_t p, const Ints& position) const {
         const int32_t i = members[p];
         int64_t left = p;
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-            if (of[g.indices[k]] == of[i]) left = std::min<int64_t>(left, place[g.indices[k]]);
+            if (of[g.indices[k]] == of[i]) left = std::min<int64_t>(left, position[g.indices[k]]);
         return left;
     }
 
     // Take the order of a cluster's nodes that a search in breadth gives, if it is better than theirs.
-    void arrange(const Graph& g, int64_t c, Ints& place) {
+    void arrange(const Graph& g, int64_t c, Ints& position) {
         const int32_t start = starts[c], size = starts[c + 1] - start;
         if (size < 3) return;
-        const int64_t before = envelope(g, c, place);
+        const int64_t before = envelope(g, c, position);
         const Ints given(members.begin() + start, members.begin() + start + size);
-        const Ints there = breadth(g, c, given[0], place);
-        Ints found = breadth(g, c, there.back(), place);  // from one end to the other
+        const Ints there = breadth(g, c, given[0], position);
+        Ints found = breadth(g, c, there.back(), position);  // from one end to the other
         std::copy(found.rbegin(), found.rend(), members.begin() + start);
-        if (envelope(g, c, place) >= before) std::copy(given.begin(), given.end(), members.begin() + start);
+        if (envelope(g, c, position) >= before) std::copy(given.begin(), given.end(), members.begin() + start);
     }
 
     // Nodes of cluster c from one of them outwards; those without links to it come last.
-    Ints breadth(const Graph& g, int64_t c, int32_t from, Ints& place) const {
+    Ints breadth(const Graph& g, int64_t c, int32_t from, Ints& position) const {
         const Ints all(members.begin() + starts[c], members.begin() + starts[c + 1]);
-        for (int32_t i : all) place[i] = -1;
+        for (int32_t i : all) position[i] = -1;
         Ints found;
         for (int64_t next = -1; next < static_cast<int64_t>(all.size()); ++next) {
             const int32_t seed = next < 0 ? from : all[next];
-            if (place[seed] >= 0) continue;
-            place[seed] = 0;
+            if (position[seed] >= 0) continue;
+            position[seed] = 0;
             found.push_back(seed);
             for (size_t at = found.size() - 1; at < found.size(); ++at)
                 for (int32_t k = g.indptr[found[at]]; k < g.indptr[found[at] + 1]; ++k) {
                     const int32_t j = g.indices[k];
-                    if (of[j] != c || place[j] >= 0) continue;
-                    place[j] = 0;
+                    if (of[j] != c || position[j] >= 0) continue;
+                    position[j] = 0;
                     found.push_back(j);
                 }
         }
         return found;
     }
 
-    void fill(const Graph& g, const double* A, int b, const std::vector<uint8_t>& fixed, const Ints& place,
+    void fill(const Graph& g, const double* A, int b, const Bytes& fixed, const Ints& position,
               int64_t p) {
         const int64_t i = members[p];
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
-            const int64_t j = g.indices[k], q = place[j];
+            const int64_t j = g.indices[k], q = position[j];
             if (of[j] != of[i] || q > p) continue;
             for (int r = 0; r < b; ++r)
                 for (int c = 0; c < b && q * b + c <= p * b + r; ++c) {
@@ -200,21 +196,6 @@ private:
         }
     }
 };
-
-// Squared Frobenius norms of blocks.
-inline double squared_norm(const double* block, int size) {
-    double sum = 0;
-    for (int e = 0; e < size; ++e) sum += block[e] * block[e];
-    return sum;
-}
-
-inline std::vector<double> diagonal_norms(const Graph& g, const double* A, int size) {
-    std::vector<double> norms(g.rows, 0.0);
-    for (int64_t i = 0; i < g.rows; ++i)
-        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-            if (g.indices[k] == i) norms[i] = std::sqrt(squared_norm(A + int64_t{k} * size, size));
-    return norms;
-}
 
 // Label nodes by the lowest node that links join them to; joins(i, k) says whether link k of i does.
 template <class F>
@@ -237,13 +218,13 @@ Ints components(const Graph& g, const F& joins) {
 
 // Links of each node by length, and how many of each length each component has.
 struct Lengths {
-    std::vector<uint8_t> near;
+    Bytes near;
     Ints label, size, far, between;
 };
 
 inline Lengths lengths(const Graph& g, const double* X) {
     Lengths out;
-    std::vector<double> least(g.rows);
+    Doubles least(g.rows);
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         for (int64_t i = first; i < last; ++i) least[i] = extent(g, X, i).first;
     });
@@ -267,8 +248,8 @@ inline Lengths lengths(const Graph& g, const double* X) {
     return out;
 }
 
-// The clusters of a mesh with nodes at X (n, 3), not factorised; none unless most nodes belong to
-// clusters that a gap sets apart from the links between them, and that are cheap to factorise.
+// The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
+// clusters that a gap sets apart from the links between them, and that are cheap to factorize.
 inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta) {
     if (!looks_stretched(g, X)) return {};
     const Lengths links = lengths(g, X);
@@ -284,20 +265,20 @@ inline Clusters find_clusters(const Graph& g, const double* A, int b, const doub
     if (2 * apart < g.rows) return {};
     Clusters found;
     found.collect(g, label);
-    Ints place(g.rows);
-    std::vector<uint8_t> cheap(found.count());
+    Ints position(g.rows);
+    Bytes cheap(found.count());
     int64_t joined = 0;
     for (int64_t c = 0; c < found.count(); ++c) {
         int64_t blocks = 0;
         for (int32_t p = found.starts[c]; p < found.starts[c + 1]; ++p)
             blocks += g.indptr[found.members[p] + 1] - g.indptr[found.members[p]];
         const int32_t size = found.starts[c + 1] - found.starts[c];
-        cheap[c] = size > 1 && found.envelope(g, c, place) <= FILL * blocks;
+        cheap[c] = size > 1 && found.envelope(g, c, position) <= FILL * blocks;
         joined += cheap[c] ? size : 0;
     }
     if (2 * joined < g.rows) return {};
-    const std::vector<double> own = diagonal_norms(g, A, b * b);
-    label = components(g, [&](int32_t i, int32_t k) {  // unlike materials part them
+    const Doubles own = diagonal_norms(g, A, b * b);
+    label = components(g, [&](int32_t i, int32_t k) {  // a stiffness contrast parts them
         const int32_t j = g.indices[k];
         return links.near[k] && found.of[i] == found.of[j] && cheap[found.of[i]] &&
                squared_norm(A + int64_t{k} * b * b, b * b) >= theta * theta * own[i] * own[j];

@@ -1,26 +1,49 @@
-// Loops over Gauss points: geometry, strains, stresses and nodal vectors of elements of any shape.
+// Loops over Gauss points: geometry, strains and stresses of elements of any shape.
 //
 // An element is known by its reference tables alone.  V elements are computed at once, one in each
-// lane, so that a kernel needs no special case for a number of nodes or points.  Coordinates are
-// taken from the first node of each element: far from the origin no digits are lost.
+// lane of a vector, so that a kernel needs no special case for a number of nodes or points.  Coordinates
+// are taken from the first node of each element: far from the origin no digits are lost.
 
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "isa.hpp"
 
 namespace kl {
 
+// C (6, 6), as two constants where it is isotropic to the last bits.
+struct Law {
+    const double* C = nullptr;
+    bool isotropic = true;
+
+    Law() = default;
+    explicit Law(const double* C) : C(C) {
+        double size = 0;
+        for (int i = 0; i < 36; ++i) size = std::fmax(size, std::fabs(C[i]));
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6; ++j) {
+                const double shear = i < 3 ? 2 * C[21] : C[21];
+                const double ideal = (i < 3 && j < 3 ? C[1] : 0) + (i == j ? shear : 0);
+                isotropic &= std::fabs(C[6 * i + j] - ideal) <= 4e-16 * size;
+            }
+    }
+};
+
 // Some elements [first, last), their tables, and what a kernel reads and writes.
-struct Gauss {
+struct Elements {
     const double* points;     // (n, 3)
+    int64_t n;
     const int32_t* nodes;     // (m, k)
     int k, g;                 // nodes of an element, points of its rule
     const double* N;          // (g, k)
     const double* dN;         // (g, k, 3)
     const double* weights;    // (g)
-    const double* field;      // (n, 3) displacement or force per volume
-    const double* C;          // (6, 6)
+    const double* field;      // (n, 3) displacement or force per volume, or null
+    const double* increment;  // (n, 3) of the displacement in a step, or null
+    double damping;           // share of the increment of stress that is added to the mean stress
+    Law law;
     const double* prestress;  // (m, 6) or null
     const double* to_nodes;   // (k, g) extrapolation
     double* space;            // of `vectors()` vectors
@@ -29,15 +52,16 @@ struct Gauss {
     int64_t origin, first, last;
 
     // Vectors of working space: coordinates, displacements, prestress, stresses, nodal values.
-    int64_t vectors() const { return 12 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
+    int64_t vectors() const { return 15 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
+    const double* dN_at(int q) const { return dN + 3 * static_cast<int64_t>(k) * q; }
 };
 
-// Rows (k, 3) of a nodal field in lanes; spare lanes repeat the last element.
+// Rows (k, 3) of a nodal field, one element in each lane; spare lanes repeat the last element.
 template <int V>
-KL_INLINE void gather(const Gauss& w, const double* values, int64_t e, vec<double, V>* to) {
+KL_INLINE void gather(const Elements& w, const double* values, int64_t e, vec<double, V>* to) {
     double* flat = reinterpret_cast<double*>(to);
     for (int lane = 0; lane < V; ++lane) {
-        const int32_t* nodes = w.nodes + (e + lane < w.last ? e + lane : w.last - 1) * w.k;
+        const int32_t* nodes = w.nodes + std::min(e + lane, w.last - 1) * w.k;
         for (int a = 0; a < w.k; ++a)
             for (int i = 0; i < 3; ++i)
                 flat[(3 * a + i) * V + lane] = values[3 * static_cast<int64_t>(nodes[a]) + i];
@@ -50,10 +74,35 @@ KL_INLINE void shift_to_first_node(vec<double, V>* X, int k) {
         for (int i = 0; i < 3; ++i) X[3 * a + i] -= X[i];
 }
 
+// Coordinates, nodal field, increments and prestress of V elements, and the space behind them.
 template <int V>
-KL_INLINE void gather_points(const Gauss& w, int64_t e, vec<double, V>* X) {
+struct Local {
+    vec<double, V>*X, *u, *du, *initial, *rest;
+};
+
+template <int V>
+KL_INLINE Local<V> gather_all(const Elements& w, int64_t e, double* space) {
+    vec<double, V>* X = reinterpret_cast<vec<double, V>*>(space);
+    Local<V> at{X, X + 3 * w.k, X + 6 * w.k, X + 9 * w.k, X + 9 * w.k + 6};
     gather<V>(w, w.points, e, X);
     shift_to_first_node<V>(X, w.k);
+    if (w.field) gather<V>(w, w.field, e, at.u);
+    if (w.increment) gather<V>(w, w.increment, e, at.du);
+    for (int c = 0; c < 6; ++c) {
+        at.initial[c] = vec<double, V>{};
+        for (int lane = 0; w.prestress && lane < V; ++lane)
+            at.initial[c][lane] = w.prestress[6 * std::min(e + lane, w.last - 1) + c];
+    }
+    return at;
+}
+
+// Lanes [count] of vectors to rows of an array (m, count).
+template <int V>
+KL_INLINE void store(const Elements& w, const vec<double, V>* from, int64_t count, int64_t e, double* to) {
+    const double* flat = reinterpret_cast<const double*>(from);
+    const int64_t lanes = e + V < w.last ? V : w.last - e;
+    for (int64_t lane = 0; lane < lanes; ++lane)
+        for (int64_t c = 0; c < count; ++c) to[(e + lane - w.origin) * count + c] = flat[c * V + lane];
 }
 
 template <int V>
@@ -97,68 +146,73 @@ KL_INLINE void invert(const vec<double, V> (&J)[3][3], vec<double, V> (&cofactor
 }
 
 template <int V>
-KL_INLINE void jacobian(const Gauss& w, const vec<double, V>* X, int q, vec<double, V> (&cofactors)[3][3],
+KL_INLINE void jacobian(const Elements& w, const vec<double, V>* X, int q, vec<double, V> (&cofactors)[3][3],
                         vec<double, V>& det) {
     vec<double, V> J[3][3];
-    reference_gradient<V>(X, w.dN + 3 * static_cast<int64_t>(w.k) * q, w.k, J);
+    reference_gradient<V>(X, w.dN_at(q), w.k, J);
     invert<V>(J, cofactors, det);
 }
 
-// Strain in Voigt order xx yy zz xy yz zx with engineering shear; inverse = J^-1.
+// J^-1 and γ det J.
 template <int V>
-KL_INLINE void strain_at(const Gauss& w, const vec<double, V>* u, int q,
-                         const vec<double, V> (&inverse)[3][3], vec<double, V> (&strain)[6]) {
-    vec<double, V> H[3][3], D[3][3];
-    reference_gradient<V>(u, w.dN + 3 * static_cast<int64_t>(w.k) * q, w.k, H);
+KL_INLINE void inverse_jacobian(const Elements& w, const vec<double, V>* X, int q,
+                                vec<double, V> (&inverse)[3][3], vec<double, V>& dV) {
+    vec<double, V> det;
+    jacobian<V>(w, X, q, inverse, det);
+    const vec<double, V> scale = 1.0 / det;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) inverse[i][j] *= scale;
+    dV = det * w.weights[q];
+}
+
+// H_ij = du_i/dX_j
+template <int V>
+KL_INLINE void gradient(const Elements& w, const vec<double, V>* u, int q,
+                        const vec<double, V> (&inverse)[3][3], vec<double, V> (&H)[3][3]) {
+    vec<double, V> R[3][3];
+    reference_gradient<V>(u, w.dN_at(q), w.k, R);
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-            D[i][j] = H[i][0] * inverse[0][j] + H[i][1] * inverse[1][j] + H[i][2] * inverse[2][j];
-    for (int i = 0; i < 3; ++i) {
-        strain[i] = D[i][i];
-        strain[3 + i] = D[i][(i + 1) % 3] + D[(i + 1) % 3][i];
-    }
+            H[i][j] = R[i][0] * inverse[0][j] + R[i][1] * inverse[1][j] + R[i][2] * inverse[2][j];
 }
 
-// What is known at one Gauss point of V elements: volume, J^-1, strain and C ε.
+// S = C E
 template <int V>
-struct State {
-    vec<double, V> dV, inverse[3][3], strain[6], elastic[6];
-};
-
-template <int V>
-KL_INLINE void state_at(const Gauss& w, const vec<double, V>* X, const vec<double, V>* u, int q,
-                        State<V>& s) {
-    vec<double, V> det;
-    jacobian<V>(w, X, q, s.inverse, det);
-    const vec<double, V> share = 1.0 / det;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) s.inverse[i][j] *= share;
-    s.dV = det * w.weights[q];
-    strain_at<V>(w, u, q, s.inverse, s.strain);
+KL_INLINE void elastic(const Law& law, const vec<double, V>* E, vec<double, V>* S) {
+    if (law.isotropic) {
+        const vec<double, V> pressure = law.C[1] * (E[0] + E[1] + E[2]);
+        const double mu = law.C[21];
+        for (int i = 0; i < 3; ++i) {
+            S[i] = pressure + 2 * mu * E[i];
+            S[3 + i] = mu * E[3 + i];
+        }
+        return;
+    }
     for (int c = 0; c < 6; ++c) {
         vec<double, V> sum = {};
-        for (int d = 0; d < 6; ++d) sum += w.C[6 * c + d] * s.strain[d];
-        s.elastic[c] = sum;
+        for (int d = 0; d < 6; ++d) sum += law.C[6 * c + d] * E[d];
+        S[c] = sum;
     }
 }
 
+// T = A S of a symmetric S in Voigt order.
 template <int V>
-KL_INLINE void gather_prestress(const Gauss& w, int64_t e, vec<double, V>* to) {
-    for (int c = 0; c < 6; ++c) {
-        to[c] = vec<double, V>{};
-        if (!w.prestress) continue;
-        for (int lane = 0; lane < V; ++lane)
-            to[c][lane] = w.prestress[6 * (e + lane < w.last ? e + lane : w.last - 1) + c];
+KL_INLINE void times_symmetric(const vec<double, V> (&A)[3][3], const vec<double, V>* S,
+                               vec<double, V> (&T)[3][3]) {
+    for (int i = 0; i < 3; ++i) {
+        T[i][0] = A[i][0] * S[0] + A[i][1] * S[3] + A[i][2] * S[5];
+        T[i][1] = A[i][0] * S[3] + A[i][1] * S[1] + A[i][2] * S[4];
+        T[i][2] = A[i][0] * S[5] + A[i][1] * S[4] + A[i][2] * S[2];
     }
 }
 
-// Lanes [count] of vectors to rows of an array (m, count).
+// force (k, 3) += R dN, where R is a stress times J^-T γ det J: forces need the reference gradients alone.
 template <int V>
-KL_INLINE void store(const Gauss& w, const vec<double, V>* from, int64_t count, int64_t e, double* to) {
-    const double* flat = reinterpret_cast<const double*>(from);
-    const int64_t lanes = e + V < w.last ? V : w.last - e;
-    for (int64_t lane = 0; lane < lanes; ++lane)
-        for (int64_t c = 0; c < count; ++c) to[(e + lane - w.origin) * count + c] = flat[c * V + lane];
+KL_INLINE void add_forces(const Elements& w, int q, const vec<double, V> (&R)[3][3], vec<double, V>* force) {
+    const double* dN = w.dN_at(q);
+    for (int a = 0; a < w.k; ++a)
+        for (int i = 0; i < 3; ++i)
+            force[3 * a + i] += R[i][0] * dN[3 * a] + R[i][1] * dN[3 * a + 1] + R[i][2] * dN[3 * a + 2];
 }
 
 }  // namespace kl

@@ -1,4 +1,4 @@
-// The kernels over Gauss points, for elements [first, last) and every instruction set.
+// The kernels over Gauss points for small strains, for elements [first, last) and every instruction set.
 
 #pragma once
 #include "gauss.hpp"
@@ -11,23 +11,23 @@ namespace kl {
 constexpr double CLEAR_SHARE = 1e-9, CLEAR_ROUNDING = 1e-12;
 
 template <int V>
-KL_INLINE void clearly_positive_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
+KL_INLINE void clearly_positive_body(const Elements& w) {
+    typedef vec<double, V> Vec;
+    Vec* X = reinterpret_cast<Vec*>(w.space);
     for (int64_t e = w.first; e < w.last; e += V) {
-        lane reach, size, mean = {}, lowest = lane{} + __builtin_inf();
+        Vec reach, size, mean = {}, lowest = Vec{} + __builtin_inf();
         gather<V>(w, w.points, e, X);
         largest<V>(X, 3 * w.k, reach);
         shift_to_first_node<V>(X, w.k);
         largest<V>(X, 3 * w.k, size);
         for (int q = 0; q < w.g; ++q) {
-            lane cofactors[3][3], det, size_of_det;
+            Vec cofactors[3][3], det, size_of_det;
             jacobian<V>(w, X, q, cofactors, det);
             lowest = det < lowest ? det : lowest;
             absolute<V>(det, size_of_det);
             mean += w.weights[q] * size_of_det;  // not a number stays so, and is not clear
         }
-        const lane bound = CLEAR_ROUNDING * size * size * (size + reach);
+        const Vec bound = CLEAR_ROUNDING * size * size * (size + reach);
         for (int l = 0; l < V && e + l < w.last; ++l)
             w.out[e + l - w.origin] = lowest[l] > CLEAR_SHARE * mean[l] && lowest[l] > bound[l];
     }
@@ -35,33 +35,30 @@ KL_INLINE void clearly_positive_body(const Gauss& w) {
 
 // out (m, g): γ det J.
 template <int V>
-KL_INLINE void volumes_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane* dV = X + 3 * w.k;
+KL_INLINE void volumes_body(const Elements& w) {
+    typedef vec<double, V> Vec;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
+        const Local<V> at = gather_all<V>(w, e, w.space);
         for (int q = 0; q < w.g; ++q) {
-            lane cofactors[3][3], det;
-            jacobian<V>(w, X, q, cofactors, det);
-            dV[q] = det * w.weights[q];
+            Vec cofactors[3][3], det;
+            jacobian<V>(w, at.X, q, cofactors, det);
+            at.rest[q] = det * w.weights[q];
         }
-        store<V>(w, dV, w.g, e, w.out);
+        store<V>(w, at.rest, w.g, e, w.out);
     }
 }
 
 // out (m, k): Σ N_a γ det J, the row sums of the mass matrix; second (m, k): its diagonal.
 template <int V>
-KL_INLINE void shares_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *sums = X + 3 * w.k, *diagonal = sums + w.k;
+KL_INLINE void row_sums_body(const Elements& w) {
+    typedef vec<double, V> Vec;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        for (int a = 0; a < 2 * w.k; ++a) sums[a] = lane{};
+        const Local<V> at = gather_all<V>(w, e, w.space);
+        Vec *sums = at.rest, *diagonal = sums + w.k;
+        for (int a = 0; a < 2 * w.k; ++a) sums[a] = Vec{};
         for (int q = 0; q < w.g; ++q) {
-            lane cofactors[3][3], det;
-            jacobian<V>(w, X, q, cofactors, det);
+            Vec cofactors[3][3], det;
+            jacobian<V>(w, at.X, q, cofactors, det);
             det *= w.weights[q];
             const double* N = w.N + static_cast<int64_t>(w.k) * q;
             for (int a = 0; a < w.k; ++a) {
@@ -76,20 +73,18 @@ KL_INLINE void shares_body(const Gauss& w) {
 
 // out (m, k, 3): Σ N_a b γ det J of a nodal field b.
 template <int V>
-KL_INLINE void body_force_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *b = X + 3 * w.k, *force = b + 3 * w.k;
+KL_INLINE void body_force_body(const Elements& w) {
+    typedef vec<double, V> Vec;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        gather<V>(w, w.field, e, b);
-        for (int a = 0; a < 3 * w.k; ++a) force[a] = lane{};
+        const Local<V> at = gather_all<V>(w, e, w.space);
+        Vec* force = at.rest;
+        for (int a = 0; a < 3 * w.k; ++a) force[a] = Vec{};
         for (int q = 0; q < w.g; ++q) {
-            lane cofactors[3][3], det, value[3] = {};
-            jacobian<V>(w, X, q, cofactors, det);
+            Vec cofactors[3][3], det, value[3] = {};
+            jacobian<V>(w, at.X, q, cofactors, det);
             const double* N = w.N + static_cast<int64_t>(w.k) * q;
             for (int a = 0; a < w.k; ++a)
-                for (int i = 0; i < 3; ++i) value[i] += N[a] * b[3 * a + i];
+                for (int i = 0; i < 3; ++i) value[i] += N[a] * at.u[3 * a + i];
             for (int i = 0; i < 3; ++i) value[i] *= det * w.weights[q];
             for (int a = 0; a < w.k; ++a)
                 for (int i = 0; i < 3; ++i) force[3 * a + i] += N[a] * value[i];
@@ -98,78 +93,76 @@ KL_INLINE void body_force_body(const Gauss& w) {
     }
 }
 
+// What is known at one Gauss point of V elements: volume, J^-1, ε, C ε and C ε + σ0.
+template <int V>
+struct PointState {
+    vec<double, V> dV, inverse[3][3], strain[6], elastic[6], stress[6];
+};
+
+template <int V>
+KL_INLINE void evaluate(const Elements& w, const Local<V>& at, int q, PointState<V>& s) {
+    vec<double, V> H[3][3];
+    inverse_jacobian<V>(w, at.X, q, s.inverse, s.dV);
+    gradient<V>(w, at.u, q, s.inverse, H);
+    for (int i = 0; i < 3; ++i) {
+        s.strain[i] = H[i][i];
+        s.strain[3 + i] = H[i][(i + 1) % 3] + H[(i + 1) % 3][i];
+    }
+    elastic<V>(w.law, s.strain, s.elastic);
+    for (int c = 0; c < 6; ++c) s.stress[c] = s.elastic[c] + at.initial[c];
+}
+
 // out (m, g, 6): C ε + σ0.
 template <int V>
-KL_INLINE void stress_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *u = X + 3 * w.k, *initial = u + 3 * w.k, *stress = initial + 6;
-    State<V> s;
+KL_INLINE void stress_body(const Elements& w) {
+    PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        gather<V>(w, w.field, e, u);
-        gather_prestress<V>(w, e, initial);
+        const Local<V> at = gather_all<V>(w, e, w.space);
         for (int q = 0; q < w.g; ++q) {
-            state_at<V>(w, X, u, q, s);
-            for (int c = 0; c < 6; ++c) stress[6 * q + c] = s.elastic[c] + initial[c];
+            evaluate<V>(w, at, q, s);
+            for (int c = 0; c < 6; ++c) at.rest[6 * q + c] = s.stress[c];
         }
-        store<V>(w, stress, 6 * w.g, e, w.out);
+        store<V>(w, at.rest, 6 * w.g, e, w.out);
     }
 }
 
 // out (m, k, 3): Σ B^T (C ε + σ0) γ det J.
 template <int V>
-KL_INLINE void internal_load_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *u = X + 3 * w.k, *initial = u + 3 * w.k, *force = initial + 6;
-    State<V> s;
+KL_INLINE void internal_load_body(const Elements& w) {
+    typedef vec<double, V> Vec;
+    PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        gather<V>(w, w.field, e, u);
-        gather_prestress<V>(w, e, initial);
-        for (int a = 0; a < 3 * w.k; ++a) force[a] = lane{};
+        const Local<V> at = gather_all<V>(w, e, w.space);
+        for (int a = 0; a < 3 * w.k; ++a) at.rest[a] = Vec{};
         for (int q = 0; q < w.g; ++q) {
-            state_at<V>(w, X, u, q, s);
-            lane t[6], P[3][3];  // P = σ J^-T γ det J, so that forces need the reference gradients alone
-            for (int c = 0; c < 6; ++c) t[c] = (s.elastic[c] + initial[c]) * s.dV;
-            for (int j = 0; j < 3; ++j) {
-                P[0][j] = t[0] * s.inverse[j][0] + t[3] * s.inverse[j][1] + t[5] * s.inverse[j][2];
-                P[1][j] = t[3] * s.inverse[j][0] + t[1] * s.inverse[j][1] + t[4] * s.inverse[j][2];
-                P[2][j] = t[5] * s.inverse[j][0] + t[4] * s.inverse[j][1] + t[2] * s.inverse[j][2];
-            }
-            const double* dN = w.dN + 3 * static_cast<int64_t>(w.k) * q;
-            for (int a = 0; a < w.k; ++a)
-                for (int i = 0; i < 3; ++i)
-                    force[3 * a + i] +=
-                        P[i][0] * dN[3 * a] + P[i][1] * dN[3 * a + 1] + P[i][2] * dN[3 * a + 2];
+            evaluate<V>(w, at, q, s);
+            for (int c = 0; c < 6; ++c) s.stress[c] *= s.dV;
+            Vec T[3][3], R[3][3];
+            times_symmetric<V>(s.inverse, s.stress, T);
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) R[i][j] = T[j][i];
+            add_forces<V>(w, q, R, at.rest);
         }
-        store<V>(w, force, 3 * w.k, e, w.out);
+        store<V>(w, at.rest, 3 * w.k, e, w.out);
     }
 }
 
 // out (m, 2): ½ Σ ε C ε γ det J and the largest square of the von Mises stress.
 template <int V>
-KL_INLINE void totals_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *u = X + 3 * w.k, *initial = u + 3 * w.k, *found = initial + 6;
-    State<V> s;
+KL_INLINE void totals_body(const Elements& w) {
+    typedef vec<double, V> Vec;
+    PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        gather<V>(w, w.field, e, u);
-        gather_prestress<V>(w, e, initial);
-        found[0] = found[1] = lane{};
+        const Local<V> at = gather_all<V>(w, e, w.space);
+        Vec found[2] = {};
         for (int q = 0; q < w.g; ++q) {
-            state_at<V>(w, X, u, q, s);
-            lane t[6], energy = {};
-            for (int c = 0; c < 6; ++c) {
-                energy += s.strain[c] * s.elastic[c];
-                t[c] = s.elastic[c] + initial[c];
-            }
+            evaluate<V>(w, at, q, s);
+            Vec energy = {};
+            for (int c = 0; c < 6; ++c) energy += s.strain[c] * s.elastic[c];
             found[0] += 0.5 * energy * s.dV;
-            const lane xy = t[0] - t[1], yz = t[1] - t[2], zx = t[2] - t[0];
-            const lane square =
+            const Vec* t = s.stress;
+            const Vec xy = t[0] - t[1], yz = t[1] - t[2], zx = t[2] - t[0];
+            const Vec square =
                 0.5 * (xy * xy + yz * yz + zx * zx) + 3.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
             found[1] = square > found[1] ? square : found[1];
         }
@@ -179,30 +172,24 @@ KL_INLINE void totals_body(const Gauss& w) {
 
 // out (m, k, 6): C ε + σ0 taken to the nodes; second (m, 6): its mean over the volume.
 template <int V>
-KL_INLINE void averages_body(const Gauss& w) {
-    typedef vec<double, V> lane;
-    lane* X = reinterpret_cast<lane*>(w.space);
-    lane *u = X + 3 * w.k, *initial = u + 3 * w.k, *mean = initial + 6, *stress = mean + 6;
-    lane* nodal = stress + 6 * w.g;
-    State<V> s;
+KL_INLINE void averages_body(const Elements& w) {
+    typedef vec<double, V> Vec;
+    PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        gather_points<V>(w, e, X);
-        gather<V>(w, w.field, e, u);
-        gather_prestress<V>(w, e, initial);
-        lane volume = {};
-        for (int c = 0; c < 6; ++c) mean[c] = lane{};
+        const Local<V> at = gather_all<V>(w, e, w.space);
+        Vec *stress = at.rest, *nodal = stress + 6 * w.g, mean[6] = {}, volume = {};
         for (int q = 0; q < w.g; ++q) {
-            state_at<V>(w, X, u, q, s);
+            evaluate<V>(w, at, q, s);
             volume += s.dV;
             for (int c = 0; c < 6; ++c) {
-                stress[6 * q + c] = s.elastic[c] + initial[c];
-                mean[c] += stress[6 * q + c] * s.dV;
+                stress[6 * q + c] = s.stress[c];
+                mean[c] += s.stress[c] * s.dV;
             }
         }
         for (int c = 0; c < 6; ++c) mean[c] /= volume;
         for (int a = 0; a < w.k; ++a)
             for (int c = 0; c < 6; ++c) {
-                lane sum = {};
+                Vec sum = {};
                 for (int q = 0; q < w.g; ++q)
                     sum += w.to_nodes[static_cast<int64_t>(w.g) * a + q] * stress[6 * q + c];
                 nodal[6 * a + c] = sum;
@@ -212,13 +199,13 @@ KL_INLINE void averages_body(const Gauss& w) {
     }
 }
 
-KL_DISPATCH(clearly_positive, clearly_positive_body, double, const Gauss&)
-KL_DISPATCH(volumes, volumes_body, double, const Gauss&)
-KL_DISPATCH(shares, shares_body, double, const Gauss&)
-KL_DISPATCH(body_force, body_force_body, double, const Gauss&)
-KL_DISPATCH(stress, stress_body, double, const Gauss&)
-KL_DISPATCH(internal_load, internal_load_body, double, const Gauss&)
-KL_DISPATCH(totals, totals_body, double, const Gauss&)
-KL_DISPATCH(averages, averages_body, double, const Gauss&)
+KL_DISPATCH(clearly_positive, clearly_positive_body, const Elements&)
+KL_DISPATCH(volumes, volumes_body, const Elements&)
+KL_DISPATCH(row_sums, row_sums_body, const Elements&)
+KL_DISPATCH(body_force, body_force_body, const Elements&)
+KL_DISPATCH(stress, stress_body, const Elements&)
+KL_DISPATCH(internal_load, internal_load_body, const Elements&)
+KL_DISPATCH(totals, totals_body, const Elements&)
+KL_DISPATCH(averages, averages_body, const Elements&)
 
 }  // namespace kl

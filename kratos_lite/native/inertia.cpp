@@ -6,18 +6,11 @@
 
 #include "inertia.hpp"
 
-#include <optional>
-
 #include "elements.hpp"
 
 namespace {
 
-using kl::Array;
-using kl::Indices;
-using kl::Numbers;
-using kl::require;
-namespace py = pybind11;
-
+using namespace kl;
 using Data = std::optional<Array<double>>;
 
 double* optional(Data& array, Indices indices) {
@@ -27,26 +20,24 @@ double* optional(Data& array, Indices indices) {
 
 void add(Numbers points, Indices nodes, Numbers N, Numbers dN, Numbers weights, Numbers velocity,
          Indices indptr, Indices indices, Data M, Data G, Data H) {
-    kl::Inertia w{kl::elements(points, nodes, N, dN, weights), velocity.data(), {},
-                  optional(M, indices), optional(G, indices), optional(H, indices)};
-    require(kl::has_shape(velocity, 3, 4), "velocity must be (3, 4)");
-    require(indptr.size() == points.shape(0) + 1, "the pattern must have a row for each point");
+    Inertia w{elements(points, nodes, N, dN, weights), velocity.data(), optional(M, indices),
+              optional(G, indices), optional(H, indices), {}};
+    require(has_shape(velocity, 3, 4), "velocity must be (3, 4)");
+    const Graph graph = pattern(indptr, indices, w.n);
     w.wide.assign(static_cast<int64_t>(w.g) * w.wide_k(), 0.0);
     for (int q = 0; q < w.g; ++q) std::copy_n(w.N + q * w.k, w.k, w.wide.data() + q * w.wide_k());
-    const kl::Graph graph{points.shape(0), indptr.data(), indices.data()};
     py::gil_scoped_release release;
-    const int V = kl::lanes();
-    kl::for_groups({w.nodes, w.last, w.k}, graph, V, kl::inertia_size(w, V),
-                   [&](const kl::Group& group) { kl::add_inertia_group({group, w}); });
+    const int V = vector_width();
+    for_chunks({w.nodes, w.last, w.k}, graph, V, w.size(V), [&](const Chunk& chunk) {
+        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { add_inertia<V>(w, chunk); });
+    });
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_inertia, m) {
-    kl::common(m);
-    m.def("add", &add, "Add M, G and H of elements to the data of matrices, of those that are given",
-          py::arg("points").noconvert(), py::arg("nodes").noconvert(), py::arg("N").noconvert(),
-          py::arg("dN").noconvert(), py::arg("weights").noconvert(), py::arg("velocity").noconvert(),
-          py::arg("indptr").noconvert(), py::arg("indices").noconvert(), py::arg("M").noconvert() = py::none(),
-          py::arg("G").noconvert() = py::none(), py::arg("H").noconvert() = py::none());
+    common(m);
+    define(m, "add", add, "Add M, G and H of elements to the data of matrices, of those that are given", "points",
+           "nodes", "N", "dN", "weights", "velocity", "indptr", "indices", py::arg("M").noconvert() = py::none(),
+           py::arg("G").noconvert() = py::none(), py::arg("H").noconvert() = py::none());
 }

@@ -3,19 +3,21 @@
 // A kernel is a template over its vector width, forced inline into one function for each
 // instruction set:
 //
-//     template <int V> KL_INLINE void body(Args& args) { ... kl::vec<double, V> ... }
-//     KL_DISPATCH(kernel, body, double, Args&)
-//     kernel(args);  // runs body<8> with AVX-512, body<4> with AVX2 and FMA, else body<2>
+//     template <int V> KL_INLINE void body(Args args) { ... kl::vec<double, V> ... }
+//     dispatch<double>([&](auto V) KL_INLINE_LAMBDA { body<V>(args); });
 //
-// The width follows the instruction set: eight doubles at once would spill on AVX2.
+// runs body<8> with AVX-512, body<4> with AVX2 and FMA, else body<2>.  The width follows the
+// instruction set: eight doubles at once would spill on AVX2.
 
 #pragma once
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #define KL_INLINE inline __attribute__((always_inline))
+#define KL_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace kl {
 
@@ -50,7 +52,7 @@ inline const char* isa_name() {
 }
 
 // Doubles in one vector.
-inline int lanes() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 2; }
+inline int vector_width() { return isa() == Isa::avx512 ? 8 : isa() == Isa::avx2 ? 4 : 2; }
 
 // GCC's vector extension: element-wise + - * / on V numbers.
 template <class T, int V>
@@ -60,10 +62,10 @@ struct vec_of {
 template <class T, int V>
 using vec = typename vec_of<T, V>::type;
 
-// Room for some numbers, from an address that suits vectors.
-class Space {
+// Working memory, aligned for vectors.
+class Workspace {
 public:
-    explicit Space(int64_t size) : numbers(size + 8) {}
+    explicit Workspace(int64_t size) : numbers(size + 8) {}
     double* data() {
         return reinterpret_cast<double*>((reinterpret_cast<uintptr_t>(numbers.data()) + 63) / 64 * 64);
     }
@@ -72,23 +74,36 @@ private:
     std::vector<double> numbers;
 };
 
+template <int bytes, class T, class F>
+KL_INLINE void call(const F& f) {
+    f(std::integral_constant<int, bytes / sizeof(T)>());
+}
+
 #if defined(__x86_64__)
-#define KL_DISPATCH(name, body, T, ...)                                                            \
-    __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"))) inline void             \
-    name##_avx512(__VA_ARGS__ args) { body<64 / sizeof(T)>(args); }                                \
-    __attribute__((target("avx2,fma"))) inline void name##_avx2(__VA_ARGS__ args) {                \
-        body<32 / sizeof(T)>(args);                                                                \
-    }                                                                                              \
-    inline void name##_base(__VA_ARGS__ args) { body<16 / sizeof(T)>(args); }                      \
-    inline void name(__VA_ARGS__ args) {                                                           \
-        const kl::Isa isa = kl::isa();                                                             \
-        isa == kl::Isa::avx512 ? name##_avx512(args)                                               \
-        : isa == kl::Isa::avx2 ? name##_avx2(args)                                                 \
-                               : name##_base(args);                                                \
-    }
-#else
-#define KL_DISPATCH(name, body, T, ...)                                                            \
-    inline void name(__VA_ARGS__ args) { body<16 / sizeof(T)>(args); }
+template <class T, class F>
+__attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"))) inline void call_avx512(const F& f) {
+    call<64, T>(f);
+}
+template <class T, class F>
+__attribute__((target("avx2,fma"))) inline void call_avx2(const F& f) {
+    call<32, T>(f);
+}
 #endif
+
+// f(V) with V numbers of type T in one vector.
+template <class T, class F>
+inline void dispatch(const F& f) {
+#if defined(__x86_64__)
+    if (isa() == Isa::avx512) return call_avx512<T>(f);
+    if (isa() == Isa::avx2) return call_avx2<T>(f);
+#endif
+    call<16, T>(f);
+}
+
+// A function that runs a body over double.
+#define KL_DISPATCH(name, body, ...) \
+    inline void name(__VA_ARGS__ args) { \
+        kl::dispatch<double>([&](auto V) KL_INLINE_LAMBDA { body<V>(args); }); \
+    }
 
 }  // namespace kl

@@ -1,7 +1,7 @@
 // Algebraic multigrid for matrices of 3x3 blocks, as a preconditioner and as a solver.
 
 #include "arrays.hpp"
-#include "hierarchy.hpp"
+#include "conjugate_gradients.hpp"
 
 namespace {
 
@@ -12,7 +12,7 @@ struct Matrix {
     Array<int32_t> indptr, indices;
     Array<double> data;
     kl::Graph graph() const { return {indptr.size() - 1, indptr.data(), indices.data()}; }
-    kl::Blocks<double> blocks() const { return {indptr.size() - 1, indptr.data(), indices.data(), data.data()}; }
+    kl::BlockMatrix blocks() const { return {graph(), data.data(), static_cast<uint32_t>(indptr.size() - 1)}; }
 };
 
 std::vector<uint8_t> bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
@@ -62,9 +62,9 @@ public:
         std::vector<uint8_t> apart = bytes_of(linear_fixed);
         std::vector<double> B = free_modes(modes, apart), X = coordinates(points, apart.size());
         kl::Transfer transfer;
-        transfer.indptr.assign(indptr.data(), indptr.data() + indptr.size());
-        transfer.indices.assign(indices.data(), indices.data() + indices.size());
-        transfer.data.assign(weights.data(), weights.data() + weights.size());
+        transfer.P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
+        transfer.P.indices.assign(indices.data(), indices.data() + indices.size());
+        transfer.P.data.assign(weights.data(), weights.data() + weights.size());
         py::gil_scoped_release release;
         hierarchy.add_linear(below.graph(), below.data.data(), apart, std::move(transfer), fixed,
                              std::move(X));

@@ -10,6 +10,21 @@
 
 namespace kl {
 
+// The pattern of a matrix over nodes: sorted columns of each row (CSR).
+struct Graph {
+    int64_t rows;
+    const int32_t* indptr;
+    const int32_t* indices;
+};
+
+// Whether all indices are from 0 to n - 1: none is negative, nor is n - 1 less any of them.
+inline bool in_range(const int32_t* indices, int64_t count, int64_t n) {
+    const int32_t last = static_cast<int32_t>(n - 1);
+    int32_t signs = 0;
+    for (int64_t i = 0; i < count; ++i) signs |= indices[i] | (last - indices[i]);
+    return signs >= 0;
+}
+
 // Elements with the same number of nodes: (count, k) rows of nodes.
 struct Connectivity {
     const int32_t* nodes;
@@ -80,7 +95,7 @@ private:
     int32_t low = INT32_MAX, high = -1;
 };
 
-// Rows of a pattern: made in pieces by several threads, then copied to their places.
+// Rows of a pattern: made in pieces by several threads, then copied to where they belong.
 class Pattern {
 public:
     Pattern(int64_t n, const std::vector<Connectivity>& groups)

@@ -1,6 +1,6 @@
 // One step of pseudo-rigid bodies, which deform homogeneously: explicit, linearly implicit, energy-momentum.
 //
-// A body: q = deformation gradient F (row-wise) and centre x, u their rates.  A load is conjugate to u.
+// A body: q = deformation gradient F (row-wise) and center x, u their rates.  A load is conjugate to u.
 // Kinetic energy 1/2 tr(Fdot E0 Fdot^T), so each row of F has the mass matrix E0; St. Venant-Kirchhoff material.
 // B(F) X, in Voigt order xx yy zz xy yz zx, is the strain sym(F^T X) with engineering shear.
 
@@ -9,14 +9,14 @@
 
 namespace kl {
 
-enum PseudoScheme { DEF_EXP, DEF_LIM, ENERGY_MOMENTUM };
+enum PseudoIntegrator { EXPLICIT, LINEARLY_IMPLICIT, ENERGY_MOMENTUM };
 
 struct PseudoGroup {
-    Row q[12], u[12], load[12], euler[9], mass[1], volume[1], C[36], damping[1];
-    Row acceleration[3], spatial[12];  // of loads that stay constant
-    Row work[1], flaw[1];
+    Pack q[12], u[12], load[12], euler[9], mass[1], volume[1], C[36], damping[1];
+    Pack acceleration[3], spatial[12];  // of loads that stay constant
+    Pack work[1], flaw[1];
     double h, tolerance;
-    int count, scheme;
+    int count, integrator;
 };
 
 constexpr int VOIGT[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
@@ -42,7 +42,7 @@ KL_INLINE void green_strain(const D* F, D* E) {
 }
 
 template <class D>
-KL_INLINE void stress(const Row* C, int at, const D* E, D* S) {
+KL_INLINE void stress(const Pack* C, int at, const D* E, D* S) {
     for (int a = 0; a < 6; ++a) {
         D row[6];
         load<6>(C + 6 * a, at, row);
@@ -60,7 +60,7 @@ KL_INLINE void first_stress(const D* F, const D* S, D* P) {
 
 // A (9, 9): to each row of F the symmetric block (9) given, and B(left)^T (factor C) B(right).
 template <class D>
-KL_INLINE void tangent(const D* block, const D& factor, const D* left, const Row* C, int at, const D* right, D* A) {
+KL_INLINE void tangent(const D* block, const D& factor, const D* left, const Pack* C, int at, const D* right, D* A) {
     for (int k = 0; k < 3; ++k)
         for (int l = 0; l < 3; ++l) {
             D S[6], column[9];
@@ -101,7 +101,7 @@ KL_INLINE void linear_step(const PseudoGroup& g, int at, const D* F, const D* U,
     first_stress(Fh, rate_stress, P);
     first_stress(U, S, damping);
     for (int k = 0; k < 9; ++k) change[k] = h * (f[k] - volume * (P[k] + eta * damping[k]));
-    if (g.scheme == DEF_EXP) {
+    if (g.integrator == EXPLICIT) {
         for (int i = 0; i < 3; ++i) {
             const D row[3] = {change[3 * i], change[3 * i + 1], change[3 * i + 2]};
             solve3(euler, row, change + 3 * i);
@@ -175,7 +175,7 @@ KL_INLINE void pseudo_finish_body(PseudoGroup& g) {
         load<12>(g.load, at, f);
         load<1>(g.mass, at, &m);
         load<1>(g.work, at, &work);
-        if (g.scheme == ENERGY_MOMENTUM)
+        if (g.integrator == ENERGY_MOMENTUM)
             energy_momentum(g, at, q, u, f, change, flaw);
         else
             linear_step(g, at, q, u, f, change);
@@ -194,6 +194,6 @@ KL_INLINE void pseudo_finish_body(PseudoGroup& g) {
     }
 }
 
-KL_DISPATCH(pseudo_finish, pseudo_finish_body, double, PseudoGroup&)
+KL_DISPATCH(pseudo_finish, pseudo_finish_body, PseudoGroup&)
 
 }  // namespace kl

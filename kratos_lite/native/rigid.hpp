@@ -1,33 +1,33 @@
 // One step of rigid bodies: Koziara & Bicanic, Int. J. Numer. Meth. Eng. 81 (2010) 1073-1092.
 //
-// A body: q = rotation R (column-wise) and centre x, u = referential angular velocity W and velocity v.
+// A body: q = rotation R (column-wise) and center x, u = referential angular velocity W and velocity v.
 // A load is conjugate to u: referential torque, then force.
 
 #pragma once
-#include "lanes.hpp"
+#include "body_group.hpp"
 
 namespace kl {
 
-enum RigidScheme { RIG_POS, RIG_NEG, RIG_IMP };
+enum RigidIntegrator { RIGID_POSITIVE, RIGID_NEGATIVE, RIGID_IMPLICIT };
 
 struct RigidGroup {
-    Row q[12], u[6], qh[12], load[6], inertia[9], inverse[9], mass[1];
-    Row acceleration[3], spatial[6], convected[6];  // of loads that stay constant
-    Row work[1], flaw[1];                           // work of the loads; not 0 where the step failed
+    Pack q[12], u[6], qh[12], load[6], inertia[9], inverse[9], mass[1];
+    Pack acceleration[3], spatial[6], convected[6];  // of loads that stay constant
+    Pack work[1], flaw[1];                           // work of the loads; not 0 where the step failed
     double h, tolerance;
-    int count, scheme;
+    int count, integrator;
 };
 
 constexpr int NEWTON_STEPS = 50;
 constexpr double ROUND_OFF = 4e-16;  // relative change of a velocity that is none
 
 template <class D>
-KL_INLINE void load_rotation(const Row* q, int at, D* R) {
+KL_INLINE void load_rotation(const Pack* q, int at, D* R) {
     for (int k = 0; k < 9; ++k) R[3 * (k % 3) + k / 3] = *reinterpret_cast<const D*>(q[k] + at);
 }
 
 template <class D>
-KL_INLINE void store_rotation(const D* R, int at, Row* q) {
+KL_INLINE void store_rotation(const D* R, int at, Pack* q) {
     for (int k = 0; k < 9; ++k) *reinterpret_cast<D*>(q[k] + at) = R[3 * (k % 3) + k / 3];
 }
 
@@ -145,10 +145,10 @@ KL_INLINE void rigid_finish_body(RigidGroup& g) {
             A[i] = p[i] + h * load_[i];
             x[i] += h / 2 * next[3 + i];
         }
-        if (g.scheme == RIG_IMP) implicit_velocity(J, A, h, g.tolerance, next, flaw);
+        if (g.integrator == RIGID_IMPLICIT) implicit_velocity(J, A, h, g.tolerance, next, flaw);
         rotation(next, h / 2, E);
         product(Rh, E, R);
-        if (g.scheme == RIG_NEG) {
+        if (g.integrator == RIGID_NEGATIVE) {
             apply_transposed(E, A, part);
             apply(inverse, part, next);
         }
@@ -162,8 +162,8 @@ KL_INLINE void rigid_finish_body(RigidGroup& g) {
     }
 }
 
-KL_DISPATCH(rigid_half, rigid_half_body, double, RigidGroup&)
-KL_DISPATCH(rigid_load, rigid_load_body, double, RigidGroup&)
-KL_DISPATCH(rigid_finish, rigid_finish_body, double, RigidGroup&)
+KL_DISPATCH(rigid_half, rigid_half_body, RigidGroup&)
+KL_DISPATCH(rigid_load, rigid_load_body, RigidGroup&)
+KL_DISPATCH(rigid_finish, rigid_finish_body, RigidGroup&)
 
 }  // namespace kl

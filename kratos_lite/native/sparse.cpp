@@ -6,36 +6,34 @@
 
 namespace {
 
-using kl::Array;
-namespace py = pybind11;
+using namespace kl;
 
-Array<double> multiply(Array<int32_t> indptr, Array<int32_t> indices, Array<double> data, Array<double> x) {
+Array<double> product(Indices indptr, Indices indices, Numbers data, Numbers x) {
     const int64_t rows = indptr.size() - 1;
-    kl::require(data.ndim() == 3 && data.shape(0) == indices.size() && data.size() == 9 * indices.size(),
-                "data must be (nnz, 3, 3)");
-    kl::require(x.size() >= 3 * rows, "x must have three numbers for each row of blocks");
+    require(data.ndim() == 3 && data.shape(0) == indices.size() && data.size() == 9 * indices.size(),
+            "data must be (nnz, 3, 3)");
+    require(x.size() >= 3 * rows, "x must have three numbers for each row of blocks");
     Array<double> y(3 * rows);
-    const kl::Blocks<double> A{rows, indptr.data(), indices.data(), data.data()};
+    const BlockMatrix A{pattern(indptr, indices, rows), data.data(), static_cast<uint32_t>(x.size() / 3)};
     const double* from = x.data();
     double* to = y.mutable_data();
     py::gil_scoped_release release;
-    kl::multiply(A, from, to);
+    multiply(A, from, to);
     return y;
 }
 
-double norm(Array<int32_t> indptr, Array<double> data) {
+double largest_row_sum(Indices indptr, Numbers data) {
     const int64_t rows = indptr.size() - 1;
-    kl::require(rows < 1 || data.size() == 9 * static_cast<int64_t>(indptr.data()[rows]), "data must be (nnz, 3, 3)");
-    const kl::Blocks<double> A{rows, indptr.data(), nullptr, data.data()};
+    check_rows(indptr, data.size() / 9);
+    const BlockMatrix A{{rows, indptr.data(), nullptr}, data.data(), 0};
     py::gil_scoped_release release;
-    return kl::norm(A);
+    return norm(A);
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_sparse, m) {
-    kl::common(m);
-    m.def("norm", &norm, "largest row sum of |A|", py::arg("indptr").noconvert(), py::arg("data").noconvert());
-    m.def("multiply", &multiply, "A x of a matrix of 3x3 blocks", py::arg("indptr").noconvert(),
-          py::arg("indices").noconvert(), py::arg("data").noconvert(), py::arg("x").noconvert());
+    common(m);
+    define(m, "norm", largest_row_sum, "largest row sum of |A|", "indptr", "data");
+    define(m, "multiply", product, "A x of a matrix of 3x3 blocks", "indptr", "indices", "data", "x");
 }

@@ -1,69 +1,61 @@
-// Matrices of dense blocks in rows of blocks (BSR): products with vectors.
+// Matrices of dense 3x3 blocks in rows of blocks (BSR): products with vectors; sums over vectors.
 
 #pragma once
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "isa.hpp"
+#include "pattern.hpp"
 #include "threads.hpp"
 
 namespace kl {
 
-constexpr int64_t ROW_GRAIN = 1024;  // block rows of one task
+constexpr int64_t ROW_GRAIN = 1024;      // block rows of one task
+constexpr int64_t VECTOR_GRAIN = 16384;  // numbers of one task on a vector
 
-// A matrix of R x C blocks, row-major blocks, as borrowed arrays.
-template <class T, int R = 3, int C = 3>
-struct Blocks {
-    int64_t rows;
-    const int32_t* indptr;
-    const int32_t* indices;
-    const T* data;
+// A matrix of row-major blocks, as borrowed arrays.
+struct BlockMatrix : Graph {
+    const double* data;
+    uint32_t columns;
 };
 
-template <class T>
-struct Product {
-    Blocks<T> A;
-    const T* x;
-    T* y;
-    int64_t first, last;
-};
-
-// y = A x for some rows of 3x3 blocks.  Four lanes hold the products of one column of a block, so
+// y = A x for some rows of blocks.  Four lanes hold the products of one column of a block, so
 // that a row of blocks costs three multiply-adds each and one sum at its end.
-template <int V, class T>
-KL_INLINE void product_rows(const Product<T>& p) {
-    typedef vec<T, 4> lane;
-    for (int64_t i = p.first; i < p.last; ++i) {
-        lane s0 = {}, s1 = {}, s2 = {};
-        for (int32_t k = p.A.indptr[i]; k < p.A.indptr[i + 1]; ++k) {
-            const T* a = p.A.data + 9 * static_cast<int64_t>(k);
-            const T* x = p.x + 3 * static_cast<int64_t>(p.A.indices[k]);
-            const lane v = {x[0], x[1], x[2], 0};
-            const lane a2 = {a[6], a[7], a[8], 0};  // the fourth lane would lie beyond the block
-            s0 += *reinterpret_cast<const lane*>(a) * v;
-            s1 += *reinterpret_cast<const lane*>(a + 3) * v;
+KL_INLINE bool multiply_rows(const BlockMatrix& A, const double* from, double* y, int64_t first, int64_t last) {
+    typedef vec<double, 4> Vec;
+    for (int64_t i = first; i < last; ++i) {
+        Vec s0 = {}, s1 = {}, s2 = {};
+        for (int32_t k = A.indptr[i]; k < A.indptr[i + 1]; ++k) {
+            const double* a = A.data + 9 * static_cast<int64_t>(k);
+            const uint32_t j = static_cast<uint32_t>(A.indices[k]);
+            if (j >= A.columns) return false;
+            const double* x = from + 3 * static_cast<int64_t>(j);
+            const Vec v = {x[0], x[1], x[2], 0};
+            const Vec a2 = {a[6], a[7], a[8], 0};  // the fourth lane would lie beyond the block
+            s0 += *reinterpret_cast<const Vec*>(a) * v;
+            s1 += *reinterpret_cast<const Vec*>(a + 3) * v;
             s2 += a2 * v;
         }
-        p.y[3 * i] = s0[0] + s0[1] + s0[2];
-        p.y[3 * i + 1] = s1[0] + s1[1] + s1[2];
-        p.y[3 * i + 2] = s2[0] + s2[1] + s2[2];
+        y[3 * i] = s0[0] + s0[1] + s0[2];
+        y[3 * i + 1] = s1[0] + s1[1] + s1[2];
+        y[3 * i + 2] = s2[0] + s2[1] + s2[2];
     }
+    return true;
 }
 
-template <int V>
-KL_INLINE void product_f64(const Product<double>& p) { product_rows<V, double>(p); }
-KL_DISPATCH(product_chunk, product_f64, double, const Product<double>&)
-
-inline void multiply(const Blocks<double>& A, const double* x, double* y) {
+inline void multiply(const BlockMatrix& A, const double* x, double* y) {
     parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        product_chunk(Product<double>{A, x, y, first, last});
+        dispatch<double>([=](auto) KL_INLINE_LAMBDA {
+            if (!multiply_rows(A, x, y, first, last)) throw std::invalid_argument("an index is no column of the matrix");
+        });
     });
 }
 
 // The largest sum of |A| over a row.
-inline double norm(const Blocks<double>& A) {
+inline double norm(const BlockMatrix& A) {
     std::vector<double> largest((A.rows + ROW_GRAIN - 1) / ROW_GRAIN, 0.0);
     parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         double& mine = largest[first / ROW_GRAIN];
@@ -75,6 +67,29 @@ inline double norm(const Blocks<double>& A) {
         }
     });
     return largest.empty() ? 0.0 : *std::max_element(largest.begin(), largest.end());
+}
+
+// f(i) for all numbers of a vector.
+template <class F>
+void for_each(int64_t n, const F& f) {
+    parallel_ranges(n, VECTOR_GRAIN, [&](int64_t first, int64_t last) {
+        for (int64_t i = first; i < last; ++i) f(i);
+    });
+}
+
+// The sum of x y in double, the same for any number of threads.
+template <class T>
+double dot(const T* x, const T* y, int64_t n) {
+    constexpr int64_t PART = 8192;
+    std::vector<double> parts((n + PART - 1) / PART);
+    parallel_ranges(n, PART, [&](int64_t first, int64_t last) {
+        double sum = 0;
+        for (int64_t i = first; i < last; ++i) sum += static_cast<double>(x[i]) * y[i];
+        parts[first / PART] = sum;
+    });
+    double sum = 0;
+    for (double part : parts) sum += part;
+    return sum;
 }
 
 }  // namespace kl

@@ -15,13 +15,8 @@ namespace kl {
 constexpr int64_t TEXT_GRAIN = 1 << 18;  // bytes of one task
 
 inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
-inline bool is_letter(char c) { return static_cast<unsigned char>((c | 32) - 'a') < 26; }
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 inline bool ends_word(const char* p, const char* end) { return p == end || is_blank(*p) || *p == '\n'; }
-
-inline bool is_name(char c) { return is_letter(c) || is_digit(c) || c == '_'; }
-// Whether a number or name before this character would go on.
-inline bool goes_on(char c) { return is_name(c) || c == '.' || c == '+' || c == '-'; }
 
 // A whole number of at most 18 digits, which is below 2^63.
 inline bool read_whole(const char*& p, const char* end, int64_t& value) {
@@ -34,11 +29,11 @@ inline bool read_whole(const char*& p, const char* end, int64_t& value) {
     return p > start;
 }
 
-// A number whose exponent Fortran wrote with a D; it ends before any other sign.
+// A number whose exponent Fortran wrote with a D.
 inline bool read_fortran(const char*& p, const char* end, const char* start, double& value) {
     char copy[64];
     size_t size = 0;
-    for (p = start; p < end && goes_on(*p); ++p) {
+    for (p = start; !ends_word(p, end); ++p) {
         if (size == sizeof copy) return false;
         copy[size++] = *p == 'd' || *p == 'D' ? 'e' : *p;
     }

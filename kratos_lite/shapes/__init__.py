@@ -1,6 +1,6 @@
 """Shapes: reference cells with their shape functions, faces and node orders."""
 
-from kratos_lite.shapes.base import SHAPES, Shape
+from kratos_lite.shapes.base import LINEAR, SHAPES, Shape
 from kratos_lite.shapes.faces import (
     FACE_SHAPES,
     Line2,
@@ -18,8 +18,14 @@ from kratos_lite.shapes.pyramids import Pyramid5, Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.shapes.wedges import Wedge6, Wedge15
 
+LINEAR.update(
+    (shape.cell, shape)
+    for shape in (Point1, Line2, Triangle3, Quadrilateral4, Tetrahedron4, Pyramid5, Wedge6, Hexahedron8)
+)
+
 __all__ = [
     "FACE_SHAPES",
+    "LINEAR",
     "SHAPES",
     "Hexahedron8",
     "Hexahedron20",

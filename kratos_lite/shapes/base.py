@@ -12,6 +12,8 @@ from kratos_lite.typing import Array
 
 SHAPES: Registry[type[Shape]] = Registry("shape")
 """Every shape by its class name."""
+LINEAR: dict[str, type[Shape]] = {}
+"""The shape of the corners alone, by family of cells; `kratos_lite.shapes` fills it."""
 
 
 class Shape:
@@ -55,6 +57,23 @@ class Shape:
         cls.to_vtk = cls.to_vtk or same
         cls.to_gmsh = cls.to_gmsh or same
         SHAPES.add(cls.__name__, cls)
+
+    @classmethod
+    def linear(cls) -> type[Shape] | None:
+        """Return the shape of the corners alone.
+
+        Returns
+        -------
+        type of Shape, or None
+            None for a cell that kratos_lite does not know.
+
+        Examples
+        --------
+        >>> from kratos_lite.shapes import Hexahedron20
+        >>> Hexahedron20.linear().__name__
+        'Hexahedron8'
+        """
+        return LINEAR.get(cls.cell)
 
     @staticmethod
     def N(xi: ArrayLike) -> Array:

@@ -21,7 +21,7 @@ from kratos_lite.typing import Array, Ints
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from kratos_lite.assembly.stiffness import Pattern
+    from kratos_lite.assembly.sparsity_pattern import Pattern
 
 BAND_LIMIT = 16.0
 """Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
@@ -52,12 +52,13 @@ class Factorizer:
     Examples
     --------
     >>> import kratos_lite as kl
-    >>> from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+    >>> from kratos_lite.assembly.sparsity_pattern import Pattern
+    >>> from kratos_lite.assembly.stiffness import assemble_stiffness
     >>> model = kl.Model(kl.box((0.1, 0.1, 1.0), (1, 1, 9)), kl.Isotropic3D(E=1.0, nu=0.3))
     >>> points, groups = model.mesh.points, model.element_groups()
     >>> pattern = Pattern(len(points), [group.nodes for group in groups])
     >>> A = assemble_stiffness(points, groups, pattern)
-    >>> add_scalar(A, np.full(len(points), 2.0), A.diagonal_blocks())
+    >>> A.add_scalar(np.full(len(points), 2.0), A.diagonal_blocks())
     >>> b = np.arange(120.0)
     >>> bool(np.allclose(A @ Factorizer(pattern).factorize(A).solve(b), b))
     True
@@ -65,7 +66,7 @@ class Factorizer:
 
     def __init__(self, pattern: Pattern, symmetric: bool = True) -> None:
         self.symmetric = symmetric
-        rows = np.repeat(np.arange(pattern.n_nodes), np.diff(pattern.indptr))
+        rows = pattern.rows()
         self._nodes, nodal_width = _numbering(pattern, rows)
         self.width = w = 3 * nodal_width + 2
         self._height = w + 1 if symmetric else 3 * w + 1  # exchanged rows need room
@@ -160,21 +161,6 @@ def choose(n: int, width: int, height: int) -> tuple[str, str]:
     if n * height > BAND_NUMBERS:
         return "sparse", f"{n * height} numbers > {BAND_NUMBERS}: a band takes too much memory"
     return "band", f"width {width} ≤ {limit}: a band is fastest"
-
-
-def add_scalar(A: BlockMatrix, m: Array, at: Ints | None = None) -> None:
-    """Add numbers to the diagonals of blocks: A += m 1, in place.
-
-    Parameters
-    ----------
-    m : (nnz,), the data of a scalar matrix on the same pattern, or one number for each block of `at`.
-    at : blocks that take the numbers; `A.diagonal_blocks()` where m (n,) is a lumped mass.
-    """
-    diagonals = A.data.reshape(-1, 9)[:, ::4]
-    if at is None:
-        diagonals += m[:, None]
-    else:
-        diagonals[at] += m[:, None]
 
 
 # ---- numbering -------------------------------------------------------------------------------------

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.assembly.block_matrix import LinearLevel
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements import (
     KinematicLinear,
     KinematicLinear3D4N,
@@ -18,13 +19,31 @@ from kratos_lite.elements import (
     KinematicLinear3D8N,
 )
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Rows
 
-LINEAR: dict[str, type[KinematicLinear]] = {
-    element.shape.cell: element
+LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
+    element.shape: element
     for element in (KinematicLinear3D4N, KinematicLinear3D5N, KinematicLinear3D6N, KinematicLinear3D8N)
 }
-"""The linear element of each cell."""
+"""The linear element of each linear shape."""
+
+
+@dataclass(eq=False)
+class LinearLevel:
+    """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
+
+    Attributes
+    ----------
+    K : (3m, 3m) stiffness matrix of the linear elements on the corner nodes.
+    nodes : (m,) int, row among all n nodes of each corner node.
+    indptr, indices, weights : interpolation (n, m) from corner nodes to all nodes in rows (CSR).
+    """
+
+    K: BlockMatrix
+    nodes: Ints
+    indptr: Rows
+    indices: Rows
+    weights: Array
 
 
 def linear_level(points: Array, groups: Sequence[ElementGroup]) -> LinearLevel | None:
@@ -59,28 +78,28 @@ def linear_level(points: Array, groups: Sequence[ElementGroup]) -> LinearLevel |
 
 def _corners(shape: type[Shape]) -> Ints | None:
     """Return the rows among the nodes of a shape that are the nodes of its linear element."""
-    if shape.cell not in LINEAR:
+    linear = shape.linear()
+    if linear is None or linear not in LINEAR:
         return None
-    corners = LINEAR[shape.cell].shape.nodes
-    same = np.abs(shape.nodes[None] - corners[:, None]).max(axis=2) < 1e-12
+    same = np.abs(shape.nodes[None] - linear.nodes[:, None]).max(axis=2) < 1e-12
     return same.argmax(axis=1) if same.any(axis=1).all() else None
 
 
 def _is_linear(shape: type[Shape]) -> bool:
-    return len(shape.nodes) == len(LINEAR[shape.cell].shape.nodes)
+    return len(shape.nodes) == shape.corners
 
 
-def _linear(group: ElementGroup, nodes: NDArray[np.int32]) -> ElementGroup:
+def _linear(group: ElementGroup, nodes: Rows) -> ElementGroup:
     """Return the linear elements of a group on their corner nodes."""
     if _is_linear(group.element.shape):
         return ElementGroup(group.element, group.rule, group.material, nodes, group.rows)
-    element = LINEAR[group.element.shape.cell]
+    element = LINEAR[group.element.shape.linear()]
     return ElementGroup(element, element.rule, group.material, nodes, group.rows)
 
 
 def _interpolation(
-    groups: Sequence[ElementGroup], linear: Sequence[ElementGroup], number: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+    groups: Sequence[ElementGroup], linear: Sequence[ElementGroup], number: Rows
+) -> tuple[Rows, Rows, Array]:
     """Return rows (indptr, indices, weights) from corners to all nodes; `number` is that of each corner."""
     corners = np.flatnonzero(number >= 0)
     entries = [(corners, number[corners], np.ones(len(corners)))]
@@ -93,7 +112,7 @@ def _interpolation(
         rows = np.flatnonzero((first >= 0) & missing)
         missing[rows] = False
         element, local = np.divmod(first[rows], k)
-        N = LINEAR[group.element.shape.cell].shape.N(group.element.shape.nodes)
+        N = inner.element.shape.N(group.element.shape.nodes)
         N = np.where(np.abs(N) < 1e-14, 0.0, N)[local]
         at, corner = np.nonzero(N)
         entries.append((rows[at], inner.nodes[element[at], corner], N[at, corner]))

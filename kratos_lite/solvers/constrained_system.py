@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from kratos_lite import solvers
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.fields import internal_load
-from kratos_lite.assembly.stiffness import Pattern, PatternCache, assemble_dense, assemble_stiffness
+from kratos_lite.assembly.gauss_point_fields import internal_load
+from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
+from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
 from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.common import DENSE_MAX

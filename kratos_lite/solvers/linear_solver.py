@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.assembly.block_matrix import BlockMatrix, LinearLevel
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct, multigrid
+from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.common import DIRECT_LIMIT, Solution, backward_error
 from kratos_lite.solvers.supports import ConstraintMap
 from kratos_lite.typing import Array, Progress

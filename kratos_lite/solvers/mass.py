@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.assembly import fields
+from kratos_lite.assembly import inertia
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import Rule
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.banded import add_scalar
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ class Mass:
     def nodal(self) -> Array:
         """Row sums (n,) in kg."""
         if self.lumped:
-            return fields.lumped_mass(self._points, self._batches)
+            return inertia.lumped_mass(self._points, self._batches)
         return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:
@@ -79,9 +78,9 @@ class Mass:
     def add_to(self, A: BlockMatrix) -> None:
         """Add the mass matrix to a matrix of blocks on the same pattern."""
         if self.lumped:
-            add_scalar(A, self.nodal, self._diagonal)
+            A.add_scalar(self.nodal, self._diagonal)
         else:
-            add_scalar(A, self.scalar.data)
+            A.add_scalar(self.scalar.data)
 
     @cached_property
     def _diagonal(self) -> NDArray[np.int64]:

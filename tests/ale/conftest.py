@@ -8,7 +8,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.solvers.mass import Mass
 

@@ -10,9 +10,9 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.ale.matrices import exact_rule
-from kratos_lite.assembly import inertia
+from kratos_lite.assembly import element_groups
 from kratos_lite.assembly.inertia import inertia_matrices
-from kratos_lite.assembly.stiffness import Pattern
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.native import kernels
 from kratos_lite.solvers.mass import Mass
@@ -41,7 +41,7 @@ def fine(element):
 
 def numpy_matrices(monkeypatch, *arguments):
     with monkeypatch.context() as patch:
-        patch.setattr(inertia, "kernels", lambda name: None)
+        patch.setattr(element_groups, "kernels", lambda name: None)
         return inertia_matrices(*arguments)
 
 

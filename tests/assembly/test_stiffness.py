@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.assembly import stiffness as assembly
+from kratos_lite.assembly import element_groups, sparsity_pattern
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern, assemble_dense, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import CONSTANT_JACOBIANS, assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS
 from kratos_lite.native import kernels
 from kratos_lite.shapes import SHAPES, Tetrahedron4
 
@@ -31,7 +33,8 @@ compiled = pytest.mark.skipif(MODULE is None, reason="the compiled kernels were 
 def path(request, monkeypatch):
     """Run a test on both paths."""
     if request.param == "numpy":
-        monkeypatch.setattr(assembly, "kernels", lambda name: None)
+        for module in (element_groups, sparsity_pattern):
+            monkeypatch.setattr(module, "kernels", lambda name: None)
     elif MODULE is None:
         pytest.skip("the compiled kernels were not built")
     return request.param
@@ -73,7 +76,7 @@ def test_compiled_pattern_is_that_of_scipy(name):
     points, groups = scene(name)
     nodes = [group.nodes for group in groups]
     for got, want in zip(
-        MODULE.pattern(len(points), nodes), assembly._pattern(len(points), nodes), strict=True
+        MODULE.pattern(len(points), nodes), sparsity_pattern._pattern(len(points), nodes), strict=True
     ):
         assert got.dtype == np.int32
         np.testing.assert_array_equal(got, want)
@@ -85,7 +88,7 @@ def test_compiled_pattern_of_scattered_nodes_in_several_groups(threads):
     n = 20_000
     nodes = [np.array([rng.choice(n, k, replace=False) for _ in range(300)], np.int32) for k in (4, 7, 20)]
     nodes.append(np.empty((0, 8), np.int32))
-    want = assembly._pattern(n, nodes)
+    want = sparsity_pattern._pattern(n, nodes)
     assert (np.diff(want[0]) == 0).any()
     for count in (1, 2, 3, 5):
         threads(count)
@@ -177,7 +180,7 @@ def test_an_element_of_a_user_with_seven_nodes(path):
         group = ElementGroup(
             KinematicLinear3D7N, KinematicLinear3D7N.rule, STEEL, tens.nodes[:, :7], tens.rows
         )
-        assert KinematicLinear3D7N.stiffness_from_tables()
+        assert KinematicLinear3D7N.inherits(*STIFFNESS_STEPS)
         assert_sum(points, [group])
 
 
@@ -202,7 +205,7 @@ def test_an_element_class_that_redefines_its_stiffness(path):
 def test_constant_jacobians_are_used_and_said(path, name):
     skipped = set()
     assert_sum(*scene(name, (4, 4, 1)), skipped=skipped)
-    assert skipped == {assembly.CONSTANT_JACOBIANS}
+    assert skipped == {CONSTANT_JACOBIANS}
     skipped.clear()
     assert_sum(*scene(name, (4, 4, 1), 0.02), skipped=skipped)
     assert not skipped

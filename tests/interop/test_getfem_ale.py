@@ -14,7 +14,8 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
 from kratos_lite.ale.matrices import exact_rule
-from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements.kinematic_linear import lame_constants
 from kratos_lite.solvers.mass import Mass
 

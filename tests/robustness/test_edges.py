@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.assembly.stiffness import Pattern, PatternCache
+from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.materials import MATERIALS
 from kratos_lite.solvers import constrained_system as system
 from kratos_lite.solvers.supports import rigid_modes

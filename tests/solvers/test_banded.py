@@ -6,10 +6,11 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import banded
-from kratos_lite.solvers.banded import Factorizer, add_scalar
+from kratos_lite.solvers.banded import Factorizer
 from kratos_lite.solvers.mass import Mass
 
 MATERIAL = kl.Isotropic3D(2e6, 0.26, 7800.0)
@@ -38,7 +39,7 @@ def system(label, symmetric=True, shuffled=False):
     A = finite_strain.stiffness(points, groups, pattern, q, None if symmetric else dq)
     A.data *= 1e-4
     mass = Mass(points, groups, pattern, lumped=False).scalar
-    add_scalar(A, mass.data)
+    A.add_scalar(mass.data)
     return pattern, A
 
 
@@ -129,7 +130,7 @@ def test_nodes_without_elements_and_separate_bodies(symmetric):
     A = assemble_stiffness(points, [group], pattern)
     A.data /= A.norm()
     rng = np.random.default_rng(3)
-    add_scalar(A, 1.0 + rng.random(2 * n + 1), A.diagonal_blocks())
+    A.add_scalar(1.0 + rng.random(2 * n + 1), A.diagonal_blocks())
     b = rng.standard_normal(A.shape[0])
     x = Factorizer(pattern, symmetric).factorize(A).solve(b)
     np.testing.assert_allclose(A @ x, b, rtol=0, atol=1e-14)
@@ -142,9 +143,9 @@ def test_scalar_matrices_are_added_to_the_diagonals_of_blocks():
     mass = Mass(mesh.points, groups, pattern, lumped=False).scalar
     A = assemble_stiffness(mesh.points, groups, pattern)
     K = A.scipy().toarray()
-    add_scalar(A, mass.data)
+    A.add_scalar(mass.data)
     np.testing.assert_array_equal(A.scipy().toarray(), K + np.kron(mass.toarray(), np.eye(3)))
     lumped = np.arange(1.0, mesh.n_nodes + 1)
     B = BlockMatrix(np.zeros_like(A.data), A.indices, A.indptr)
-    add_scalar(B, lumped, B.diagonal_blocks())
+    B.add_scalar(lumped, B.diagonal_blocks())
     np.testing.assert_array_equal(B.scipy().toarray(), np.diag(np.repeat(lumped, 3)))

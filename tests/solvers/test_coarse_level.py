@@ -6,7 +6,8 @@ from scipy.sparse import csr_array
 
 import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern, assemble_dense, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.shapes import Hexahedron8
 from kratos_lite.solvers.coarse_level import linear_level

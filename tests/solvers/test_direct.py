@@ -7,7 +7,8 @@ import pytest
 from scipy.sparse import csr_array
 
 import kratos_lite as kl
-from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import LinearSolver, direct
 from kratos_lite.solvers.supports import reduction

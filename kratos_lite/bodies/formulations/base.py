@@ -18,7 +18,8 @@ import numpy as np
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.stiffness import Pattern, assemble_stiffness
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.deformable import Solve
 from kratos_lite.errors import ModelError
 from kratos_lite.registry import Registry

@@ -374,16 +374,16 @@ ERRORS = {
     "huge node id": ({"elem": "\nELEMENTS[1] = A([1,99999999999999999999],1)"}, "a.elem:2:1: "),
     "node twice": (
         {"node": NODE + "NODES[3] = Node(9, 9, 9)"},
-        "a.node:2:1: node 3 is defined twice with other coordinates, first at line 1",
+        "a.node:2:1: node 3 is already defined at line 1 at",
     ),
-    "element twice": ({"elem": ELEM + ELEM}, "a.elem:2:1: element 1 is defined twice, first at line 1"),
+    "element twice": ({"elem": ELEM + ELEM}, "a.elem:2:1: element 1 is already defined at line 1"),
     "element twice in lists": (
         {"elem": "ELEMENTS = ElementsList(A,[[1,[1,2],1],\n[1,[2,3],1]])"},
-        "a.elem:2:1: element 1 is defined twice, first at line 1",
+        "a.elem:2:1: element 1 is already defined at line 1",
     ),
     "condition twice": (
         {"cond": "CONDITIONS[1]=A([1],0)\nCONDITIONS[1]=B([2],0)"},
-        "a.cond:2:1: condition 1 is defined twice, first at line 1",
+        "a.cond:2:1: condition 1 is already defined at line 1",
     ),
     "missing node": (
         {"elem": ELEM + "ELEMENTS[2] = KinematicLinear3D4N([1,2,3,99],1)"},
@@ -391,7 +391,7 @@ ERRORS = {
     ),
     "missing node of a condition": (
         {"cond": "CONDITIONS[1]=A([9],0)"},
-        "a.cond:1:1: condition 1 (A): there is no node 9;",
+        "a.cond:1:1: condition 1 (A): there is no node 9",
     ),
     "missing node of Fix": ({"cond": "\nNODES[9].Fix(P)"}, "a.cond:2:1: there is no node 9"),
     "missing node of init": ({"init": "NODES[9](P, 0) = 1"}, "a.init:1:1: there is no node 9"),
@@ -418,7 +418,7 @@ ERRORS = {
     ),
     "value twice": (
         {"prop": PROP + "PROPERTIES[1][DENSITY] = 2"},
-        "a.prop:2:1: DENSITY of properties 1 is defined twice, first at line 1",
+        "a.prop:2:1: DENSITY of properties 1 is already defined at line 1",
     ),
     "ragged matrix": (
         {"prop": "PROPERTIES[1][M] = [[1,2],[3]]"},
@@ -429,7 +429,7 @@ ERRORS = {
     "old step": ({"init": "NODES[1](P, 1) = 0"}, "a.init:1:1: step 1 of the solution"),
     "init twice": (
         {"init": "NODES[1](P, 0) = 0;\nNODES[1](P, 0) = 1"},
-        "a.init:2:1: P of node 1 is defined twice with another value, first at line 1",
+        "a.init:2:1: P of node 1 is already defined at line 1 with another value",
     ),
     "whole vector": (
         {"cond": "NODES[1].Fix(DISPLACEMENT)"},
@@ -488,7 +488,7 @@ def test_repetitions_that_agree_are_noted(make):
         )
     )
     assert [str(note) for note in document.notes] == [
-        "a.node:2: node 3 is repeated from line 1",
+        "a.node:2: node 3 is already defined at line 1, the same",
         "a.cond:2: 1 statements repeat earlier ones, from here on",
         "a.init:2: 1 statements repeat earlier ones, from here on",
     ]

@@ -314,7 +314,7 @@ def test_value_by_the_type_of_its_variable(read, text, value):
         ("INTEGRATION_ORDER 2.0", r"'2.0' is not a whole number"),
         (
             "DENSITY 1\n DENSITY 2",
-            r"9:2: DENSITY stands here again; it stands at line 8 already with another value",
+            r"9:2: DENSITY is already defined at line 8 with another value",
         ),
     ],
 )
@@ -399,7 +399,7 @@ def test_constraint_variables_follow_the_header(read, header, masters):
         ("1 0.0 [2,1.0,-0.5]", r"has 3 weights, but 0 nodes"),
         ("1 0.0 [1] 1 9", r"there is no node 9"),
         ("1 0.0 1 2", r"expected 'id constant \[w1, w2, …\] slave"),
-        ("1 0.0 [1] 1 2\n1 0.0 [1] 3 4", r"9: constraint 1 stands at line 8 already"),
+        ("1 0.0 [1] 1 2\n1 0.0 [1] 3 4", r"9: constraint 1 is already defined at line 8"),
     ],
 )
 def test_wrong_constraint_is_refused(read, row, message):

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.io.document import Data, Properties
+from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
 from kratos_lite.io.formats.elem.grammar import Form, Run, Source
-from kratos_lite.io.formats.elem.mesh import twice
 from kratos_lite.mesh import Mesh, without_repeats
 from kratos_lite.typing import Array, Ints
 
@@ -33,7 +33,9 @@ def read_properties(files: ElemFiles) -> dict[int, Properties]:
             properties = found.setdefault(number, Properties(number, line=line, source=source.name))
             variable = name.decode("ascii")
             if variable in properties.values:
-                source.add(start, twice(f"{variable} of properties {number}", properties.lines[variable]))
+                source.problem(
+                    already(f"{variable} of properties {number}", properties.lines[variable]), start
+                )
             properties.values[variable] = _value(source, run.form, text, start)
             properties.lines[variable] = line
     return found
@@ -74,14 +76,14 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
         source = files.sources[ending]
         ids = source.integers(run.columns[0], run.starts)
         for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
-            source.add(run.starts[i], files.no_node(ids[i]))
+            source.problem(files.no_node(ids[i]), run.starts[i])
         values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
         if not _add_all(found, run.columns[1], ids, values, source.lines(run.starts)):
             _add_singly(found, source, run, ids, values)
         for name in sorted(set(run.columns[1]) & VECTORS):
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")
-            source.add(start, f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z")
+            source.problem(f"{text} is a vector; expected one of {text}_X, {text}_Y, {text}_Z", start)
     return found
 
 
@@ -111,34 +113,35 @@ def _add_singly(found: dict[str, Values], source: Source, run: Run, ids: Ints, v
         nodes = found.setdefault(name.decode("ascii"), {})
         earlier, at = nodes.setdefault(node, (value, line))
         if earlier != value:
-            source.add(start, twice(f"{name.decode('ascii')} of node {node}", at, " with another value"))
+            source.problem(
+                already(f"{name.decode('ascii')} of node {node}", at, " with another value"), start
+            )
         elif at != line:
             repeated.append(start)
     if repeated:
-        source.note(repeated[0], f"{len(repeated)} statements repeat earlier ones, from here on")
+        source.note(f"{len(repeated)} statements repeat earlier ones, from here on", repeated[0])
 
 
 def _initial(source: Source, run: Run) -> Array:
     """Return the values of ``.init`` statements; their step must be 0."""
     steps = source.integers(run.columns[2], run.starts, least=0)
     for i in np.flatnonzero(steps):
-        source.add(run.starts[i], f"step {steps[i]} of the solution is not known at the start; expected 0")
+        source.problem(
+            f"step {steps[i]} of the solution is not known at the start; expected 0", run.starts[i]
+        )
     return source.reals(run.columns[3], run.starts)
 
 
-def _value(source: Source, form: Form, text: bytes | float, start: int) -> Any:
+def _value(source: Source, form: Form, text: bytes, start: int) -> Any:
     """Return the value of a property: a float, or a vector or matrix as an array."""
-    if not isinstance(text, bytes):
-        return float(text)
     if form is not MATRIX:
         values = source.reals([text], [start] * (text.count(b",") + 1))
         return values if form is VECTOR else float(values[0])
     rows = [row.strip(b", \t\n") for row in text.replace(b"[", b"").split(b"]")[:-1]]
     matrix = [source.reals([row], [start] * (row.count(b",") + 1)) for row in rows]
     if len({len(row) for row in matrix}) > 1:
-        source.add(
-            start, f"the rows of the matrix have {[len(row) for row in matrix]} numbers; expected equal rows"
-        )
+        counts = [len(row) for row in matrix]
+        source.problem(f"the rows of the matrix have {counts} numbers; expected equal rows", start)
         return None
     return np.array(matrix)
 

@@ -87,7 +87,7 @@ class ElemFiles:
 
     def no_node(self, node: int) -> str:
         """Return the message for a node id that no node has."""
-        return f"there is no node {node}; expected the id of a node in {self.sources['.node'].name}"
+        return f"there is no node {node} in {self.sources['.node'].name}"
 
 
 def stem(path: str | Path) -> str:

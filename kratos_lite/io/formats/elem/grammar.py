@@ -11,15 +11,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Note
+from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
-from kratos_lite.native import kernels
 from kratos_lite.typing import Array, Ints
 
 INT = rb"\d+(?![\w.+-])"
@@ -37,8 +36,6 @@ WORDS = {
     "<rows>": (rb"(%b(?:\s*,\s*%b)*)\s*(?:,\s*)?" % (ROW, ROW), "a row [number, …]"),
     "<next>": (rb"(?:,\s*|(?=\]))", "',' or ']'"),
 }
-SMALL = 200_000
-"""Bytes below which the compiled kernels are not worth loading."""
 KEYWORDS = ("NODES", "ELEMENTS", "CONDITIONS", "PROPERTIES", "ElementsGroup")
 HOME = {"NODES": ".node, .cond or .init", "ELEMENTS": ".elem", "CONDITIONS": ".cond", "PROPERTIES": ".prop"}
 
@@ -98,31 +95,20 @@ def _word(word: str) -> tuple[bytes, str]:
     return re.escape(word.encode()) + (rb"\b\s*" if word.isalpha() else rb"\s*"), repr(word)
 
 
-class Lists(NamedTuple):
-    """Lists of ids that are read already: how many each holds, and all one after the other."""
-
-    counts: Ints
-    ids: Ints
-
-
 @dataclass
 class Run:
-    """Statements or rows of one form that follow each other: the values by column, and where they start.
-
-    A column holds the words of the file, or the compiled reader has put numbers in their place:
-    an array, or `Lists`; names are always words.
-    """
+    """Statements or rows of one form that follow each other: their values by column, and their offsets."""
 
     form: Form
     head: tuple[bytes, ...] = ()
-    columns: list[Any] = field(default_factory=list)
+    columns: list[Sequence[bytes]] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
 
 
 CLOSE = Form("] )")
 
 
-class Source:
+class Source(TextSource):
     """One file of the set: its bytes without comments, and places in it for messages.
 
     Parameters
@@ -132,45 +118,21 @@ class Source:
     """
 
     def __init__(self, path: Path, problems: Problems, notes: list[Note]) -> None:
-        self.name = str(path)
-        self.problems = problems
-        self.notes = notes
-        self.data = blank_comments(read_bytes(path), self.name)
+        data = blank_comments(read_bytes(path), str(path))
+        super().__init__(str(path), data, problems, notes, path.name)
 
-    @cached_property
-    def _line_ends(self) -> NDArray[np.int64]:
-        return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == ord("\n"))
-
-    def lines(self, starts: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int32]:
-        """Return the line (from 1) of each offset."""
-        return (np.searchsorted(self._line_ends, starts) + 1).astype(np.int32)
-
-    def add(self, start: int, message: str) -> None:
-        """Note a problem at an offset."""
-        line = int(self.lines([start])[0])
-        column = start - (int(self._line_ends[line - 2]) if line > 1 else -1)
-        self.problems.add(f"{self.name}:{line}:{column}: {message}")
-
-    def note(self, start: int, text: str) -> None:
-        """Note something odd at an offset."""
-        self.notes.append(Note(int(self.lines([start])[0]), text, Path(self.name).name))
-
-    def integers(self, tokens: Iterable[bytes] | Ints, starts: Sequence[int] | Ints, least: int = 1) -> Ints:
+    def integers(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints, least: int = 1) -> Ints:
         """Convert tokens, or commas between them; ids below `least` or beyond 2^63-1 are problems.
 
-        `starts` are the offsets of the statements that hold the integers.  Arrays are right already.
+        `starts` are the offsets of the statements that hold the integers.
         """
-        if isinstance(tokens, np.ndarray):
-            return tokens
         text = b" ".join(tokens).replace(b",", b" ")
         values = np.fromstring(text, dtype=np.int64, sep=" ")
         self._check(text, starts, (values < least) | (values == np.iinfo(np.int64).max), integer)
         return values
 
-    def reals(self, tokens: Iterable[bytes] | Array, starts: Sequence[int] | Ints) -> Array:
+    def reals(self, tokens: Iterable[bytes], starts: Sequence[int] | Ints) -> Array:
         """Convert tokens, or commas between them; a number too large for a float is a problem."""
-        if isinstance(tokens, np.ndarray):
-            return tokens
         text = b" ".join(tokens).replace(b",", b" ").translate(_EXPONENTS)
         values = np.fromstring(text, sep=" ")
         self._check(text, starts, ~np.isfinite(values), real)
@@ -189,7 +151,7 @@ class Source:
             try:
                 read(tokens[i])
             except ValueError as reason:
-                self.add(int(starts[i]), str(reason))
+                self.problem(str(reason), int(starts[i]))
 
     def scan(self, forms: Sequence[Form]) -> list[Run]:
         """Read the whole file as statements of these forms; what fits none of them is a problem."""
@@ -209,7 +171,7 @@ class Source:
                 runs.append(run)
             elif close := CLOSE.match(self.data, position):
                 if not opened:  # GiD templates wrote the end of a list even where they left out its beginning
-                    self.note(position, "'])' closes no list; ignored")
+                    self.note("'])' closes no list; ignored", position)
                 opened, after = None, self._skip(close.end())
             else:
                 after, stay = self._explain(position, forms, opened)
@@ -223,22 +185,6 @@ class Source:
 
     def _take(self, form: Form, position: int) -> tuple[Run, int]:
         """Take as many statements of one form as follow each other here."""
-        return self._take_compiled(form, position) or self._take_words(form, position)
-
-    def _take_compiled(self, form: Form, position: int) -> tuple[Run, int] | None:
-        """Take the statements in compiled code; None where it knows less of them than the patterns do."""
-        words = form.text.split()
-        is_plain = not {"<reals>", "<rows>"} & set(words)
-        text = kernels("text") if is_plain and len(self.data) > SMALL else None
-        if text is None:
-            return None
-        starts, columns, end = text.statements(self.data, position, words, form.ends)
-        if form.match(self.data, end):
-            return None
-        columns = [Lists(*column) if isinstance(column, tuple) else column for column in columns]
-        return Run(form, (), columns, starts.tolist()), end
-
-    def _take_words(self, form: Form, position: int) -> tuple[Run, int]:
         data, match = self.data, form.match
         rows: list[tuple[bytes, ...]] = []
         starts: list[int] = []
@@ -257,9 +203,9 @@ class Source:
         found = _FOUND.match(self.data, place)
         word = found.group()[:60] if found else b""
         if place == start and not opened:
-            self.add(place, _unknown(word, forms))
+            self.problem(_unknown(word, forms), place)
         else:
-            self.add(place, _unexpected(word, wanted) + self._opened_at(opened))
+            self.problem(_unexpected(word, wanted) + self._opened_at(opened), place)
         resume = (choices[0].resume if opened else _NEXT_STATEMENT).search(self.data, start + 1)
         after = resume.start() if resume else len(self.data)
         return after, bool(opened and resume) and self.data[after : after + 1] in (b"[", b"]")
@@ -277,7 +223,7 @@ class Source:
         return place, ["the end of the statement"]
 
     def _opened_at(self, opened: Run | None) -> str:
-        return f" (in the list opened at line {self.lines(opened.starts)[0]})" if opened else ""
+        return f" (in the list opened at line {self.line(opened.starts[0])})" if opened else ""
 
 
 _MANY = tuple(WORDS[word][0] for word in ("<ids>", "<reals>", "<rows>"))

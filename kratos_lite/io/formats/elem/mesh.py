@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kratos_lite.io.document import Note
+from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
 from kratos_lite.io.formats.elem.files import ElemFiles
-from kratos_lite.io.formats.elem.grammar import Lists, Run
+from kratos_lite.io.formats.elem.grammar import Run
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
@@ -48,19 +49,15 @@ def _nodes(files: ElemFiles) -> Mesh:
     before = files.problems.count
     if source is None or not starts:
         if source is not None and not before:
-            source.add(0, "there are no nodes; expected NODES = NodesList([[id, x, y, z], …])")
+            source.problem("there are no nodes; expected NODES = NodesList([[id, x, y, z], …])", 0)
         files.nodes_known = False
         return Mesh(np.zeros((0, 3)), source=name)
     ids = _joined(runs, 0, source.integers)
     points = np.column_stack([_joined(runs, column, source.reals) for column in (1, 2, 3)])
     keep = np.ones(len(ids), dtype=bool)
-    for first, again in _duplicates(ids):
-        keep[again] = False
-        line = source.lines([starts[first]])[0]
-        if np.array_equal(points[first], points[again]):
-            source.note(starts[again], f"node {ids[again]} is repeated from line {line}")
-        else:
-            source.add(starts[again], twice(f"node {ids[again]}", line, " with other coordinates"))
+    for row, text, is_same in repeated_nodes(ids, points, source.lines(starts)):
+        keep[row] = False
+        (source.note if is_same else source.problem)(text, starts[row])
     files.nodes_known &= files.problems.count == before
     return Mesh(points[keep], node_ids=ids[keep], source=name)
 
@@ -77,33 +74,38 @@ def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
     starts, names = _starts(runs), [name for run in runs for name in run.columns[1]]
     ids = _joined(runs, 0, source.integers)
     properties = _joined(runs, 3, lambda tokens, at: source.integers(tokens, at, least=0))
-    counts, listed = _lists(runs)
+    bodies = [body for run in runs for body in run.columns[2]]
+    counts = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     lines = source.lines(starts)
-    for first, again in _duplicates(ids):
-        source.add(starts[again], twice(f"{kind.word} {ids[again]}", lines[first]))
+    for row, first in repeated(ids):
+        source.problem(already(f"{kind.word} {ids[row]}", lines[first]), starts[row])
     blocks, end = [], 0
     for name, group in groupby(names):
         rows = slice(end, end := end + len(list(group)))
         text = name.decode("ascii")
         block = Block(text, NO_NODES, ids[rows], properties[rows], kind.shape_of(text), lines[rows])
-        _connect(block, counts[rows], listed(rows), starts[rows], (files, mesh, kind))
+        _connect(block, counts[rows], bodies[rows], starts[rows], (files, mesh, kind))
         blocks.append(block)
     return blocks
 
 
 def _connect(
-    block: Block, widths: Ints, bodies: Any, starts: Sequence[int], at: tuple[ElemFiles, Mesh, Kind]
+    block: Block,
+    widths: Ints,
+    bodies: Sequence[bytes],
+    starts: Sequence[int],
+    at: tuple[ElemFiles, Mesh, Kind],
 ) -> None:
     """Fill ``block.nodes`` with the node rows of the `widths` ids that each of the texts `bodies` names."""
     files, mesh, kind = at
     source = files.sources[kind.ending]
 
-    def add(cell: int, message: str) -> None:
-        source.add(starts[cell], f"{kind.word} {block.ids[cell]} ({block.name}){message}")
+    def problem(cell: int, message: str) -> None:
+        source.problem(f"{kind.word} {block.ids[cell]} ({block.name}){message}", starts[cell])
 
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
     for i in np.flatnonzero(widths != width).tolist():
-        add(i, f" has {widths[i]} nodes; expected {width}")
+        problem(i, f" has {widths[i]} nodes; expected {width}")
     if (widths != width).any():
         return
     before = files.problems.count
@@ -111,11 +113,8 @@ def _connect(
     if files.problems.count > before:
         return
     block.nodes = mesh.node_rows(nodes).astype(np.int32)
-    ordered = np.sort(nodes, axis=1)
-    for i, k in np.argwhere(ordered[:, 1:] == ordered[:, :-1]).tolist():
-        add(i, f" names node {ordered[i, k]} twice; its nodes must differ")
-    for i, k in np.argwhere(block.nodes < 0).tolist() if files.nodes_known else ():
-        add(i, f": {files.no_node(nodes[i, k])}")
+    for i, message in wrong_nodes(nodes, block.nodes) if files.nodes_known else ():
+        problem(i, message)
 
 
 def _note_unused(files: ElemFiles, mesh: Mesh) -> None:
@@ -138,38 +137,3 @@ def _joined(runs: Sequence[Run], column: int, read: Callable[[Any, list[int]], N
 
 def _starts(runs: Sequence[Run]) -> list[int]:
     return [start for run in runs for start in run.starts]
-
-
-def _lists(runs: Sequence[Run]) -> tuple[Ints, Callable[[slice], Any]]:
-    """Return how many ids each cell lists, and a function that gives the ids, or texts, of some cells."""
-    columns = [run.columns[2] for run in runs]
-    if all(isinstance(column, Lists) for column in columns):
-        counts = np.concatenate([column.counts for column in columns])
-        ids = np.concatenate([column.ids for column in columns])
-        ends = np.append(0, np.cumsum(counts))
-        return counts, lambda rows: ids[ends[rows.start] : ends[rows.stop]]
-    texts = [_bodies(column) if isinstance(column, Lists) else column for column in columns]
-    bodies = [body for column in texts for body in column]
-    return np.array([body.count(b",") + 1 if body else 0 for body in bodies]), lambda rows: bodies[rows]
-
-
-def _bodies(lists: Lists) -> list[bytes]:
-    """Return the ids of each list as text."""
-    return [
-        ",".join(map(str, ids.tolist())).encode() for ids in np.split(lists.ids, np.cumsum(lists.counts)[:-1])
-    ]
-
-
-def _duplicates(ids: Ints) -> Iterator[tuple[int, int]]:
-    """Yield pairs of rows, the first and a later one, that carry the same id."""
-    if (np.diff(ids) > 0).all():
-        return
-    order = np.argsort(ids, kind="stable")
-    ordered = ids[order]
-    for i in np.flatnonzero(ordered[1:] == ordered[:-1]):
-        yield int(order[np.searchsorted(ordered, ordered[i])]), int(order[i + 1])
-
-
-def twice(what: str, line: int, how: str = "") -> str:
-    """Return the message for what stands in a file for the second time."""
-    return f"{what} is defined twice{how}, first at line {line}; expected once"

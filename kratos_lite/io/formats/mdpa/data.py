@@ -7,7 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.io.document import Data, Note
+from kratos_lite.io.document import Data
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at
@@ -96,16 +96,13 @@ def _note_missing(source: Source, data: Data, word: str, known: Ints) -> None:
     missing = rows_of_ids(known, data.ids) < 0
     if (missing & data.fixed).any():
         ids = data.ids[missing & data.fixed]
-        source.problems.add(
-            f"{data.variable} is fixed on {word} {_first(ids)}, which the file does not have", data.line
-        )
+        text = f"{data.variable} is fixed on {word} {_first(ids)}, which the file does not have"
+        source.problem_in_line(text, data.line)
     elif missing.any():
         text = f"{data.variable} on {word} {_first(data.ids[missing])} is ignored: the file does not have it"
-        source.notes.append(Note(data.line, text))
+        source.note_in_line(text, data.line)
     if len(without_repeats(data.ids)) < len(data.ids):
-        source.notes.append(
-            Note(data.line, f"{data.variable} stands twice for a {word}; the last value counts")
-        )
+        source.note_in_line(f"{data.variable} is given twice for a {word}; the last value counts", data.line)
 
 
 def _first(ids: Ints) -> str:

@@ -6,16 +6,14 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Note
-from kratos_lite.io.formats.mdpa.rows import Layout, Rows, read_rows, width_of_first_line
+from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
+from kratos_lite.io.formats.mdpa.rows import Layout, read_rows, width_of_first_line
 from kratos_lite.io.formats.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
 from kratos_lite.mesh import Block, Mesh, distinct
 from kratos_lite.shapes import FACE_SHAPES
-from kratos_lite.typing import Ints
 
 NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
 WORDS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
@@ -45,43 +43,12 @@ def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
             f"{source.name}: there are no nodes; a 'Begin Nodes' block with rows 'id x y z' is needed"
         )
     keep = np.ones(len(ids), dtype=bool)
-    for row, first in repeated(ids):
+    for row, text, is_same in repeated_nodes(ids, points, lines):
         keep[row] = False
-        if (points[row] == points[first]).all():
-            source.notes.append(
-                Note(int(lines[row]), f"node {ids[row]} stands at line {lines[first]} already, the same")
-            )
-        else:
-            source.problems.add(
-                f"node {ids[row]} stands at line {lines[first]} already, at {_at(points[first])}; found "
-                f"{_at(points[row])}; give each node its own id",
-                int(lines[row]),
-            )
+        (source.note_in_line if is_same else source.problem_in_line)(text, int(lines[row]))
     if not keep.all():
         points, ids = points[keep], ids[keep]
     return Mesh(points, node_ids=ids, source=source.name)
-
-
-def _at(point: NDArray[np.float64]) -> str:
-    return " ".join(f"{x:.12g}" for x in point)
-
-
-def repeated(ids: Ints) -> list[tuple[int, int]]:
-    """Return (row, row of the first) for every id that stands there again.
-
-    >>> repeated(np.array([4, 7, 4]))
-    [(2, 0)]
-    """
-    if len(ids) < 2 or (ids[1:] > ids[:-1]).all():
-        return []
-    order = np.argsort(ids, kind="stable")
-    starts = np.append(True, ids[order][1:] != ids[order][:-1])
-    if starts.all():
-        return []
-    first = np.empty_like(order)
-    first[order] = order[starts][np.cumsum(starts) - 1]
-    again = np.flatnonzero(first != np.arange(len(ids)))
-    return [(int(row), int(first[row])) for row in again]
 
 
 def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
@@ -107,7 +74,8 @@ def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     rows = read_rows(source, frame.spans[0], layout)
     ids = rows.ints[:, 0] if len(rows.ints) else np.zeros(0, dtype=np.int64)
     nodes = mesh.node_rows(rows.ints[:, head:]).astype(np.int32).reshape(len(ids), width)
-    _check_nodes(source, rows, nodes, head, f"{word} {{}} ({name})")
+    for row, text in wrong_nodes(rows.ints[:, head:], nodes):
+        source.problem_in_line(f"{word} {ids[row]} ({name}){text}", int(rows.lines[row]))
     properties = rows.ints[:, 1] if head == 2 and len(ids) else np.zeros(len(ids), dtype=np.int64)
     shape = {"element": element_shape, "condition": condition_shape}.get(word, lambda _: None)(name)
     return Block(name, nodes, ids, properties, shape, rows.lines)
@@ -123,31 +91,12 @@ def _width(kind: str, name: str) -> int | None:
     return width if width in known else None
 
 
-def _check_nodes(source: Source, rows: Rows, nodes: NDArray[np.int32], head: int, text: str) -> None:
-    """Note cells with nodes that are missing or stand twice."""
-    if not nodes.size:
-        return
-    for row, column in np.argwhere(nodes < 0)[:1000] if nodes.min() < 0 else ():
-        name = text.format(rows.ints[row, 0])
-        source.problems.add(f"{name}: there is no node {rows.ints[row, head + column]}", int(rows.lines[row]))
-    ordered = np.sort(nodes, axis=1)
-    twice = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
-    for row in np.flatnonzero(twice.any(axis=1))[:1000]:
-        node = rows.ints[row, head + int(np.argmax(nodes[row] == ordered[row, 1:][twice[row]][0]))]
-        name = text.format(rows.ints[row, 0])
-        source.problems.add(f"{name} names node {node} twice; its nodes must differ", int(rows.lines[row]))
-
-
 def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
     ids = np.concatenate([block.ids for block in blocks])
-    again = repeated(ids)
-    if again:
-        lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
-        for row, first in again:
-            source.problems.add(
-                f"{word} {ids[row]} stands at line {lines[first]} already; give each {word} its own id",
-                int(lines[row]),
-            )
+    lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
+    for row, first in repeated(ids):
+        text = already(f"{word} {ids[row]}", lines[first], f"; give each {word} its own id")
+        source.problem_in_line(text, int(lines[row]))
 
 
 def _check_properties(source: Source, blocks: list[Block], word: str, declared: Sequence[int]) -> None:
@@ -157,8 +106,9 @@ def _check_properties(source: Source, blocks: list[Block], word: str, declared: 
                 continue
             rows = np.flatnonzero(block.properties == number)
             more = f" (and {len(rows) - 1} more {word}s)" if len(rows) > 1 else ""
-            source.problems.add(
+            assert block.lines is not None
+            source.problem_in_line(
                 f"{word} {block.ids[rows[0]]}{more} uses Properties {number}, which the file does not have; "
                 f"add 'Begin Properties {number}' … 'End Properties'",
-                int(block.lines[rows[0]]) if block.lines is not None else None,
+                int(block.lines[rows[0]]),
             )

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from kratos_lite.io.document import Note
+from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.mdpa.rows import Layout, read_rows
 from kratos_lite.io.formats.mdpa.scan import LISTS, Frame, Source
 from kratos_lite.io.formats.mdpa.values import read_values
@@ -46,10 +46,8 @@ class PartReader:
             return
         full = f"{parent}.{name}" if parent else name
         if full in self.lines:
-            self.source.problem(
-                f"SubModelPart {full} stands at line {self.lines[full]} already; give each part its own name",
-                frame.offset,
-            )
+            text = already(f"SubModelPart {full}", self.lines[full], "; give each part its own name")
+            self.source.problem(text, frame.offset)
             return
         self.lines[full] = self.source.line(frame.offset)
         for ancestor in _chain(full):
@@ -77,10 +75,8 @@ class PartReader:
         for i in np.flatnonzero(~exists)[:1000]:
             word = "Properties" if kind == "properties" else _singular(kind)
             text = f"SubModelPart {full} lists {word} {ids[i]}, which the file does not have"
-            if is_number:
-                self.source.notes.append(Note(int(read.lines[i]), text))
-            else:
-                self.source.problems.add(text, int(read.lines[i]))
+            report = self.source.note_in_line if is_number else self.source.problem_in_line
+            report(text, int(read.lines[i]))
         for ancestor in _chain(full) if len(ids) else ():
             if is_number:
                 have = getattr(self.parts[ancestor], kind)

@@ -10,8 +10,9 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.formats.cells import already, repeated
 from kratos_lite.io.formats.mdpa.data import read_data
-from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh, repeated
+from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.parts import PartReader
 from kratos_lite.io.formats.mdpa.scan import TOP, Frame, Source, scan
 from kratos_lite.io.formats.mdpa.values import Table, read_table, read_values
@@ -130,10 +131,8 @@ def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = Fa
         source.problem(f"{frame.name}: {error}", frame.offset)
         return None
     if number in found:
-        source.problem(
-            f"{frame.name} {number} stands at line {found[number].line} already; give each its own id",
-            frame.offset,
-        )
+        text = already(f"{frame.name} {number}", found[number].line, "; give each its own id")
+        source.problem(text, frame.offset)
         return None
     return number
 
@@ -141,7 +140,5 @@ def _number(source: Source, frame: Frame, found: dict[int, Any], zero: bool = Fa
 def _refuse_repeated_constraints(source: Source, document: Document) -> None:
     all_ = document.constraints
     for row, first in repeated(_numbers(c.id for c in all_)):
-        source.problems.add(
-            f"constraint {all_[row].id} stands at line {all_[first].line} already; give each its own id",
-            all_[row].line,
-        )
+        text = already(f"constraint {all_[row].id}", all_[first].line, "; give each its own id")
+        source.problem_in_line(text, all_[row].line)

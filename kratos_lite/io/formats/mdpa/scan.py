@@ -5,13 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
-
-import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.document import Note
+from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import shown
 from kratos_lite.native import kernels
 
@@ -57,47 +53,21 @@ class Frame:
         return " ".join(["Begin", self.name, *self.arguments])
 
 
-@dataclass(eq=False)
-class Source:
-    """The text of a file without comments, with line numbers, problems and notes."""
+class Source(TextSource):
+    """The text of an `.mdpa` file; `strict` wants every row on a line of its own."""
 
-    name: str
-    data: bytes
-    strict: bool = True
-
-    def __post_init__(self) -> None:
-        self.problems = Problems(self.name)
-        self.notes: list[Note] = []
-
-    @cached_property
-    def newlines(self) -> NDArray[np.int64]:
-        """Offsets of the line ends."""
-        return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == 10)
-
-    def line(self, offset: int) -> int:
-        """Return the line, from 1, of an offset."""
-        return int(np.searchsorted(self.newlines, offset)) + 1
-
-    def lines(self, offsets: NDArray[np.int64]) -> NDArray[np.int32]:
-        """Return the lines, from 1, of increasing offsets."""
-        return (np.searchsorted(self.newlines, offsets) + 1).astype(np.int32)
-
-    def problem(self, text: str, offset: int) -> None:
-        """Note what is wrong at an offset."""
-        self.problems.add(text, self.line(offset), offset - self.data.rfind(b"\n", 0, offset))
+    def __init__(self, name: str, data: bytes, strict: bool = True) -> None:
+        super().__init__(name, data, Problems(), [])
+        self.strict = strict
 
     def fail(self, text: str, offset: int) -> InputError:
         """Return the error with all problems up to this one, after which reading makes no sense."""
-        self.problems.add(text, self.line(offset), offset - self.data.rfind(b"\n", 0, offset))
+        self.problem(text, offset)
         try:
             self.problems.raise_if_any()
         except InputError as error:
             return error
         raise AssertionError
-
-    def note(self, text: str, offset: int) -> None:
-        """Note what was kept without use, skipped or found odd."""
-        self.notes.append(Note(self.line(offset), text))
 
     def words(self, span: Span) -> Iterator[re.Match[bytes]]:
         """Return the words in a piece of the text."""

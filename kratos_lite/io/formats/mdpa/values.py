@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, read_rows
 from kratos_lite.io.formats.mdpa.scan import NAME, WORD, Frame, Source, Span
 from kratos_lite.io.names import nearest_variable
@@ -85,8 +86,8 @@ def read_values(source: Source, spans: list[Span]) -> tuple[dict[str, Any], dict
     for name, value, offset in (item for span in spans for item in _items(source, span)):
         if name in values:
             same = np.array_equal(values[name], value)
-            text = f"{name} stands here again; it stands at line {lines[name]} already"
-            (source.note if same else source.problem)(text if same else f"{text} with another value", offset)
+            how = ", the same" if same else " with another value"
+            (source.note if same else source.problem)(already(name, lines[name], how), offset)
             continue
         if kind_of(name) is None:
             note_unknown(source, name, offset)

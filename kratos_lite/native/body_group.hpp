@@ -1,7 +1,7 @@
-// Groups of bodies, one to a lane, and small dense algebra in lanes.
+// Groups of bodies, one in each SIMD lane, and small dense algebra over them.
 //
-// A group holds each number of LANES bodies side by side (a Row).  What a lane computes does not
-// depend on its neighbours, nor on how many of them there are.
+// A group holds each number of LANES bodies side by side (a Pack).  What a lane computes does not
+// depend on its neighbors, nor on how many of them there are.
 
 #pragma once
 #include <cmath>
@@ -12,40 +12,17 @@
 namespace kl {
 
 constexpr int LANES = 8;
-typedef double Row[LANES];
-
-// What every body has `width` numbers of; one body's numbers for all where stride is 0.
-struct Rows {
-    const double* data;
-    int64_t stride;
-    int width;
-};
-
-// Bodies first … first + count to rows; lanes past them repeat the first, and are never stored.
-inline void gather(const Rows& from, int64_t first, int count, Row* rows) {
-    const double* body = from.data + first * from.stride;
-    for (int k = 0; k < from.width; ++k)
-        for (int l = 0; l < LANES; ++l) rows[k][l] = body[k];
-    for (int l = 1; l < count && from.stride; ++l) {
-        body += from.stride;
-        for (int k = 0; k < from.width; ++k) rows[k][l] = body[k];
-    }
-}
-
-inline void scatter(const Row* rows, int width, int64_t first, int count, double* to) {
-    for (int l = 0; l < count; ++l)
-        for (int k = 0; k < width; ++k) to[(first + l) * width + k] = rows[k][l];
-}
+typedef double Pack[LANES];
 
 // In what follows D is a vector of doubles, matrices are row-major and results come last.
 
 template <int K, class D>
-KL_INLINE void load(const Row* rows, int at, D* x) {
+KL_INLINE void load(const Pack* rows, int at, D* x) {
     for (int k = 0; k < K; ++k) x[k] = *reinterpret_cast<const D*>(rows[k] + at);
 }
 
 template <int K, class D>
-KL_INLINE void store(const D* x, int at, Row* rows) {
+KL_INLINE void store(const D* x, int at, Pack* rows) {
     for (int k = 0; k < K; ++k) *reinterpret_cast<D*>(rows[k] + at) = x[k];
 }
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.assembly import fields
+from kratos_lite.assembly import element_groups, inertia, nodal_values
+from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import ELEMENTS, KinematicLinear3D4N, KinematicLinear3D8N, KinematicLinear3D20N
 from kratos_lite.errors import MeshError
@@ -28,7 +29,7 @@ compiled = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled ker
 @pytest.fixture
 def numpy_only(monkeypatch):
     """Leave the kernels aside from the moment that the returned function is called."""
-    return lambda: monkeypatch.setattr(fields, "kernels", lambda name: None)
+    return lambda: monkeypatch.setattr(element_groups, "kernels", lambda name: None)
 
 
 def distorted(name, cells=(3, 2, 2)):
@@ -69,7 +70,7 @@ def everything(mesh):
     found |= {f"strain {i}": fields.at_gauss(P, b, u, stress=False) for i, b in enumerate(groups)}
     found["internal load"] = fields.internal_load(P, groups, u)
     for what in (True, False):
-        found[f"means {what}"], found[f"nodal {what}"] = fields.averages(
+        found[f"means {what}"], found[f"nodal {what}"] = nodal_values.averages(
             P, groups, u, mesh.n_elements, stress=what
         )
     energy, mises, row = fields.totals(P, groups, u)
@@ -79,7 +80,7 @@ def everything(mesh):
         found[f"{label} force"] = kl.BodyForce(force).forces(mesh, groups)
         found[f"{label} force of some"] = kl.BodyForce(force, some).forces(mesh, groups)
     found["weight"] = kl.Gravity((0, 0, -9.81)).forces(mesh, groups)
-    found["lumped mass"] = fields.lumped_mass(P, groups)
+    found["lumped mass"] = inertia.lumped_mass(P, groups)
     return found
 
 
@@ -187,14 +188,16 @@ def test_an_element_with_its_own_strain_takes_it():
         once = fields.at_gauss(points, usual, u, stress=stress)
         np.testing.assert_allclose(twice, 2 * once, rtol=0, atol=1e-13 * np.abs(once).max())
         for a, b in zip(
-            fields.averages(points, [group], u, 12, stress=stress),
-            fields.averages(points, [usual], u, 12, stress=stress),
+            nodal_values.averages(points, [group], u, 12, stress=stress),
+            nodal_values.averages(points, [usual], u, 12, stress=stress),
             strict=True,
         ):
             np.testing.assert_allclose(a, 2 * b, rtol=0, atol=1e-13 * np.abs(b).max())
     assert fields.totals(points, [group], u)[0] == pytest.approx(4 * fields.totals(points, [usual], u)[0])
     np.testing.assert_allclose(
-        fields.internal_load(points, [group], u), 2 * fields.internal_load(points, [usual], u), atol=1e-5
+        fields.internal_load(points, [group], u),
+        2 * fields.internal_load(points, [usual], u),
+        atol=1e-5,
     )
 
 
@@ -213,7 +216,9 @@ def test_an_element_with_its_own_volume_takes_it():
     assert fields.totals(points, [group], u)[0] == pytest.approx(fields.totals(points, [usual], u)[0] / 2)
     force = np.array([0.0, 0.0, -1.0])
     np.testing.assert_allclose(
-        fields.body_force(points, group, force), fields.body_force(points, usual, force) / 2, atol=1e-14
+        fields.body_force(points, group, force),
+        fields.body_force(points, usual, force) / 2,
+        atol=1e-14,
     )
 
 
@@ -234,14 +239,18 @@ def test_an_element_with_its_own_loads_and_masses_takes_them():
     _, usual = batch_of(KinematicLinear3D8N)
     for b in (np.array([1.0, 2.0, 3.0]), points):
         np.testing.assert_allclose(
-            fields.body_force(points, group, b), 3 * fields.body_force(points, usual, b), rtol=1e-12
+            fields.body_force(points, group, b),
+            3 * fields.body_force(points, usual, b),
+            rtol=1e-12,
         )
     np.testing.assert_allclose(
-        fields.lumped_mass(points, [group]), 7 * fields.lumped_mass(points, [usual]), rtol=1e-12
+        inertia.lumped_mass(points, [group]), 7 * inertia.lumped_mass(points, [usual]), rtol=1e-12
     )
     once = fields.internal_load(points, [usual], 1e-3 * points**2)
     np.testing.assert_allclose(
-        fields.internal_load(points, [group], 1e-3 * points**2), 5 * once, atol=1e-12 * np.abs(once).max()
+        fields.internal_load(points, [group], 1e-3 * points**2),
+        5 * once,
+        atol=1e-12 * np.abs(once).max(),
     )
 
 
@@ -276,7 +285,7 @@ def test_volume_weight_and_mass_of_a_box(name):
     groups = kl.Model(mesh, SOIL).element_groups()
     total = sum(fields.volumes(mesh.points, group).sum() for group in groups)
     assert total == pytest.approx(12.0, rel=1e-14)
-    assert fields.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
+    assert inertia.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
     weight = kl.Gravity((0.0, 0.0, -9.81)).forces(mesh, groups)
     np.testing.assert_allclose(weight.sum(axis=0), [0, 0, -12 * 7620.0 * 9.81], rtol=1e-13, atol=1e-9)
 
@@ -377,7 +386,7 @@ def test_a_tetrahedron_with_two_nodes_at_one_place_has_no_volume_at_any_scale(sc
 @compiled
 def test_good_elements_need_no_closer_look_and_bad_ones_do():
     mesh = distorted("KinematicLinear3D20N")
-    _, dN = fields.tabulate(KinematicLinear3D20N.shape, KinematicLinear3D20N.rule)
+    _, dN = element_groups.tabulate(KinematicLinear3D20N.shape, KinematicLinear3D20N.rule)
     args = mesh.blocks[0].nodes, KinematicLinear3D20N, dN, len(dN)
     assert fields.clearly_positive(mesh.points, *args).all()
     assert not fields.clearly_positive(-mesh.points, *args).any()

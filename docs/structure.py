@@ -1,0 +1,117 @@
+"""Draw the rooms of the package and their imports, from the source: ``python docs/structure.py``.
+
+The picture, ``docs/images/structure.svg``, has one row for each floor. An arrow leads from a room to one
+that it imports from, unless a way through other rooms leads there, too.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+PACKAGE = DOCS.parent / "kratos_lite"
+PICTURE = DOCS / "images" / "structure.svg"
+GROUND = "errors typing validation registry voigt time_series"
+FLOORS = [
+    {name: (1.5, "") for name in GROUND.split()},
+    {"native": (0, "compiled kernels"), "shapes": (1, "N, dN, faces"), "quadrature": (2, "Gauss points")},
+    {"elements": (1, "B-operator"), "materials": (3, "stress from strain")},
+    {"mesh": (0, "nodes, cells, parts")},
+    {"view": (0, "pictures"), "assembly": (1, "K, M, fields at Gauss points")},
+    {"solvers": (1, "K u = f, constraints, modes")},
+    {"model": (1, "loads, supports, checks")},
+    {"ale": (1, "material moves through mesh"), "bodies": (2, "rigid, pseudo-rigid, FE")},
+    {"analysis": (1, "static, modal, integrators")},
+    {"io": (1, "file formats, cases, writers"), "testing": (3, "conformance kit")},
+    {"cli": (1, "commands and options")},
+    {"__main__": (1, "python -m kratos_lite")},
+]
+"""The rooms of each floor, with column in the picture and content; modules import only from floors above."""
+
+COLUMN, ROW, BOX, HEIGHT = 220, 72, 196, 44
+TEXT = 'text-anchor="middle" font-family="Helvetica, Arial, sans-serif"'
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    """Yield the dotted name, without that of the package, and the file of each module."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        if name:
+            yield name, path
+
+
+def imports(path: Path, names: set[str]) -> Iterator[str]:
+    """Yield those of the modules that a file imports: at the top, in functions, for types alone."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("kratos_lite."):
+            home = str(node.module).removeprefix("kratos_lite").removeprefix(".")
+            for alias in node.names:
+                one = f"{home}.{alias.name}".removeprefix(".")
+                if one in names or home:
+                    yield one if one in names else home
+
+
+def room(module: str) -> str:
+    """Return the room of a module; those at the root of the package are one, the ground."""
+    top = module.partition(".")[0]
+    return "ground" if top in FLOORS[0] else top
+
+
+def arrows() -> list[tuple[str, str]]:
+    """Return the pairs of rooms of which the first imports from the second, and no way leads around."""
+    names = {name for name, _ in modules()}
+    below: dict[str, set[str]] = {room(name): set() for name in names}
+    for name, path in modules():
+        below[room(name)] |= {room(target) for target in imports(path, names)} - {room(name)}
+    floor = {name: level for level, names in enumerate(FLOORS) for name in map(room, names)}
+    reached: dict[str, set[str]] = {}
+    for name in sorted(below, key=lambda name: floor[name]):
+        reached[name] = below[name].union(*(reached.get(other, set()) for other in below[name]))
+    return sorted(
+        (name, other)
+        for name, others in below.items()
+        for other in others
+        if not any(other in reached[third] for third in others - {other})
+    )
+
+
+def places() -> dict[str, tuple[float, float]]:
+    """Return the center of the box of each room."""
+    return {
+        room(name): (COLUMN * (column + 0.5), ROW * (len(FLOORS) - level - 0.5))
+        for level, names in enumerate(FLOORS)
+        for name, (column, _) in names.items()
+    }
+
+
+def picture() -> str:
+    """Return the picture as the text of an SVG file."""
+    at, words = places(), {name: words for names in FLOORS for name, (_, words) in names.items()}
+    words["ground"] = GROUND
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {4 * COLUMN} {ROW * len(FLOORS)}">',
+        '<marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" '
+        'orient="auto">'
+        '<path d="M 0 0 L 8 4 L 0 8 z" fill="#667"/></marker>',
+        '<rect width="100%" height="100%" fill="white"/>',
+    ]
+    for name, other in arrows():
+        (x, y), (x2, y2) = at[name], at[other]
+        x2 = x if other == "ground" else x2
+        y, turned, y2 = y + HEIGHT / 2, y + ROW - HEIGHT / 2, y2 - HEIGHT / 2
+        curve = f"M {x:g} {y:g} C {x:g} {turned:g} {x2:g} {y:g} {x2:g} {turned:g} V {y2:g}"
+        lines.append(f'<path d="{curve}" fill="none" stroke="#667" marker-end="url(#tip)"/>')
+    for name, (x, y) in at.items():
+        width = BOX + 3 * COLUMN if name == "ground" else BOX
+        box = f'x="{x - width / 2:g}" y="{y - HEIGHT / 2:g}" width="{width:g}" height="{HEIGHT}" rx="6"'
+        lines += [
+            f'<rect {box} fill="#eef3fa" stroke="#357"/>',
+            f'<text x="{x:g}" y="{y - 3:g}" font-size="15" font-weight="bold" {TEXT}>{name}</text>',
+            f'<text x="{x:g}" y="{y + 14:g}" font-size="12" {TEXT}>{words[name]}</text>',
+        ]
+    return "\n".join([*lines, "</svg>", ""])
+
+
+if __name__ == "__main__":
+    PICTURE.write_text(picture(), encoding="utf-8")

@@ -1,0 +1,142 @@
+"""Gauss point fields: volumes, strains and stresses of elements, and the loads and energies of them.
+
+Every function takes the compiled kernels where the element class and the material leave the methods
+that they stand for as they are; a class that overrides one of them is computed by its own methods, in
+cache-sized chunks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.assembly.element_groups import GEOMETRY, ElementGroup, add_nodal, compiled, floats
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.typing import Array, Ints, Mask, Rows
+
+
+def compiled_law(group: ElementGroup, *methods: str, stress: bool = True) -> Any:
+    """Return the kernels if they stand for the strains, or the stresses, of a group, else None."""
+    if stress and type(group.material).stress is not LinearMaterial.stress:
+        return None
+    return compiled("gauss", group.element, *GEOMETRY, "strain", *methods)
+
+
+def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
+    """Return what kernels take to compute strains, or stresses, of displacements u (n, 3)."""
+    nodes, _, dN, weights = group.tables()
+    law = group.law() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
+    return floats(points), nodes, dN, weights, floats(u), *law
+
+
+# ---- geometry ------------------------------------------------------------------------------------
+
+
+def clearly_positive(
+    points: Array, nodes: Ints | Rows, element: type[KinematicLinear], dN: Array, g: int
+) -> Mask:
+    """Return a mask (m,) of the elements whose det J is so clearly > 0 that none needs a closer look.
+
+    At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
+    times what rounding of the coordinates makes of it.  Without kernels every element needs the closer look.
+    """
+    module = compiled("gauss", element, "__init__", "_jacobian", "determinants")
+    if module is None:
+        return np.zeros(len(nodes), dtype=bool)
+    weights = np.where(np.arange(len(dN)) < g, 1 / g, 0.0)
+    cells = np.ascontiguousarray(nodes, dtype=np.int32)
+    return module.clearly_positive(floats(points), cells, floats(dN), weights) > 0
+
+
+def volumes(points: Array, group: ElementGroup) -> Array:
+    """Return the volume of each Gauss point, γ det J, as (m, g) in m³.
+
+    >>> from kratos_lite import Isotropic3D, Model, box
+    >>> model = Model(box(cells=(2, 1, 1)), Isotropic3D(E=1.0, nu=0.3))
+    >>> volumes(model.mesh.points, model.element_groups()[0]).sum(axis=1).round(12).tolist()
+    [0.5, 0.5]
+    """
+    if module := compiled("gauss", group.element, *GEOMETRY):
+        nodes, _, dN, weights = group.tables()
+        return module.volumes(floats(points), nodes, dN, weights)
+    return np.concatenate([group.at(points, chunk).dV for chunk in group.chunks()])
+
+
+# ---- body forces ------------------------------------------------------------------------------------
+
+
+def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
+    """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b (3,), or nodal (n, 3), in N/m³."""
+    nodal, kind = b.ndim == 2, group.element
+    if nodal and (module := compiled("gauss", kind, "__init__", "_jacobian", "body_force", "scalar_mass")):
+        tables = group.tables(group.element.mass_rule)
+        return module.body_force(floats(points), *tables, floats(b))
+    if not nodal and (module := compiled("gauss", kind, *GEOMETRY, "body_force")):
+        return module.shares(floats(points), *group.tables()) * b
+    total = np.zeros_like(points)
+    for chunk in group.chunks():
+        nodes = group.nodes[chunk]
+        add_nodal(total, nodes, group.at(points, chunk).body_force(b[nodes] if nodal else b))
+    return total
+
+
+# ---- strains and stresses --------------------------------------------------------------------------
+
+
+def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:
+    """Return stresses in Pa with prestress, or strains, (m, g, 6) of displacements u (n, 3) in m."""
+    if module := compiled_law(group, stress=stress):
+        return module.stress(*displaced(points, group, u, stress))
+    parts = [value_at(group.at(points, chunk), group, u, chunk, stress) for chunk in group.chunks()]
+    return np.concatenate(parts)
+
+
+def value_at(
+    element: KinematicLinear, group: ElementGroup, u: Array, chunk: slice, stress: bool = True
+) -> Array:
+    """Return stresses, or strains, (m, g, 6) of the placed elements of a chunk by their own methods."""
+    strain = element.strain(u[group.nodes[chunk]])
+    return group.material.stress(strain) + group.initial_stress(chunk) if stress else strain
+
+
+def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
+    """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
+    total = np.zeros_like(points)
+    for group in groups:
+        if module := compiled_law(group, "internal_load"):
+            total += module.internal_load(*displaced(points, group, u))
+            continue
+        for chunk in group.chunks():
+            element = group.at(points, chunk)
+            add_nodal(total, group.nodes[chunk], element.internal_load(value_at(element, group, u, chunk)))
+    return total
+
+
+def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[float, float, int]:
+    """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
+    energy, largest, row = 0.0, 0.0, 0
+    for group in groups:
+        module = compiled_law(group)
+        parts = (
+            [module.totals(*displaced(points, group, u))]
+            if module
+            else [_totals(points, group, u, chunk) for chunk in group.chunks()]
+        )
+        for share, mises, at in parts:
+            energy += share
+            if mises > largest:
+                largest, row = mises, int(group.rows[at])
+    return energy, largest, row
+
+
+def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple[float, float, int]:
+    element = group.at(points, chunk)
+    value = element.strain(u[group.nodes[chunk]])
+    elastic = group.material.stress(value)
+    energy = float(((value * elastic).sum(axis=-1) * element.dV).sum()) / 2
+    mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
+    return energy, float(mises.max()), chunk.start + int(mises.argmax())

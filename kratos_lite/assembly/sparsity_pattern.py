@@ -1,0 +1,115 @@
+"""Sparsity pattern: which blocks of a global matrix the elements fill, and where.
+
+It is made from the node graph, once for each connectivity.  Compiled, the places of a few elements are
+found as they are added; NumPy keeps the place of every entry of every element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import block_rows
+from kratos_lite.native import kernels
+from kratos_lite.typing import Array, Ints, Rows
+
+
+class Pattern:
+    """Sparsity of the node graph in rows of node blocks.
+
+    Parameters
+    ----------
+    n_nodes : number of nodes.
+    connectivity : (m, k) node rows of each number of elements.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int32, where the row of each node starts; nodes without elements have empty rows.
+    indices : (nnz,) int32, sorted within a row: the nodes that share an element with it.
+    """
+
+    def __init__(self, n_nodes: int, connectivity: Sequence[Rows]) -> None:
+        self.n_nodes = n_nodes
+        self.connectivity = [np.ascontiguousarray(nodes, dtype=np.int32) for nodes in connectivity]
+        module = kernels("stiffness")
+        make = module.pattern if module else _pattern
+        self.indptr: Rows
+        self.indices: Rows
+        self.indptr, self.indices = make(n_nodes, self.connectivity)
+
+    def rows(self) -> Ints:
+        """Return the row of each block, (nnz,)."""
+        return block_rows(self.indptr)
+
+    @cached_property
+    def positions(self) -> list[Rows]:
+        """Position of each node pair of each element, (m, k, k) of each number."""
+        keys = self.rows() * self.n_nodes + self.indices
+        return [self._find(keys, nodes) for nodes in self.connectivity]
+
+    def _find(self, keys: Ints, nodes: Rows) -> Rows:
+        m, k = nodes.shape
+        found = np.zeros((m, k, k), dtype=np.int32)
+        step = max(1, 1_000_000 // (k * k))
+        for start in range(0, m, step):
+            n = nodes[start : start + step].astype(np.int64)
+            wanted = n[:, :, None] * self.n_nodes + n[:, None, :]
+            place = np.searchsorted(keys, wanted)
+            if (keys[np.minimum(place, len(keys) - 1)] != wanted).any():
+                raise AssertionError("the sparsity pattern misses a pair of nodes that share an element")
+            found[start : start + step] = place
+        return found
+
+    def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
+        """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
+        if module := kernels("stiffness"):
+            matrices = np.ascontiguousarray(matrices)
+            module.add_matrices(self.connectivity[number][window], matrices, self.indptr, self.indices, data)
+        else:
+            _add_blocks(data, self.positions[number][window], matrices)
+
+
+def _pattern(n_nodes: int, connectivity: Sequence[Rows]) -> tuple[Rows, Rows]:
+    """Return rows (indptr, indices) of the nodes that share an element."""
+    from scipy.sparse import csr_array, hstack
+
+    incident = []
+    for nodes in connectivity:
+        m, k = nodes.shape
+        pointer = np.arange(0, m * k + 1, k)
+        # booleans, as the product only asks whether two nodes share an element, however many
+        ones = np.ones(m * k, dtype=bool)
+        incident.append(csr_array((ones, nodes.ravel(), pointer), shape=(m, n_nodes)).T)
+    incidence = hstack(incident, format="csr", dtype=bool)
+    graph = (incidence @ incidence.T).tocsr()
+    graph.sort_indices()
+    return graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
+
+
+class PatternCache:
+    """The last pattern made, for as long as the connectivity stays the same."""
+
+    def __init__(self) -> None:
+        self._key: tuple[int, ...] = ()
+        self._pattern: Pattern | None = None
+
+    def get(self, n_nodes: int, connectivity: Sequence[Rows]) -> Pattern:
+        """Return the pattern of this connectivity, made anew only if it differs from the last."""
+        key = (n_nodes, *(hash((nodes.shape, nodes.tobytes())) for nodes in connectivity))
+        if self._pattern is None or key != self._key:
+            self._key, self._pattern = key, Pattern(n_nodes, connectivity)
+        return self._pattern
+
+
+def _add_blocks(data: Array, positions: Rows, matrices: Array) -> None:
+    """Add element matrices to node blocks `data`; see `Pattern.add`."""
+    from scipy.sparse import csc_array
+
+    low, high = int(positions.min()), int(positions.max()) + 1
+    flat = positions.ravel() - low
+    # the matrix that takes each block to its place, by columns: a product adds one block after the other
+    selection = csc_array((np.ones(len(flat)), flat, np.arange(len(flat) + 1)), shape=(high - low, len(flat)))
+    total = np.asarray(selection @ matrices.reshape(len(flat), -1))
+    data[low:high] += total.reshape(data[low:high].shape)

@@ -1,0 +1,105 @@
+// Transfers between the levels of a multigrid hierarchy.
+
+#pragma once
+#include "cluster_transfer.hpp"
+#include "level.hpp"
+
+namespace kl {
+
+typedef vec<float, 8> Modes;  // six modes; the last two lanes hold what is not used
+
+// Coarse rows of to = P^T from.
+template <int b>
+KL_INLINE void restrict_rows(const Transposed& columns, const float* P, const float* from, float* to,
+                             int64_t first, int64_t last) {
+    for (int64_t I = first; I < last; ++I) {
+        Modes even = {}, odd = {};
+        for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k) {
+            const float* r = from + static_cast<int64_t>(columns.rows[k]) * b;
+            const float* p = P + static_cast<int64_t>(columns.entries[k]) * b * MODES;
+            for (int j = 0; j < b; ++j)
+                (j % 2 ? odd : even) += *reinterpret_cast<const Modes*>(p + j * MODES) * r[j];
+        }
+        const Modes sum = even + odd;
+        for (int c = 0; c < MODES; ++c) to[I * MODES + c] = sum[c];
+    }
+}
+
+// Fine rows of to += P from.
+template <int b>
+KL_INLINE void prolong_rows(const Prolongator& P, const float* from, float* to, int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+        Modes sum[b] = {};
+        for (int32_t k = P.indptr[i]; k < P.indptr[i + 1]; ++k) {
+            const Modes x = *reinterpret_cast<const Modes*>(from + static_cast<int64_t>(P.indices[k]) * MODES);
+            const float* p = &P.data[static_cast<int64_t>(k) * b * MODES];
+            for (int j = 0; j < b; ++j) sum[j] += *reinterpret_cast<const Modes*>(p + j * MODES) * x;
+        }
+        for (int j = 0; j < b; ++j) {
+            const Modes s = sum[j];
+            to[i * b + j] += (s[0] + s[1]) + (s[2] + s[3]) + (s[4] + s[5]);
+        }
+    }
+}
+
+// From a level to the next coarser one: blocks b x 6 of smoothed aggregation, or one weight for each
+// pair of nodes (linear elements within quadratic ones).
+struct Transfer {
+    Prolongator P;
+    Transposed columns;
+    bool weights = false;
+    Bytes fine_fixed, coarse_fixed;  // components that weights must not touch
+
+    int64_t bytes() const {
+        return 4 * static_cast<int64_t>(P.indptr.size() + P.indices.size() + P.data.size() + columns.indptr.size() +
+                                        columns.rows.size() + columns.entries.size());
+    }
+
+    // coarse = P^T fine
+    void restrict_to(const Level& fine, const Floats& from, const Level& coarse, Floats& to) const {
+        parallel_ranges(coarse.n, 64, [&](int64_t first, int64_t last) {
+            if (!weights)
+                return fine.b == 3 ? restrict_blocks<3>(from, to, first, last)
+                                   : restrict_blocks<6>(from, to, first, last);
+            for (int64_t I = first; I < last; ++I) {
+                float sum[3] = {};
+                for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k)
+                    for (int c = 0; c < 3; ++c)
+                        sum[c] += P.data[columns.entries[k]] * from[3 * static_cast<int64_t>(columns.rows[k]) + c];
+                for (int c = 0; c < 3; ++c) to[3 * I + c] = coarse_fixed[3 * I + c] ? 0.0f : sum[c];
+            }
+        });
+    }
+
+    // fine += P coarse
+    void prolong(const Floats& from, const Level& fine, Floats& to) const {
+        parallel_ranges(fine.n, 1024, [&](int64_t first, int64_t last) {
+            if (!weights)
+                return fine.b == 3 ? prolong_blocks<3>(from, to, first, last)
+                                   : prolong_blocks<6>(from, to, first, last);
+            for (int64_t i = first; i < last; ++i) {
+                float sum[3] = {};
+                for (int32_t k = P.indptr[i]; k < P.indptr[i + 1]; ++k)
+                    for (int c = 0; c < 3; ++c)
+                        sum[c] += P.data[k] * from[3 * static_cast<int64_t>(P.indices[k]) + c];
+                for (int c = 0; c < 3; ++c)
+                    if (!fine_fixed[3 * i + c]) to[3 * i + c] += sum[c];
+            }
+        });
+    }
+
+private:
+    template <int b>
+    void restrict_blocks(const Floats& from, Floats& to, int64_t first, int64_t last) const {
+        dispatch<float>([&](auto) KL_INLINE_LAMBDA {
+            restrict_rows<b>(columns, P.data.data(), from.data(), to.data(), first, last);
+        });
+    }
+
+    template <int b>
+    void prolong_blocks(const Floats& from, Floats& to, int64_t first, int64_t last) const {
+        dispatch<float>([&](auto) KL_INLINE_LAMBDA { prolong_rows<b>(P, from.data(), to.data(), first, last); });
+    }
+};
+
+}  // namespace kl
