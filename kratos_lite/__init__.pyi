@@ -59,6 +59,7 @@ from kratos_lite.io.files import read as read
 from kratos_lite.io.files import read_case as read_case
 from kratos_lite.io.files import write as write
 from kratos_lite.io.run import run as run
+from kratos_lite.io.runners.outcome import Outcome as Outcome
 from kratos_lite.io.writers.pictures import draw as draw
 from kratos_lite.io.writers.pictures import draw_element as draw_element
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter

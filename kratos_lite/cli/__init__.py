@@ -83,8 +83,8 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
         epilog=f"examples:\n  {EXAMPLES[name]}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    # "-1,0,0" is a value, not an option
-    command._negative_number_matcher = re.compile(r"-[\d.]")
+    # "-1,0,0" and "-z:30" are values, not options
+    command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
     command.add_argument(
         "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
     )

@@ -33,7 +33,10 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     InputError
         With file, line and cure of everything that is wrong.
     """
-    return read_case(path, materials=materials, strict=strict).model
+    case = read_case(path, materials=materials, strict=strict)
+    if not case.is_of_model:
+        raise InputError(f"{path}: describes a body; read it with kl.read_case")
+    return case.model
 
 
 def read_case(
@@ -77,7 +80,7 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
         return read_kratos_project(settings, Path(settings.source).parent, outside)
     if "properties" in settings and "model" not in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
-    if "body" in settings and "model" not in settings:
+    if ("body" in settings or "mesh" in settings) and "model" not in settings:
         from kratos_lite.io.readers.body_file import read_body_file
 
         return read_body_file(settings, strict=strict)

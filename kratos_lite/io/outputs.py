@@ -76,7 +76,7 @@ def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: 
             if os.path.islink(real):
                 raise InputError(f"{name}: cannot be written: its symbolic links lead in a circle")
             if real in taken:
-                raise InputError(f"{name}: is an input or another output, too; choose another name")
+                raise InputError(f"{name}: is an input or another output; choose another name")
         taken |= {os.path.realpath(path) for path in _set_of(Path(target))}
 
 

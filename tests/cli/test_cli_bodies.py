@@ -237,21 +237,30 @@ def test_many_bodies_of_a_script(run, folder):
 def test_bad_targets_are_refused_before_the_march(run, folder):
     write(time={"step": 1e-9, "steps": 10**9})
     assert run("solve", "box.json", "-o", "box.json/o.pvd").refuses("the folder box.json does not exist")
-    assert run("solve", "box.json", "-o", "none/o.txt").refuses("")
-    assert run("solve", "box.json", "-o", "o.vtu").refuses("")
-    assert run("solve", "box.json", "--state", "o.csv").refuses("the ending of state must be .npz")
-    assert run("solve", "box.json", "-o", "o.npz", "--state", "o.npz").refuses("another output already")
-    assert run("solve", "box.json", "--steps", "0").refuses("--steps 0: a number of steps, 1 or more")
+    assert run("solve", "box.json", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")
+    assert run("solve", "box.json", "-o", "o.vtu").refuses("o.vtu: states in time are written")
+    assert run("solve", "box.json", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
+    assert run("solve", "box.json", "-o", "o.npz", "--state", "o.npz").refuses("another output")
+    assert run("solve", "box.json", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
     assert names(folder) == ["box.json"]
 
 
-def test_scenes_and_run_files_are_not_mixed_up(run, folder):
-    for words in (("solve", "box.json"), ("convert", "box.json", "a.mdpa")):
-        assert run(*words).refuses("a scene of a body is not for", "kratos-lite march box.json")
-    (folder / "run.json").write_text('{"model": "a.mdpa"}')
-    assert run("solve", "run.json").refuses("this is a run file of a model: kratos-lite solve run.json")
+def test_what_bodies_do_not_take_is_refused(run, folder):
+    assert run("convert", "box.json", "a.mdpa").refuses("describes a body; only meshes and models")
     assert run("solve", "none.json").refuses("none.json")
-    assert run("solve", "a.mdpa").refuses("a scene is a .json file or a .py script")
+    for words in (["--fix", "z-:xyz"], ["--modes", "3"], ["--rotation", "z:1"], ["--integrator", "hht"]):
+        assert run("solve", "box.json", *words).refuses(
+            f"{words[0]} is for models; box.json describes a body"
+        )
+    assert run("solve", "box.json", "--json", "a.json").refuses("a body has no summary in .json")
+    with pytest.raises(kl.InputError, match=r"box\.json: describes a body; read it with kl\.read_case"):
+        kl.read("box.json")
+
+
+def test_time_of_a_body_is_that_of_the_option(run, folder):
+    done = run("solve", "box.json", "--time", "0.01:4:2", "-o", "a.npz")
+    assert done.rows["time"] == "0 … 0.04 s, 4 steps"
+    assert np.load("a.npz")["step"].tolist() == [0, 2, 4]
 
 
 def test_debug_shows_the_traceback(run, folder):

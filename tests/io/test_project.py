@@ -8,10 +8,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kratos_lite.io.files import read_case
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
+from kratos_lite.io.case import Outputs
+from kratos_lite.io.files import read_case
 
 N = 3
 """Nodes along each side of the box."""
@@ -303,9 +304,7 @@ def test_the_same_folder_runs_in_kratos_and_here(folder, content):
                 "relative_tolerance": 1e-8,
             },
         }
-        lines = read_case(
-            write(folder, content | {"processes": {**content["processes"], "checks": [check]}})
-        )
+        lines = read_case(write(folder, content | {"processes": {**content["processes"], "checks": [check]}}))
         assert [line.split()[4] for line in lines.compare(result)] == ["passed"] * 4
 
 
@@ -919,11 +918,9 @@ def test_own_run_file_with_all_keys(folder):
     }
     project = read_case(write(folder, own, "own.json"))
     assert (project.solver, project.tolerance) == ("dense", 1e-8)
-    assert project.output == {
-        "output": str(folder / "out" / "box.vtu"),
-        "json": str(folder / "box_result.json"),
-        "picture": str(folder / "box.png"),
-    }
+    assert project.outputs == Outputs(
+        [str(folder / "out" / "box.vtu")], str(folder / "box_result.json"), str(folder / "box.png")
+    )
     assert project.compare(project.model.solve()) == []
     same_field(project.model.solve(), by_hand(top=(1e5, 0.0, 0.0), gravity=(0.0, 0.0, -9.81)).solve())
 
@@ -942,7 +939,7 @@ def test_own_run_file_by_part_with_pressure_and_point_load(folder):
         kl.PointLoad(lambda X: (X[:, 0] > 1.9) & (X[:, 2] > 1.4) & (np.abs(X[:, 1] - 0.5) > 0.4), (0, 5.0, 0))
     )
     same_field(project.model.solve(), hand.solve())
-    assert (project.solver, project.tolerance, project.output) == ("auto", 1e-10, {})
+    assert (project.solver, project.tolerance, project.outputs) == ("auto", 1e-10, Outputs())
 
 
 BAD_OWN = {

@@ -5,11 +5,11 @@ import re
 
 import numpy as np
 import pytest
-from kratos_lite.io.files import read_case
-from kratos_lite.io.readers.motion import add_motion
 
 import kratos_lite as kl
 from kratos_lite.cli import main
+from kratos_lite.io.files import read_case
+from kratos_lite.io.readers.motion import add_motion
 from kratos_lite.io.settings import read_settings
 
 RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
@@ -85,7 +85,10 @@ def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, c
 
 def test_a_translation_in_words_and_in_a_run_file_are_the_same(folder):
     common = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "y-:xyz", "--traction", "y+:1e3,0,0")
-    assert run("bar.mdpa", *common, "--translation", "x:-5", "--ends", "fixed", "--json", "a.json", "-q") == 0
+    assert (
+        run("bar.mdpa", *common, "--translation", "x:-5", "--boundaries", "fixed", "--json", "a.json", "-q")
+        == 0
+    )
     path = write(
         folder,
         model="bar.mdpa",
@@ -158,7 +161,7 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
         (("--rotation", "z:1", "--translation", "x:1"), "a model has one motion"),
         (("--center", "-1,0,0"), "--center belongs to --rotation"),
         (("--stiffening", "--translation", "x:1"), "--stiffening belongs to --rotation"),
-        (("--ends", "fixed"), "--ends belongs to --translation"),
+        (("--boundaries", "fixed"), "--boundaries belongs to --translation"),
         (("--rotation", "x:1"), "not one of revolution about the axis"),
         (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
         (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number in 1/s, ≥ 0; got -2.0"),
