@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.bodies.body import Body, Clock
-from kratos_lite.bodies.loads import Bound
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.free_body import Clock
+from kratos_lite.bodies.loads import AppliedLoad
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.errors import InputError, ModelError
@@ -99,11 +100,11 @@ def _alike(members: Sequence[Body]) -> Body:
     return first
 
 
-def _loads(members: Sequence[Body]) -> list[Bound]:
+def _loads(members: Sequence[Body]) -> list[AppliedLoad]:
     """Return the constant loads of all bodies: accelerations, and forces fixed in space and in the bodies."""
     if not any(body.loads for body in members):
         return []
     loads = [body.constant_loads() for body in members]
     acceleration, spatial, convected = (np.array(parts) for parts in zip(*loads, strict=True))
     mass = np.array([body.mass for body in members])
-    return [Bound.constant(mass, acceleration, spatial, convected)]
+    return [AppliedLoad.constant(mass, acceleration, spatial, convected)]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Array
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 _log = logging.getLogger("kratos_lite")
-
-Solve: TypeAlias = Callable[[Array], Array]
 
 CORRECTIONS_MAX = 50
 ROUND_OFF = 1e-15

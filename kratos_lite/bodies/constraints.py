@@ -13,9 +13,10 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import Entries
 from kratos_lite.bodies.validation import one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.time_series import Factor, function_of, integral_of
@@ -44,7 +45,7 @@ class Constraint(ABC):
     def __init__(self, points: Points) -> None:
         self._where = points if isinstance(points, str) or callable(points) else None
         self._hold(np.zeros((1, 3)) if isinstance(points, str) or callable(points) else points_of(points))
-        self._body: Body | None = None
+        self._body: FreeBody | None = None
         self._jacobian: Array | None = None
 
     def _hold(self, points: Array) -> None:
@@ -54,7 +55,7 @@ class Constraint(ABC):
             raise InputError(f"a {type(self).__name__} needs one point at least; got none")
         self.reactions = np.zeros_like(self.points)
 
-    def bind(self, body: Body) -> None:
+    def bind(self, body: FreeBody) -> None:
         """Take hold of a body where it is now.
 
         Raises
@@ -75,7 +76,7 @@ class Constraint(ABC):
         body.locate(self.points)
         self._body, self._start = body, body.position(self.points)
 
-    def begin(self, body: Body, h: float) -> None:  # noqa: B027 - most have nothing to prepare
+    def begin(self, body: FreeBody, h: float) -> None:  # noqa: B027 - most have nothing to prepare
         """Prepare a step of h s from the state of the body."""
 
     @abstractmethod
@@ -96,7 +97,7 @@ class Constraint(ABC):
         """
         return np.zeros_like(v)
 
-    def jacobian_entries(self, body: Body, q: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    def jacobian_entries(self, body: FreeBody, q: Array) -> Entries:
         """Return rows, dofs and values of H (m r, dofs): points move along their directions with H u."""
         directions = self.directions(body.position(self.points, q))
         row, dof, value = [], [], []
@@ -109,7 +110,7 @@ class Constraint(ABC):
             value.append(block[r, k])
         return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
 
-    def jacobian(self, body: Body, q: Array) -> Array:
+    def jacobian(self, body: FreeBody, q: Array) -> Array:
         """Return H (m r, dofs) as a full matrix; it is kept where it is always the same."""
         if self._jacobian is not None:
             return self._jacobian
@@ -125,12 +126,12 @@ class Constraint(ABC):
         """Number of rows."""
         return len(self.points)
 
-    def gaps(self, body: Body, q: Array, u: Array, time: float, h: float) -> Array:
+    def gaps(self, body: FreeBody, q: Array, u: Array, time: float, h: float) -> Array:
         """Return the gaps (m r,) at the end of a step in m/s."""
         x, v = body.position(self.points, q), body.velocity(self.points, q, u)
         return self.gap(x, v, time, h).ravel()
 
-    def set_reactions(self, body: Body, q: Array, multipliers: Array) -> None:
+    def set_reactions(self, body: FreeBody, q: Array, multipliers: Array) -> None:
         """Note the reactions of multipliers (m r,)."""
         directions = self.directions(body.position(self.points, q))
         self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)
@@ -258,7 +259,7 @@ class PrescribedAcceleration(Along):
         function_of(acceleration, "an acceleration")
         self.acceleration = acceleration
 
-    def begin(self, body: Body, h: float) -> None:
+    def begin(self, body: FreeBody, h: float) -> None:
         """Add what the acceleration adds to the velocity in a step."""
         gained = integral_of(self.acceleration, body.time, body.time + h)
         self._target = (body.velocity(self.points) @ self.direction)[:, None] + gained
@@ -289,7 +290,7 @@ class RigidLink(Constraint):
         super().__init__(one_point(point))
         self.anchor = one_point(anchor)
 
-    def bind(self, body: Body) -> None:
+    def bind(self, body: FreeBody) -> None:
         """Take hold of a body where it is now; InputError if point and anchor coincide."""
         super().bind(body)
         self.length = float(np.linalg.norm(self._start[0] - self.anchor))

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from typing import Any, TypeVar, overload
 
-import numpy as np
-
 from kratos_lite.bodies.body import BODIES, Body
-from kratos_lite.bodies.finite_element import FiniteElementBody
-from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
-from kratos_lite.bodies.rotations import hat, polar
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.typing import Array
 
-Kind = TypeVar("Kind", RigidBody, PseudoRigidBody, FiniteElementBody)
+Kind = TypeVar("Kind", bound=Body)
 
 
 @overload
@@ -50,48 +43,16 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     """
     if isinstance(kind, str):
         kind = BODIES[kind]
-    if kind not in (RigidBody, PseudoRigidBody, FiniteElementBody):
+    if not (isinstance(kind, type) and issubclass(kind, Body) and kind.convertible):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
-    if isinstance(body, Obstacle):
-        raise ModelError("an obstacle has no mass, so it does not become another kind; make a new body")
+    if not body.convertible:
+        raise ModelError(f"an {body.kind} has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
-    F, rate = affine(body)
-    center = body.mass_center() + F @ (body.center - _own_center(body))
-    velocity = body.linear_momentum() / body.mass
+    F, rate = body.affine_motion()
+    center = body.mass_center() + F @ (body.center - body.reference_center())
     other = kind(body.mesh, body.material, **options)
-    if isinstance(other, FiniteElementBody):
-        arms = other.points - body.center
-        other.set_configuration(arms @ F.T + center - other.points)
-        other.u = (arms @ rate.T + velocity).ravel()
-    elif isinstance(other, PseudoRigidBody):
-        other.set_configuration(np.concatenate([F.ravel(), center]))
-        other.u = np.concatenate([rate.ravel(), velocity])
-    else:
-        other.set_configuration(np.concatenate([polar(F).T.ravel(), center]))
-        spin = other.rotation.T @ body.angular_momentum()
-        other.u = np.concatenate([np.linalg.solve(other.mass_properties.inertia, spin), velocity])
+    velocity = body.linear_momentum() / body.mass
+    other.set_affine_motion(F, rate, center, velocity, body.angular_momentum())
     other.time, other.step = body.time, body.step
     return other
-
-
-def affine(body: Body) -> tuple[Array, Array]:
-    """Return F and Ḟ (3, 3) of the affine motion that is nearest to that of a body with respect to mass."""
-    if isinstance(body, RigidBody):
-        return body.rotation, body.rotation @ hat(body.u[:3])
-    if isinstance(body, PseudoRigidBody):
-        return body.deformation.copy(), body.u[:9].reshape(3, 3).copy()
-    assert isinstance(body, FiniteElementBody)
-    arms = body.points - _own_center(body)
-    weighted = body.times_mass(arms.ravel()).reshape(-1, 3)
-    inverse = np.linalg.inv(weighted.T @ arms)
-    moved = body.displacement - body.displacement.mean(axis=0)
-    rate = body.u.reshape(-1, 3) - body.u.reshape(-1, 3).mean(axis=0)
-    return np.eye(3) + moved.T @ weighted @ inverse, rate.T @ weighted @ inverse
-
-
-def _own_center(body: Body) -> Array:
-    """Return the mass center of the undeformed body as its mass has it: lumped mass may shift it."""
-    if isinstance(body, FiniteElementBody):
-        return body.reference_center()
-    return body.center

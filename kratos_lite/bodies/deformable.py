@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from typing import ClassVar, TypeAlias
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
 from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.linear_algebra import Entries, Solve
 from kratos_lite.model.checks import check_wave_speeds
 from kratos_lite.typing import Array
-
-Solve: TypeAlias = Callable[[Array], Array]
 
 
 class Deformable(Body):
@@ -38,16 +37,59 @@ class Deformable(Body):
 
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal load."""
+        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal load.
+
+        Parameters
+        ----------
+        q : configuration.
+        c : s².
+
+        Returns
+        -------
+        function of columns b (dofs, k) or (dofs,) that returns x.
+        """
+
+    @abstractmethod
+    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+        """Solve K(q) x = residual + H^T multipliers with H x = -gap: one step towards equilibrium.
+
+        Parameters
+        ----------
+        residual : (dofs,), loads less internal load.
+        entries : rows, dofs and values (k,) of H (c, dofs).
+        gap : (c,) m.
+
+        Returns
+        -------
+        x (dofs,) and multipliers (c,) float.
+        """
+
+    @abstractmethod
+    def extent(self) -> float:
+        """Return the size of what displacements are added to.
+
+        Returns
+        -------
+        float, coordinates in m, or the 1 of a deformation gradient.
+        """
 
     @abstractmethod
     def highest_frequency(self) -> float:
-        """Return an upper bound of the angular frequencies at the configuration, in rad/s."""
+        """Return an upper bound of the angular frequencies at the configuration.
+
+        Returns
+        -------
+        float, rad/s.
+        """
 
     def critical_step(self) -> float:
-        """Return the largest step in s with which ``DEF_EXP`` is stable: 2/ω, and less with damping.
+        """Return the largest step with which ``DEF_EXP`` is stable: 2/ω, and less with damping.
 
         The damping force is that of the old velocity, so that h²ω²/2 + h η ω² must not exceed 2.
+
+        Returns
+        -------
+        float, s.
         """
         h = 2.0 / self.highest_frequency()
         return float(h * h / (np.hypot(h, self.damping) + self.damping))

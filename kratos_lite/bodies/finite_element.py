@@ -8,13 +8,16 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.bodies.constraint_projection import allowed
-from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.formulations import FORMULATIONS, Formulation, Modal
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.formulations import FORMULATIONS
+from kratos_lite.bodies.linear_algebra import Entries, Solve
+from kratos_lite.bodies.newton import sparse_step
 from kratos_lite.bodies.rotations import check_rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.errors import InputError, ModelError
@@ -22,7 +25,7 @@ from kratos_lite.mesh import Located, Mesh
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.solvers.eigen import modes
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite
 
 LOCATED_MAX = 64
@@ -88,21 +91,13 @@ class FiniteElementBody(Deformable):
         pattern = Pattern(mesh.n_nodes, [group.nodes for group in self.groups])
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
-        self.formulation = self._formulation(formulation, modes)
+        self.formulation = FORMULATIONS[formulation](self.points, self.groups, self._mass, modes)
         self.schemes = self.formulation.schemes  # type: ignore[misc]
         self._located: dict[bytes, Located] = {}
-        self._known: dict[bytes, tuple[NDArray[np.int64], Array]] = {}
+        self._known: dict[bytes, tuple[Ints, Array]] = {}
         super().__init__(
             mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
         )
-
-    def _formulation(self, name: str, count: int | None) -> Formulation:
-        kind = FORMULATIONS[name]
-        if kind is not Modal and count is not None:
-            raise InputError(f"modes are for formulation='modal'; got formulation={name!r}")
-        if kind is Modal:
-            return Modal(self.points, self.groups, self._mass, 12 if count is None else count)
-        return kind(self.points, self.groups, self._mass)
 
     def default_scheme(self) -> str:
         """Return the most robust scheme that the formulation has."""
@@ -163,6 +158,31 @@ class FiniteElementBody(Deformable):
         w = fitting(vector_of(angular, "an angular velocity"), (), 1, "an angular velocity")
         self.u = (v + np.cross(w, arms)).ravel()
 
+    def translation(self, v: Array) -> Array:
+        """Return v at every node; see `Body.translation`."""
+        return np.tile(v, len(self.points))
+
+    def affine_motion(self) -> tuple[Array, Array]:
+        """Return F and Ḟ nearest with respect to mass; see `Body.affine_motion`."""
+        arms = self.points - self.reference_center()
+        weighted = self.times_mass(arms.ravel()).reshape(-1, 3)
+        inverse = np.linalg.inv(weighted.T @ arms)
+        moved = self.displacement - self.displacement.mean(axis=0)
+        rate = self.u.reshape(-1, 3) - self.u.reshape(-1, 3).mean(axis=0)
+        return np.eye(3) + moved.T @ weighted @ inverse, rate.T @ weighted @ inverse
+
+    def set_affine_motion(
+        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
+    ) -> None:
+        """Move the nodes along; see `Body.set_affine_motion`."""
+        arms = self.points - self.center
+        self.set_configuration(arms @ F.T + center - self.points)
+        self.u = (arms @ rate.T + velocity).ravel()
+
+    def elements(self) -> list[ElementGroup]:
+        """Return the elements; see `Body.elements`."""
+        return self.groups
+
     def locate(self, X: Array) -> None:
         """Note where points X (3,) or (m, 3) lie in the mesh; MeshError if one lies outside."""
         points = np.atleast_2d(X)
@@ -179,7 +199,7 @@ class FiniteElementBody(Deformable):
             self._located[key] = self.mesh.locate(points).require()
         return self._located[key]
 
-    def _at(self, X: Array) -> tuple[NDArray[np.int64], Array]:
+    def _at(self, X: Array) -> tuple[Ints, Array]:
         """Return nodes (k,) and shape functions N (k,) at one point X (3,) of the body."""
         if X.tobytes() not in self._known:
             self.locate(X)
@@ -187,7 +207,7 @@ class FiniteElementBody(Deformable):
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+    def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
         """Return dofs of the nodes around X and H = N(X) 1; see `Body.jacobian`."""
         nodes, N = self._at(X)
         return (3 * nodes[:, None] + np.arange(3)).ravel(), (np.eye(3)[:, None] * N[:, None]).reshape(3, -1)
@@ -243,9 +263,7 @@ class FiniteElementBody(Deformable):
 
     def mass_solver(self) -> Solve:
         """Return what solves M x = b, for motions that the formulation has."""
-        return (
-            self.formulation.solver(self.q, 0.0) if isinstance(self.formulation, Modal) else self._mass.solve
-        )
+        return self.formulation.mass_solver(self.q)
 
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
@@ -254,6 +272,14 @@ class FiniteElementBody(Deformable):
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
         return self.formulation.increment_solver(q, dq, damping, c)
+
+    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+        """Return step and multipliers; see `Deformable.solve_static`."""
+        return sparse_step(self.stiffness(), self.points, residual, entries, gap)
+
+    def extent(self) -> float:
+        """Return the largest side of the undeformed body in m."""
+        return float(np.ptp(self.points, axis=0).max())
 
     def highest_frequency(self) -> float:
         """Return an upper bound of the angular frequencies in rad/s: that of the worst element alone."""
@@ -288,6 +314,11 @@ class FiniteElementBody(Deformable):
     def reference_center(self) -> Array:
         """Return the mass center (3,) of the undeformed body in m; lumped mass may shift it from `center`."""
         return np.asarray(self._shares @ self.points)
+
+    def gravity_potential(self, g: Array, q: Array) -> Array:
+        """Return -∫ρ g · (X + u) dV in J."""
+        weight = self.times_mass(self.translation(g))
+        return np.asarray(-(weight @ q) - self.mass * (g @ self.center))
 
     def linear_momentum(self) -> Array:
         """Return Σ (M u)_a, (3,) in kg m/s."""

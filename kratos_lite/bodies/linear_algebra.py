@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
+
+Solve: TypeAlias = Callable[[Array], Array]
+"""Returns x of A x = b for a matrix A made ready before; b is one right side or columns of them."""
+Entries: TypeAlias = tuple[Ints, Ints, Array]
+"""Rows, columns and values of a sparse matrix."""
 
 
 def first(failed: NDArray[np.bool_]) -> int:

@@ -8,24 +8,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.bodies import steps
-from kratos_lite.bodies.deformable import Deformable, Solve
-from kratos_lite.bodies.linear_algebra import apply, transposed
-from kratos_lite.bodies.pseudo_step import by_rows, green_strain, strain_operator
-from kratos_lite.bodies.rotations import axial, check_rotation, hat
-from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
+from kratos_lite.bodies.affine import AffineBody
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, transposed
+from kratos_lite.bodies.newton import dense_step
+from kratos_lite.bodies.rotations import axial, hat
+from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
+from kratos_lite.bodies.validation import Material, elements_of, mesh_of
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.typing import Array, Ints
 from kratos_lite.voigt import tensor
 
 
-class PseudoRigidBody(Deformable):
+class PseudoRigidBody(AffineBody, Deformable):
     """A body that deforms homogeneously, or many independent ones.
 
     q (..., 12): deformation gradient F row by row (F11 F12 F13 F21 …), then the mass center x̄ in m.
@@ -77,61 +78,60 @@ class PseudoRigidBody(Deformable):
                 raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
             mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
         mass_properties.check_deformable()
-        lead = np.shape(mass_properties.mass)
-        q = np.zeros((*lead, 12))
-        q[..., [0, 4, 8]] = 1.0
-        q[..., 9:] = mass_properties.center
-        self.C, self.tolerance = material.C, tolerance
-        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 12)), scheme, damping)
+        self.C = material.C
+        super().__init__(mesh, material, mass_properties, scheme, tolerance, damping)
 
     # ---- motion ----------------------------------------------------------------------------------
 
     @property
     def deformation(self) -> Array:
         """Deformation gradient F (..., 3, 3), a copy."""
-        return gradient_of(self.q).copy()
+        return self.matrix_of(self.q).copy()
 
-    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
-        """Return x = F (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
-        return self._moved(X, self.q if q is None else q)
+    @staticmethod
+    def matrix_of(q: Array) -> Array:
+        """Return F (..., 3, 3) of configurations (..., 12), or Ḟ of velocities; see `AffineBody`."""
+        return q[..., :9].reshape(*q.shape[:-1], 3, 3)
 
-    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
-        """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
-        return self._moved(X, self.u if u is None else u)
+    @staticmethod
+    def check_matrix(A: Array) -> None:
+        """Check F (..., 3, 3).
 
-    def _moved(self, X: ArrayLike, q: Array) -> Array:
-        points = points_of(X)
-        A = np.atleast_2d(points) - self.center[..., None, :]
-        x = A @ np.swapaxes(gradient_of(q), -1, -2) + q[..., None, 9:]
-        return np.asarray(x if points.ndim == 2 else x[..., 0, :])
-
-    def set_configuration(self, q: ArrayLike) -> None:
-        """Set the configuration (..., 12); see `Body.set_configuration`."""
-        q = finite(q, "a configuration")
-        if q.shape != self.q.shape:
-            raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
-        lowest = float(np.linalg.det(gradient_of(q)).min())
+        Raises
+        ------
+        InputError
+            det F ≤ 0.
+        """
+        lowest = float(np.linalg.det(A).min())
         if lowest <= 0:
             raise InputError(
                 f"a deformation gradient needs det F > 0; got {lowest:g}: it turns the body over"
             )
-        self.q[...] = q
 
-    def rotate(self, rotation: ArrayLike) -> None:
-        """Set F to a rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
-        R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
-        self.q[..., :9] = R.reshape(*R.shape[:-2], 9)
+    def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
+        """Return v = Ḟ (X - X̄) + v̄, shaped as by `position`, in m/s."""
+        u = self.u if u is None else u
+        return self._moved(X, self.matrix_of(u), u[..., 9:])
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
-        lead = self.q.shape[:-1]
-        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
-        self.u[..., 9:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
-        self.u[..., :9] = (hat(w) @ self.deformation).reshape(*lead, 9)
+        w = self._rigid_velocity(linear, angular)
+        self.u[..., :9] = (hat(w) @ self.deformation).reshape(self.u[..., :9].shape)
+
+    def affine_motion(self) -> tuple[Array, Array]:
+        """Return F and Ḟ (3, 3); see `Body.affine_motion`."""
+        return self.deformation, self.matrix_of(self.u).copy()
+
+    def set_affine_motion(
+        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
+    ) -> None:
+        """Take the affine motion; see `Body.set_affine_motion`."""
+        self.set_configuration(np.concatenate([F.ravel(), center]))
+        self.u[...] = np.concatenate([rate.ravel(), velocity])
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+    def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
         """Return dofs and H = [(X - X̄)^T in three rows, 1]; see `Body.jacobian`."""
         H = np.hstack([np.kron(np.eye(3), X - self.center), np.eye(3)])
         return np.arange(12), H
@@ -149,13 +149,9 @@ class PseudoRigidBody(Deformable):
         resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
         return np.concatenate([moment.reshape(*moment.shape[:-2], 9), resultant], axis=-1)
 
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
-        """Return F times the vector; see `Body.convected`."""
-        return np.asarray(gradient_of(q) @ vector)
-
     def times_mass(self, v: Array) -> Array:
         """Return V̇ E0 row by row and m v̄; see `Body.times_mass`."""
-        rows = (gradient_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
+        rows = (self.matrix_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
         return np.concatenate([rows, self.mass[..., None] * v[..., 9:]], axis=-1)
 
     # ---- deformation ----------------------------------------------------------------------------
@@ -213,31 +209,19 @@ class PseudoRigidBody(Deformable):
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
+    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+        """Return step and multipliers; see `Deformable.solve_static`."""
+        return dense_step(self.stiffness(), residual, entries, gap)
+
+    def extent(self) -> float:
+        """Return 1, the size of F."""
+        return 1.0
+
     def highest_frequency(self) -> float:
         """Return the highest angular frequency of all bodies in rad/s."""
         return float(self.frequencies().max())
 
-    # ---- momenta ---------------------------------------------------------------------------------
-
-    def mass_center(self) -> Array:
-        """Return x̄ (..., 3) in m."""
-        return self.q[..., 9:].copy()
-
-    def linear_momentum(self) -> Array:
-        """Return m v̄ (..., 3) in kg m/s."""
-        return np.asarray(self.mass[..., None] * self.u[..., 9:])
-
-    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
-        """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s; see `Body`."""
-        H = gradient_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
-        spin = 2 * axial(H)
-        if about is None:
-            return np.asarray(spin)
-        return np.asarray(
-            spin + np.cross(self.q[..., 9:] - vector_of(about, "a point"), self.linear_momentum())
-        )
-
-
-def gradient_of(q: Array) -> Array:
-    """Return F (..., 3, 3) of pseudo-rigid configurations, or Ḟ of velocities, (..., 12)."""
-    return q[..., :9].reshape(*q.shape[:-1], 3, 3)
+    def spin(self) -> Array:
+        """Return the axial vector of Ḟ E0 F^T - F E0 Ḟ^T, (..., 3) in kg m²/s."""
+        H = self.matrix_of(self.u) @ self.mass_properties.euler @ np.swapaxes(self.deformation, -1, -2)
+        return 2 * axial(H)

@@ -5,26 +5,25 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.bodies import steps
-from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.rigid_step import rotation
-from kratos_lite.bodies.rotations import axial, check_rotation, hat
-from kratos_lite.bodies.validation import Material, elements_of, fitting, mesh_of, points_of, vector_of
+from kratos_lite.bodies.affine import AffineBody
+from kratos_lite.bodies.linear_algebra import Solve, apply, transposed
+from kratos_lite.bodies.rotations import axial, check_rotation, hat, polar, rotation_of
+from kratos_lite.bodies.validation import Material, elements_of, mesh_of, points_of
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.typing import Array, Ints
 
 
-class RigidBody(Body):
+class RigidBody(AffineBody):
     """A body that keeps its shape, or many independent ones.
 
     q (..., 12): rotation Λ column by column (Λ11 Λ21 Λ31 Λ12 …), then the mass center x̄ in m.
@@ -56,6 +55,7 @@ class RigidBody(Body):
 
     kind = "rigid"
     dofs = 6
+    takes_torques = True
     schemes: ClassVar[tuple[str, ...]] = ("RIG_NEG", "RIG_POS", "RIG_IMP")
 
     def __init__(
@@ -71,12 +71,7 @@ class RigidBody(Body):
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its mass_properties")
             mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
-        lead = np.shape(mass_properties.mass)
-        q = np.zeros((*lead, 12))
-        q[..., [0, 4, 8]] = 1.0
-        q[..., 9:] = mass_properties.center
-        self.tolerance = tolerance
-        super().__init__(mesh, material, mass_properties, q, np.zeros((*lead, 6)), scheme)
+        super().__init__(mesh, material, mass_properties, scheme, tolerance)
 
     def default_scheme(self) -> str:
         """Return ``RIG_NEG``."""
@@ -84,78 +79,79 @@ class RigidBody(Body):
 
     # ---- motion ----------------------------------------------------------------------------------
 
+    @staticmethod
+    def matrix_of(q: Array) -> Array:
+        """Return Λ (..., 3, 3) of configurations (..., 12); see `AffineBody.matrix_of`."""
+        return rotation_of(q)
+
+    @staticmethod
+    def check_matrix(A: Array) -> None:
+        """Raise InputError unless A is a rotation."""
+        check_rotation(A, "the rotation of a configuration")
+
     @property
     def rotation(self) -> Array:
         """Rotation Λ (..., 3, 3), a copy."""
-        return rotation(self.q).copy()
-
-    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
-        """Return x = Λ (X - X̄) + x̄ of points X (m, 3) or (3,), as (..., m, 3) or (..., 3) in m."""
-        q = self.q if q is None else q
-        A, many = self._arms(X)
-        x = A @ np.swapaxes(rotation(q), -1, -2) + q[..., None, 9:]
-        return np.asarray(x if many else x[..., 0, :])
+        return rotation_of(self.q).copy()
 
     def velocity(self, X: ArrayLike, q: Array | None = None, u: Array | None = None) -> Array:
         """Return v = Λ (W × (X - X̄)) + v̄, shaped as by `position`, in m/s."""
         q, u = self.q if q is None else q, self.u if u is None else u
-        A, many = self._arms(X)
-        spin = np.cross(u[..., None, :3], A)
-        v = spin @ np.swapaxes(rotation(q), -1, -2) + u[..., None, 3:]
-        return np.asarray(v if many else v[..., 0, :])
-
-    def _arms(self, X: ArrayLike) -> tuple[Array, bool]:
-        """Return X - X̄ as (..., m, 3), and whether X were many points."""
         points = points_of(X)
-        return np.atleast_2d(points) - self.center[..., None, :], points.ndim == 2
-
-    def set_configuration(self, q: ArrayLike) -> None:
-        """Set the configuration (..., 12); see `Body.set_configuration`."""
-        q = finite(q, "a configuration")
-        if q.shape != self.q.shape:
-            raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
-        check_rotation(rotation(q), "the rotation of a configuration")
-        self.q[...] = q
-
-    def rotate(self, rotation: ArrayLike) -> None:
-        """Set the rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
-        R = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
-        self.q[..., :9] = np.swapaxes(R, -1, -2).reshape(*R.shape[:-2], 9)
+        spin = np.cross(u[..., None, :3], np.atleast_2d(points) - self.center[..., None, :])
+        v = spin @ np.swapaxes(rotation_of(q), -1, -2) + u[..., None, 3:]
+        return np.asarray(v if points.ndim == 2 else v[..., 0, :])
 
     def set_velocity(self, linear: ArrayLike = (0, 0, 0), angular: ArrayLike = (0, 0, 0)) -> None:
         """Set the velocity of the mass center in m/s and the spatial angular velocity in rad/s."""
-        lead = self.q.shape[:-1]
-        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
-        self.u[..., 3:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
-        self.u[..., :3] = (np.swapaxes(self.rotation, -1, -2) @ w[..., None])[..., 0]
+        self.u[..., :3] = transposed(self.rotation, self._rigid_velocity(linear, angular))
+
+    def affine_motion(self) -> tuple[Array, Array]:
+        """Return Λ and its rate (3, 3); see `Body.affine_motion`."""
+        return self.rotation, self.rotation @ hat(self.u[:3])
+
+    def set_affine_motion(
+        self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
+    ) -> None:
+        """Take the nearest rotation, and both momenta; see `Body.set_affine_motion`."""
+        self.set_configuration(np.concatenate([polar(F).T.ravel(), center]))
+        referential = self.rotation.T @ angular_momentum
+        self.u[...] = np.concatenate([np.linalg.solve(self.mass_properties.inertia, referential), velocity])
 
     # ---- forces ----------------------------------------------------------------------------------
 
-    def jacobian(self, X: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
+    def jacobian(self, X: Array, q: Array) -> tuple[Ints, Array]:
         """Return dofs and H = [-Λ hat(X - X̄), 1]; see `Body.jacobian`."""
-        return np.arange(6), np.hstack([-rotation(q) @ hat(X - self.center), np.eye(3)])
+        return np.arange(6), np.hstack([-rotation_of(q) @ hat(X - self.center), np.eye(3)])
 
     def generalized_force(self, X: Array, force: Array, q: Array) -> Array:
         """Return the referential torque (X - X̄) × Λ^T f and the force f; see `Body.generalized_force`."""
         f = np.broadcast_to(force, (*q.shape[:-1], 3))
-        referential = (np.swapaxes(rotation(q), -1, -2) @ f[..., None])[..., 0]
+        referential = transposed(rotation_of(q), f)
         return np.concatenate([np.cross(X - self.center, referential), f], axis=-1)
 
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return the resultant torque and force of nodal forces; see `Body.generalized_nodal_force`."""
         assert self.mesh is not None
         A = self.mesh.points - self.center[..., None, :]
-        moments = np.swapaxes(A, -1, -2) @ (forces @ rotation(q))
+        moments = np.swapaxes(A, -1, -2) @ (forces @ rotation_of(q))
         resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
         return np.concatenate([2 * axial(np.swapaxes(moments, -1, -2)), resultant], axis=-1)
 
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
-        """Return Λ times the vector; see `Body.convected`."""
-        return np.asarray(rotation(q) @ vector)
+    def generalized_torque(self, torque: Array, q: Array) -> Array:
+        """Return the referential torque Λ^T t and no force; see `Body.generalized_torque`."""
+        referential = transposed(rotation_of(q), np.asarray(torque))
+        return np.concatenate([referential, np.zeros_like(referential)], axis=-1)
+
+    def body_fixed_force(self, X: Array, force: Array) -> Array:
+        """Return the force and its torque as they are without rotation; see `Body.body_fixed_force`."""
+        upright = np.zeros_like(self.q)
+        upright[..., [0, 4, 8]] = 1.0
+        return self.generalized_force(X, force, upright)
 
     def times_mass(self, v: Array) -> Array:
         """Return J W and m v̄; see `Body.times_mass`."""
-        spin = (self.mass_properties.inertia @ v[..., :3, None])[..., 0]
+        spin = apply(self.mass_properties.inertia, v[..., :3])
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
     def step_free(self, h: float, count: int) -> None:
@@ -169,7 +165,7 @@ class RigidBody(Body):
         """Return inertia, its inverse and mass, as `steps` take them."""
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
-    def mass_solver(self) -> Callable[[Array], Array]:
+    def mass_solver(self) -> Solve:
         """Return what solves M x = b; see `Body`."""
         return self.apart
 
@@ -181,24 +177,9 @@ class RigidBody(Body):
     def _inverse(self) -> Array:
         return np.asarray(np.linalg.inv(self.mass_properties.inertia), dtype=float)
 
-    # ---- momenta ---------------------------------------------------------------------------------
-
-    def mass_center(self) -> Array:
-        """Return x̄ (..., 3) in m."""
-        return self.q[..., 9:].copy()
-
-    def linear_momentum(self) -> Array:
-        """Return m v̄ (..., 3) in kg m/s."""
-        return np.asarray(self.mass[..., None] * self.u[..., 3:])
-
-    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
-        """Return Λ J W and the moment of the linear momentum, (..., 3) in kg m²/s; see `Body`."""
-        spin = (self.rotation @ self.times_mass(self.u)[..., :3, None])[..., 0]
-        if about is None:
-            return np.asarray(spin)
-        return np.asarray(
-            spin + np.cross(self.q[..., 9:] - vector_of(about, "a point"), self.linear_momentum())
-        )
+    def spin(self) -> Array:
+        """Return Λ J W (..., 3) in kg m²/s."""
+        return apply(self.rotation, self.times_mass(self.u)[..., :3])
 
 
 class Obstacle(RigidBody):
@@ -218,10 +199,9 @@ class Obstacle(RigidBody):
     """
 
     kind = "obstacle"
+    convertible = False
 
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
-        from kratos_lite.materials import Isotropic3D
-
         shape = MassProperties.of(
             mesh_of(mesh).points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))
         )

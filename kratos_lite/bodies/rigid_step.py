@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
-from kratos_lite.bodies.rotations import exp, hat, right_jacobian
+from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, set_rotation
 from kratos_lite.typing import Array
 
 NEWTON_STEPS = 50
@@ -31,7 +31,7 @@ def rigid_finish(
 ) -> int:
     """Return the first body whose step failed, or -1: `steps.rigid_finish` in NumPy."""
     W, T, J = u[..., :3], load[..., :3], inertia
-    Rh = rotation(qh)
+    Rh = rotation_of(qh)
     with np.errstate(all="ignore"):
         p = transposed(exp(h / 2 * W), apply(J, W))
         Wh = apply(inverse, p + h / 2 * T)
@@ -66,13 +66,3 @@ def _implicit_velocity(
         W = np.where(going[..., None], W + d, W)
         going = going & ~(length(d) <= ROUND_OFF * length(W))
     return W, going
-
-
-def rotation(q: Array) -> Array:
-    """Return R (..., 3, 3) of rigid q (..., 12)."""
-    return np.swapaxes(q[..., :9].reshape(*q.shape[:-1], 3, 3), -1, -2)
-
-
-def set_rotation(q: Array, R: Array) -> None:
-    """Put R (..., 3, 3) into rigid q (..., 12)."""
-    q[..., :9] = np.swapaxes(R, -1, -2).reshape(q[..., :9].shape)

@@ -111,3 +111,13 @@ def check_rotation(R: ArrayLike, what: str = "a rotation") -> Array:
     if (np.linalg.det(R) < 0).any():
         raise InputError(f"{what} must have determinant +1; this one is a reflection")
     return R
+
+
+def rotation_of(q: Array) -> Array:
+    """Return Λ (..., 3, 3) of configurations (..., 12) of rigid bodies, a view: Λ stands column by column."""
+    return np.swapaxes(q[..., :9].reshape(*q.shape[:-1], 3, 3), -1, -2)
+
+
+def set_rotation(q: Array, R: Array) -> None:
+    """Put Λ (..., 3, 3) into configurations (..., 12) of rigid bodies."""
+    q[..., :9] = np.swapaxes(R, -1, -2).reshape(q[..., :9].shape)

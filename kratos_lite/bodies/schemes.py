@@ -16,8 +16,9 @@ import numpy as np
 
 from kratos_lite.bodies import steps
 from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.constraint_projection import Solve, Step, constrained_step
+from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import RigidBody
 from kratos_lite.errors import SolveError

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from kratos_lite import solvers
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
-from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.linear_algebra import Entries
 from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.solvers.supports import ConstraintMap
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.typing import Array, Progress
 
 INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
@@ -88,11 +84,11 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
 def _increment(body: Deformable, start: Array, share: float, progress: Progress | None) -> int:
     """Find the equilibrium under a share of the loads; return the number of iterations."""
-    initial, noise = _gap(body, start), ROUND_OFF * _extent(body)
+    initial, noise = _gap(body, start), ROUND_OFF * body.extent()
     for iteration in range(1, NEWTON_MAX + 1):
         load = share * body.external_load(body.q)
         gap = _gap(body, body.q) - (1 - share) * initial
-        step, multipliers = _newton(body, load - body.internal_load(body.q), gap)
+        step, multipliers = body.solve_static(load - body.internal_load(body.q), _entries(body), gap)
         largest = float(np.abs(step).max())
         if not np.isfinite(largest):
             break
@@ -106,20 +102,13 @@ def _increment(body: Deformable, start: Array, share: float, progress: Progress 
     raise SolveError(f"Newton does not converge in {NEWTON_MAX} iterations at {share:.0%} of the load")
 
 
-def _extent(body: Deformable) -> float:
-    """Return the size of what displacements are added to: coordinates in m, or the 1 of F."""
-    if isinstance(body, FiniteElementBody):
-        return float(np.ptp(body.points, axis=0).max())
-    return 1.0
-
-
 def _gap(body: Deformable, q: Array) -> Array:
     """Return by how much the constraints are missed in m."""
     gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
     return np.concatenate([np.zeros(0), *gaps])
 
 
-def _entries(body: Deformable) -> tuple[Ints, Ints, Array]:
+def _entries(body: Deformable) -> Entries:
     """Return rows, dofs and values of all constraints."""
     none = np.zeros(0, dtype=np.int64)
     parts, at = [(none, none, np.zeros(0))], 0
@@ -129,63 +118,6 @@ def _entries(body: Deformable) -> tuple[Ints, Ints, Array]:
         at += constraint.count
     row, dof, value = (np.concatenate(column) for column in zip(*parts, strict=True))
     return row, dof, value
-
-
-def _newton(body: Deformable, residual: Array, gap: Array) -> tuple[Array, Array]:
-    """Return the step and the multipliers of K step = residual + H^T multipliers, H step = -gap."""
-    row, dof, value = _entries(body)
-    if not isinstance(body, FiniteElementBody):
-        return _newton_dense(body, residual, gap, row, dof, value)
-    K = body.stiffness(body.q)
-    if len(row) == len(gap) and len(set(row.tolist())) == len(row):  # each row prescribes one displacement
-        return _newton_eliminated(body, K, residual, gap, dof, value)
-    return _newton_sparse(K, residual, gap, row, dof, value)
-
-
-def _newton_dense(
-    body: Deformable, residual: Array, gap: Array, row: Ints, dof: Ints, value: Array
-) -> tuple[Array, Array]:
-    n, c = len(residual), len(gap)
-    A = np.zeros((n + c, n + c))
-    A[:9, :9] = body.stiffness(body.q)
-    A[n + row, dof], A[dof, n + row] = value, value
-    # least squares: a body that loads do not move needs no support, and redundant supports share their load
-    scale = np.concatenate(
-        [np.full(n, np.abs(A[:9, :9]).max() ** -0.5), np.full(c, np.abs(A[:9, :9]).max() ** 0.5)]
-    )
-    b = np.concatenate([residual, -gap])
-    x = scale * np.linalg.lstsq(scale[:, None] * A * scale, scale * b, rcond=1e-12)[0]
-    return x[:n], -x[n:]
-
-
-def _newton_eliminated(
-    body: FiniteElementBody, K: BlockMatrix, residual: Array, gap: Array, dof: Ints, value: Array
-) -> tuple[Array, Array]:
-    prescribed = np.zeros(body.dofs)
-    prescribed[dof] = -gap / value
-    free = np.ones(body.dofs, dtype=bool)
-    free[dof] = False
-    reduced = ConstraintMap(np.flatnonzero(free), prescribed)
-    method, reason = solvers.choose("auto", len(reduced.free), body.dofs)
-    matrix: Any = K if method != "dense" else K.scipy().toarray()
-    step = solvers.LinearSolver(matrix, reduced, body.points, method, reason).solve(residual, 1e-12).x
-    reaction = (K @ step - residual)[dof] / value
-    twice = np.bincount(dof, minlength=body.dofs)[dof]
-    return step, np.asarray(reaction / twice)
-
-
-def _newton_sparse(
-    K: BlockMatrix, residual: Array, gap: Array, row: Ints, dof: Ints, value: Array
-) -> tuple[Array, Array]:
-    from scipy.sparse import block_array, csr_array, eye_array
-
-    n, c = len(residual), len(gap)
-    size = K.norm()
-    H = csr_array((value, (row, dof)), shape=(c, n)) * size
-    soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
-    A = block_array([[K.scipy(), H.T], [H, soft]], format="csr") if c else K.scipy().tocsr()
-    x = solvers.direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
-    return x[:n], -x[n:] * size
 
 
 def _balance(body: Deformable, share: float, multipliers: Array) -> None:

@@ -22,8 +22,7 @@ import numpy as np
 
 from kratos_lite.bodies import pseudo_step, rigid_step
 from kratos_lite.bodies.linear_algebra import apply, transposed
-from kratos_lite.bodies.rigid_step import rotation, set_rotation
-from kratos_lite.bodies.rotations import exp
+from kratos_lite.bodies.rotations import exp, rotation_of, set_rotation
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 from kratos_lite.typing import Array
@@ -45,7 +44,7 @@ def rigid_half(q: Array, u: Array, h: float) -> Array:
     """
     out = np.empty(q.shape)
     if _compiled("rigid_half", q, u, h, out) is NotImplemented:
-        R, x = rotation(q) @ exp(h / 2 * u[..., :3]), q[..., 9:] + h / 2 * u[..., 3:]
+        R, x = rotation_of(q) @ exp(h / 2 * u[..., :3]), q[..., 9:] + h / 2 * u[..., 3:]
         set_rotation(out, R)
         out[..., 9:] = x
     return out
@@ -116,7 +115,7 @@ def rigid_steps(
     gravity = np.asarray(mass)[..., None] * acceleration
     for step in range(steps):
         qh, before = rigid_half(q, u, h), u.copy()
-        R, load = rotation(qh), np.empty(u.shape)
+        R, load = rotation_of(qh), np.empty(u.shape)
         load[..., :3] = transposed(R, spatial[..., :3]) + convected[..., :3]
         load[..., 3:] = gravity + spatial[..., 3:] + apply(R, convected[..., 3:])
         body = rigid_step.rigid_finish(q, u, qh, load, *constant[:3], h, scheme, tolerance)

@@ -55,6 +55,11 @@ class Settings:
         """Return a key with the keys that lead to it."""
         return f"{self.path}.{key}" if self.path else key
 
+    def expect(self, fits: object, key: str, message: str) -> None:
+        """Raise the error of a key unless its value fits."""
+        if not fits:
+            raise self.error(key, message)
+
     def error(self, key: str, message: str) -> InputError:
         """Return an error at the place of a key, or of the object where it is missing."""
         line, column = self.values.places.get(key) or next(iter(self.values.places.values()), self.place)

@@ -20,8 +20,8 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.bodies.deformable import Solve
-from kratos_lite.errors import ModelError
+from kratos_lite.bodies.linear_algebra import Solve
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import LinearSolver
 from kratos_lite.solvers.banded import Factorizer
@@ -48,6 +48,7 @@ class Formulation(ABC):
     points : (n, 3) m.
     groups : the elements.
     mass : their mass.
+    modes : number of modes, of the modal formulation alone.
     """
 
     name: ClassVar[str]
@@ -59,7 +60,11 @@ class Formulation(ABC):
         if "name" in cls.__dict__:
             FORMULATIONS.add(cls.__name__, cls, [cls.name, *cls.aliases])
 
-    def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:
+    def __init__(
+        self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None
+    ) -> None:
+        if modes is not None:
+            raise InputError(f"modes are for formulation='modal'; got formulation={self.name!r}")
         self.points, self.groups, self.mass = points, groups, mass
 
     @cached_property
@@ -121,6 +126,10 @@ class Formulation(ABC):
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
         """Return what solves (M + c K(q)) x = b."""
+
+    def mass_solver(self, q: Array) -> Solve:
+        """Return what solves M x = b, for motions that the formulation has."""
+        return self.mass.solve
 
     def damping_load(self, q: Array, u: Array) -> Array:
         """Return K(q) u, (3n,)."""

@@ -9,9 +9,9 @@ import numpy as np
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.constraint_projection import Solve
 from kratos_lite.bodies.formulations import base
 from kratos_lite.bodies.formulations.base import Formulation
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.bodies.rotations import polar
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
@@ -28,8 +28,10 @@ class Corotational(Formulation):
     aliases = ("BC",)
     schemes = ("DEF_LIM", "DEF_EXP")
 
-    def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass) -> None:
-        super().__init__(points, groups, mass)
+    def __init__(
+        self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None
+    ) -> None:
+        super().__init__(points, groups, mass, modes)
         gradients, volume = finite_strain.nodal_gradients(points, groups)
         self._gradients = np.ascontiguousarray(gradients.T / volume)
         self._Z = points - points.mean(axis=0)

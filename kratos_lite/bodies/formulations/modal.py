@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.constraint_projection import Solve
 from kratos_lite.bodies.formulations.corotational import Corotational
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.errors import InputError
-from kratos_lite.solvers.eigen import modes
+from kratos_lite.solvers.eigen import modes as natural_modes
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
@@ -20,26 +20,33 @@ class Modal(Corotational):
 
     Parameters
     ----------
-    count : number of modes, at least 6.
+    modes : number of modes, at least 6; 12 if not given.
     """
 
     name = "modal"
     aliases = ("BC-MODAL",)
 
-    def __init__(self, points: Array, groups: Sequence[ElementGroup], mass: Mass, count: int) -> None:
+    def __init__(
+        self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None
+    ) -> None:
         super().__init__(points, groups, mass)
+        count = 12 if modes is None else modes
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)):
             raise InputError(f"modes must be a whole number; got {count!r}")
         if count < 6:
             raise InputError(f"modes must be at least 6, for the rigid motions are modes too; got {count}")
         self._Z = points - mass.nodal @ points / mass.nodal.sum()  # momenta are about the mass center
-        self.omega, self.shapes = modes(self.K0.scipy().tocsr(), mass.matrix(), count)
+        self.omega, self.shapes = natural_modes(self.K0.scipy().tocsr(), mass.matrix(), count)
         self._squares = np.where(np.arange(count) < 6, 0.0, self.omega**2)
         self._dual = np.ascontiguousarray(np.stack([mass.times(shape) for shape in self.shapes.T]))
 
     def _apply(self, d: Array) -> Array:
         """Return M E Λ E^T M d: the stiffness of the modes."""
         return np.asarray((self._squares * (self._dual @ d)) @ self._dual)
+
+    def mass_solver(self, q: Array) -> Solve:
+        """Return what solves M x = b among the modes; see `Formulation.mass_solver`."""
+        return self.solver(q, 0.0)
 
     def _inverse(self, c: float) -> Solve:
         scale = 1 + c * self._squares

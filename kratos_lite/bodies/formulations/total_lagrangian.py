@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.bodies.constraint_projection import Solve
 from kratos_lite.bodies.formulations.base import Formulation
+from kratos_lite.bodies.linear_algebra import Solve
 from kratos_lite.typing import Array
 
 

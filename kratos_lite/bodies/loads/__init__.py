@@ -4,18 +4,17 @@ A load is bound to a body when it is added; what is bound gives the generalized 
 Loads of models (gravity, tractions, dead pressure, …) act through their nodal forces, on every kind of body.
 """
 
-from kratos_lite.bodies.loads.base import BodyLoad, Bound, bind
+from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
 from kratos_lite.bodies.loads.callback import Callback
 from kratos_lite.bodies.loads.forces import Force, Spring, Torque
 from kratos_lite.bodies.loads.pressure import FollowerPressure
 
 __all__ = [
+    "AppliedLoad",
     "BodyLoad",
-    "Bound",
     "Callback",
     "FollowerPressure",
     "Force",
     "Spring",
     "Torque",
-    "bind",
 ]

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.loads.base import BodyLoad, Bound
-from kratos_lite.bodies.rigid import RigidBody
-from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
@@ -39,20 +36,21 @@ class Callback(BodyLoad):
             raise InputError(f"a callback is a function of q, u and t; got {function!r}")
         self.function, self.of_velocity = function, bool(of_velocity)
 
-    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body."""
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             out = finite(self.function(q, u, time), f"what a callback returns at t = {time:g} s")
-            if isinstance(body, RigidBody) and out.shape == (*q.shape[:-1], 9):
-                R = rotation(q)
-                T = (np.swapaxes(R, -1, -2) @ out[..., 3:6, None])[..., 0] + out[..., 6:]
-                return np.concatenate([T, out[..., :3]], axis=-1)
+            if body.takes_torques and out.shape == (*q.shape[:-1], 9):
+                total = body.generalized_torque(out[..., 3:6], q)
+                total[..., :3] += out[..., 6:]
+                total[..., 3:] = out[..., :3]
+                return total
             if out.shape != u.shape:
-                nine = " (or 9 numbers a body)" if isinstance(body, RigidBody) else ""
+                nine = " (or 9 numbers a body)" if body.takes_torques else ""
                 raise InputError(
                     f"a callback must return a generalized force of shape {u.shape}{nine}; got {out.shape}"
                 )
             return out
 
-        return Bound(generalized, amplitude, steady, follows_velocity=self.of_velocity)
+        return AppliedLoad(generalized, follows_velocity=self.of_velocity)

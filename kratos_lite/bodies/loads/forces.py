@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.loads.base import BodyLoad, Bound, checked_frame, no_potential, upright
-from kratos_lite.bodies.rigid import RigidBody
-from kratos_lite.bodies.rigid_step import rotation
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.loads.base import FRAMES, AppliedLoad, BodyLoad, no_potential
 from kratos_lite.bodies.validation import fitting, one_point, vector_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
@@ -29,32 +27,22 @@ class Force(BodyLoad):
 
     def __init__(self, point: ArrayLike, force: ArrayLike, frame: str = "spatial") -> None:
         self.point, self.force = one_point(point), vector_of(force, "a force")
-        self.frame = checked_frame(frame)
+        self.frame = _checked_frame(frame)
 
-    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; MeshError if the point lies outside."""
         X, f = self.point, fitting(self.force, body.q.shape[:-1], 1, "a force")
         body.locate(X)
         if self.frame == "convected":
-            fixed = body.generalized_force(X, f, upright(body)) if isinstance(body, RigidBody) else None
-            return Bound(
+            return AppliedLoad(
                 lambda q, u, t: body.generalized_force(X, body.convected(f, X, q), q),
-                amplitude,
-                steady,
-                convected=fixed,
+                convected=body.body_fixed_force(X, f),
             )
-
-        def potential(q: Array) -> Array:
-            return np.asarray(-(f * body.position(X, q)).sum(axis=-1))
-
-        central = not isinstance(body, RigidBody) or bool((np.abs(X - body.center) == 0).all())
-        fixed = body.generalized_force(X, f, body.q) if central else None
-        return Bound(
+        central = body.jacobian_is_constant or bool((np.abs(X - body.center) == 0).all())
+        return AppliedLoad(
             lambda q, u, t: body.generalized_force(X, f, q),
-            amplitude,
-            steady,
-            spatial=fixed,
-            potential_energy=potential,
+            spatial=body.generalized_force(X, f, body.q) if central else None,
+            potential_energy=lambda q: np.asarray(-(f * body.position(X, q)).sum(axis=-1)),
         )
 
 
@@ -68,24 +56,16 @@ class Torque(BodyLoad):
     """
 
     def __init__(self, torque: ArrayLike, frame: str = "spatial") -> None:
-        self.torque, self.frame = vector_of(torque, "a torque"), checked_frame(frame)
+        self.torque, self.frame = vector_of(torque, "a torque"), _checked_frame(frame)
 
-    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; ModelError unless it is rigid."""
-        if not isinstance(body, RigidBody):
-            raise ModelError(
-                f"a torque acts on rigid bodies; give a {body.kind} one a pair of forces at two points"
-            )
         t = fitting(self.torque, body.q.shape[:-1], 1, "a torque")
+        body.generalized_torque(t, body.q)  # an error where bodies of the kind take none
         fixed = np.broadcast_to(np.concatenate([t, np.zeros_like(t)], axis=-1), body.u.shape)
         if self.frame == "convected":
-            return Bound(lambda q, u, time: fixed, amplitude, steady, convected=fixed)
-
-        def generalized(q: Array, u: Array, time: float) -> Array:
-            T = (np.swapaxes(rotation(q), -1, -2) @ t[..., None])[..., 0]
-            return np.concatenate([T, np.zeros_like(T)], axis=-1)
-
-        return Bound(generalized, amplitude, steady, spatial=fixed)
+            return AppliedLoad(lambda q, u, time: fixed, convected=fixed)
+        return AppliedLoad(lambda q, u, time: body.generalized_torque(t, q), spatial=fixed)
 
 
 class Spring(BodyLoad):
@@ -113,7 +93,7 @@ class Spring(BodyLoad):
         self.damping = _not_negative(damping, "damping", "N s/m")
         self.length = None if length is None else _not_negative(length, "length", "m")
 
-    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; MeshError if the point lies outside."""
         X, anchor = self.point, self.anchor
         body.locate(X)
@@ -136,12 +116,18 @@ class Spring(BodyLoad):
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
-        return Bound(generalized, amplitude, steady, potential_energy=potential, follows_velocity=damped)
+        return AppliedLoad(generalized, potential_energy=potential, follows_velocity=damped)
 
     def _pull(self, elongation: float, rate: float) -> float:
         if callable(self.stiffness):
             return float(self.stiffness(elongation, rate))
         return self.stiffness * elongation + self.damping * rate
+
+
+def _checked_frame(frame: str) -> str:
+    if frame not in FRAMES:
+        raise InputError(f"frame must be 'spatial' or 'convected'; got {frame!r}")
+    return frame
 
 
 def _not_negative(value: float, what: str, unit: str) -> float:

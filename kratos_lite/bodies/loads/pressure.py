@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from kratos_lite.assembly.element_groups import add_nodal
-from kratos_lite.bodies.body import Body
-from kratos_lite.bodies.loads.base import BodyLoad, Bound
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
 from kratos_lite.elements import surface_pressure
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
@@ -35,7 +33,7 @@ class FollowerPressure(BodyLoad):
             raise InputError(f"a pressure must be one number in Pa; got {pressure}")
         self.where, self.pressure = where, float(value)
 
-    def bind(self, body: Body, amplitude: Callable[[float], float], steady: bool) -> Bound:
+    def bind(self, body: FreeBody) -> AppliedLoad:
         """Return the load on a body; ModelError if there are no such faces."""
         mesh = body.mesh
         if mesh is None:
@@ -56,4 +54,4 @@ class FollowerPressure(BodyLoad):
                 raise ModelError("a following pressure acts on single bodies; march them one by one")
             return body.generalized_nodal_force(nodal(body.position(mesh.points, q)), q)
 
-        return Bound(generalized, amplitude, steady)
+        return AppliedLoad(generalized)

@@ -1,9 +1,10 @@
-"""Checks of a Kratos run file: expected values, compared with a result after solving."""
+"""Expected values of a Kratos run file, compared with a result after solving."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +14,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
+from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.typing import Array
 
@@ -69,61 +71,50 @@ class NodeComparison:
         )
 
 
-def _idle(line: str) -> Comparison:
-    return lambda result: line
+def _idle(what: str, why: str) -> Comparison:
+    return lambda result: f"check {what} not evaluated: {why}"
 
 
 def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Comparison]:
-    """Yield the checks of check_scalar_to_nodes_process or of its kin for vectors.
+    """Yield the comparisons of check_scalar_to_nodes_process or of its kin for vectors.
 
     Values agree when their difference, rounded to `tolerance_rank` decimals, is zero.
     """
     settings.check_keys(NODE_KEYS)
-    if settings.section("local_axes").values:
-        raise settings.error("local_axes", "local_axes are not supported; give the values along x, y, z")
+    refuse_local_axes(settings)
     name, part = settings.text("variable_name"), settings.text("model_part_name")
     rows, value, time = context.part(settings).nodes, settings.get("value", 0.0), context.times[-1]
-    is_list = isinstance(value, list)
-    pairs = zip(("_X", "_Y", "_Z"), value, strict=False) if is_list else [("", value)]
     rank, span = settings.integer("tolerance_rank", 3), interval_of(settings)
-    if abs(rank) > 30:
-        raise settings.error("tolerance_rank", f"tolerance_rank is a count of decimals; got {rank}")
-    deformed = context.moved and not settings.flag("reference_conf", False)
-    for suffix, one in pairs:
+    text = f"tolerance_rank is a number of decimals; got {rank}"
+    settings.expect(abs(rank) <= 30, "tolerance_rank", text)
+    moved = context.moved and not settings.flag("reference_conf", False)
+    values = dict(zip(("_X", "_Y", "_Z"), value, strict=False)) if isinstance(value, list) else {"": value}
+    for suffix, one in values.items():
         what = f"{name}{suffix} on {part}"
         if one is None:
             continue
-        if not is_number(one) and not isinstance(one, str):
-            raise settings.error("value", f"value must be a number or an expression; got {shown(one)}")
-        if not span.begin <= time < span.end:
-            yield _idle(f"check {what} not evaluated: time {time:g} s is outside its interval")
-            continue
-        yield NodeComparison(what, name + suffix, rows, Analytic(one, rows, rank, time, deformed))
+        fits = is_number(one) or isinstance(one, str)
+        settings.expect(fits, "value", f"value must be a number or an expression; got {shown(one)}")
+        if span.begin <= time < span.end:
+            expected = partial(_from_expression, str(one), rows, time, moved, 0.5 * 10.0**-rank)
+            yield NodeComparison(what, name + suffix, rows, expected)
+        else:
+            yield _idle(what, f"time {time:g} s is outside its interval")
 
 
-@dataclass(frozen=True, eq=False)
-class Analytic:
-    """Expected values from a number or an expression in x, y, z, t, as Python reads it."""
-
-    value: float | str
-    rows: NDArray[np.int64]
-    rank: int
-    time: float
-    deformed: bool
-
-    def __call__(self, result: Result) -> tuple[Array, Array]:
-        """Return the expected values and the allowed differences."""
-        points = result.mesh.points[self.rows]
-        if self.deformed:
-            points = points + result.displacement()[self.rows]
-        x, y, z = points.T
-        value = evaluate(str(self.value), {"x": x, "y": y, "z": z, "t": self.time}, python=True)
-        # A difference that rounds to zero is at most half a unit of the last decimal.
-        return np.broadcast_to(value, x.shape), np.full(x.shape, 0.5 * 10.0**-self.rank)
+def _from_expression(
+    text: str, rows: NDArray[np.int64], time: float, moved: bool, allowed: float, result: Result
+) -> tuple[Array, Array]:
+    """Return the values of an expression in x, y, z, t, as Python reads it, and the allowed differences."""
+    points = result.mesh.points[rows] + (result.displacement()[rows] if moved else 0.0)
+    x, y, z = points.T
+    value = evaluate(text, {"x": x, "y": y, "z": z, "t": time}, python=True)
+    # A difference that rounds to zero is at most half a unit of the last decimal.
+    return np.broadcast_to(value, x.shape), np.full(x.shape, allowed)
 
 
 def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Comparison]:
-    """Yield the checks of from_json_check_result_process: nodal values of a reference file.
+    """Yield the comparisons of from_json_check_result_process: nodal values of a reference file.
 
     Values agree within the larger of `tolerance` and `relative_tolerance` × the expected value.
     """
@@ -132,42 +123,38 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
     try:
         path, _ = find_file(settings, "input_file_name", context.folder, outside=context.outside)
     except InputError as error:
-        yield _idle(f"check {what} not evaluated: {error}")
+        yield _idle(what, str(error))
         return
-    part = context.part(settings)
-    if settings.text("sub_model_part_name", ""):
-        part = context.part(settings, "sub_model_part_name")
-    data = read_settings(path)
+    key = "sub_model_part_name" if settings.text("sub_model_part_name", "") else "model_part_name"
+    context.part(settings)
+    rows, data = context.part(settings, key).nodes, read_settings(path)
     tolerances = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
     for variable in settings.texts("check_variables"):
         for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in FIELDS else [variable]:
-            tabled = Tabled(data, component, part.nodes, context.times[-1], tolerances)
-            yield NodeComparison(f"{component} {what}", component, part.nodes, tabled)
+            expected = partial(_from_table, data, component, rows, context.times[-1], tolerances)
+            yield NodeComparison(f"{component} {what}", component, rows, expected)
     for variable in settings.texts("gauss_points_check_variables"):
-        yield _idle(f"check {variable} {what} not evaluated: values at Gauss points are not compared")
+        yield _idle(f"{variable} {what}", "values at Gauss points are not compared")
 
 
-@dataclass(frozen=True, eq=False)
-class Tabled:
-    """Expected values from a file of Kratos' json_output_process, at a time in s."""
-
-    data: Settings
-    component: str
-    rows: NDArray[np.int64]
-    time: float
-    tolerances: tuple[float, float]
-
-    def __call__(self, result: Result) -> tuple[Array, Array]:
-        """Return the expected values and the allowed differences."""
-        times = self.data.numbers("TIME")
-        if not times or not times[0] - 1e-9 <= self.time <= times[-1] + 1e-9:
-            raise ValueError(f"the file has no values at time {self.time:g} s")
-        nodes = [self.data.section(f"NODE_{i}", required=True) for i in result.mesh.node_ids[self.rows]]
-        series = [node.numbers(self.component) for node in nodes]
-        if any(len(values) != len(times) for values in series):
-            raise ValueError(f"{self.component} must be a list with one number for each TIME")
-        expected = np.array([np.interp(self.time, times, values) for values in series])
-        return expected, np.maximum(self.tolerances[0], self.tolerances[1] * np.abs(expected))
+def _from_table(
+    data: Settings,
+    component: str,
+    rows: NDArray[np.int64],
+    time: float,
+    tolerances: tuple[float, float],
+    result: Result,
+) -> tuple[Array, Array]:
+    """Return the values at a time in a file of json_output_process, and the allowed differences."""
+    times = data.numbers("TIME")
+    if not times or not times[0] - 1e-9 <= time <= times[-1] + 1e-9:
+        raise ValueError(f"the file has no values at time {time:g} s")
+    nodes = [data.section(f"NODE_{i}", required=True) for i in result.mesh.node_ids[rows]]
+    series = [node.numbers(component) for node in nodes]
+    if any(len(values) != len(times) for values in series):
+        raise ValueError(f"{component} must be a list with one number for each TIME")
+    expected = np.array([np.interp(time, times, values) for values in series])
+    return expected, np.maximum(tolerances[0], tolerances[1] * np.abs(expected))
 
 
 COMPARISONS: dict[str, Callable[[Settings, RunContext], Iterator[Comparison]]] = {

@@ -25,6 +25,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 
 Value = float | str
+Factors = tuple[Value, ...] | None
 IDLE = ("ROTATION", "VELOCITY", "ACCELERATION", "ANGULAR_VELOCITY", "ANGULAR_ACCELERATION", "REACTION")
 """Vector variables that files set although a static solution of solids does not use them."""
 KNOWN_VECTORS = (*VECTORS, *IDLE)
@@ -39,7 +40,7 @@ class Action:
 
     Attributes
     ----------
-    settings : the parameters it came from, for messages.
+    settings : its parameters, for messages.
     rows : node or condition rows.
     component : scalar variable, such as ``DISPLACEMENT_X``.
     factors : the value is their product, each a number or an expression; empty to leave it as it is.
@@ -61,16 +62,8 @@ class Action:
         first = 1 if self.on_conditions or not self.factors else 0
         return [k for k in range(first, len(times)) if times[k] in self.interval]
 
-    def depends_on_place(self) -> bool:
-        """Whether an expression holds the place x, y or z of the moved mesh."""
-        return self.mentions("xyz")
-
-    def depends_on_time(self) -> bool:
-        """Whether an expression holds the time t."""
-        return self.mentions("t")
-
     def mentions(self, names: str) -> bool:
-        """Whether an expression holds one of some names of one letter."""
+        """Return whether an expression uses one of these names of one letter."""
         return any(isinstance(f, str) and re.search(rf"(?<!\w)[{names}](?!\w)", f) for f in self.factors)
 
     def value(self, points: Array, time: float) -> Array | float:
@@ -97,145 +90,119 @@ class Action:
         setter(self.component, self.rows, value)
 
 
-def _value(settings: Settings, value: Any, what: str) -> Value:
-    if isinstance(value, str) or is_number(value):
-        return value if isinstance(value, str) else float(value)
-    raise settings.error(what, f"{what} must be a number or an expression in x, y, z, t; got {shown(value)}")
+def _value(settings: Settings, value: Any, key: str) -> Value:
+    is_formula = isinstance(value, str)
+    expected = f"{key} must be a number or an expression in x, y, z, t; got {shown(value)}"
+    settings.expect(is_formula or is_number(value), key, expected)
+    return value if is_formula else float(value)
 
 
 def _three(settings: Settings, key: str) -> list[Any]:
     value = settings.get(key)
-    if not isinstance(value, list) or len(value) != 3:
-        raise settings.error(key, f"{key} must be a list of three entries; got {shown(value)}")
-    return value
+    fits = isinstance(value, list) and len(value) == 3
+    settings.expect(fits, key, f"{key} must be a list of three entries; got {shown(value)}")
+    return list(value)
 
 
-def _variable(settings: Settings, known: Sequence[str], kind: str) -> str:
-    name = settings.text("variable_name").rsplit(".", 1)[-1]
-    if name not in known:
-        raise settings.error(
-            "variable_name",
-            f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)} "
-            f"Known are {', '.join(known[:5])} …",
-        )
-    return name
+def _vector(settings: Settings) -> list[Factors]:
+    values = _three(settings, "value")
+    return [None if value is None else (_value(settings, value, "value"),) for value in values]
 
 
-def _constrained(settings: Settings) -> list[bool]:
-    """Return ``constrained`` for the three axes; one word stands for all."""
-    value = settings.get("constrained", True)
-    flags = [value] * 3 if isinstance(value, bool) else value
-    if not isinstance(flags, list) or len(flags) != 3 or not all(isinstance(f, bool) for f in flags):
-        raise settings.error(
-            "constrained", f"constrained must be true, false or a list of three of them; got {shown(value)}"
-        )
-    return flags
+def _scalar(settings: Settings) -> list[Factors]:
+    return [(_value(settings, settings.get("value", 0.0), "value"),)]
 
 
-def _rows(settings: Settings, context: RunContext, on_conditions: bool) -> NDArray[np.int64]:
-    part = context.part(settings)
-    return part.conditions if on_conditions else part.nodes
-
-
-def vector_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
-    """Return the actions of assign_vector_variable_process (to nodes or conditions)."""
-    settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
-    name = _variable(settings, KNOWN_VECTORS, "vector")
-    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
-    fixed = [False] * 3 if on_conditions else _constrained(settings)
-    return [
-        Action(
-            settings,
-            rows,
-            f"{name}_{axis}",
-            (_value(settings, value, "value"),),
-            interval,
-            on_conditions,
-            fix,
-        )
-        for axis, value, fix in zip("XYZ", _three(settings, "value"), fixed, strict=True)
-        if value is not None
-    ]
-
-
-def scalar_variable(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
-    """Return the action of assign_scalar_variable_process (to nodes or conditions)."""
-    settings.check_keys([*COMMON, "value", *(["entities"] if on_conditions else ["constrained"])])
-    name = _variable(settings, KNOWN_SCALARS, "scalar")
-    rows = _rows(settings, context, on_conditions)
-    value = _value(settings, settings.get("value", 0.0), "value")
-    fix = not on_conditions and settings.flag("constrained", True)
-    return [Action(settings, rows, name, (value,), interval_of(settings), on_conditions, fix)]
-
-
-def vector_by_direction(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
-    """Return the actions of assign_vector_by_direction_process: modulus × direction.
-
-    A direction of numbers is brought to length 1; one with expressions is taken as it is.
-    """
-    settings.check_keys(
-        [*COMMON, "modulus", "direction", *(["entities"] if on_conditions else ["constrained"])]
-    )
-    name = _variable(settings, KNOWN_VECTORS, "vector")
-    if settings.get("direction") in NORMALS:
-        raise settings.error("direction", "automatic normals are not supported; give three numbers")
+def _by_direction(settings: Settings) -> list[Factors]:
+    """Return modulus × direction; only a direction of numbers is brought to length 1."""
+    is_normal = settings.get("direction") in NORMALS
+    settings.expect(not is_normal, "direction", "automatic normals are not supported; give three numbers")
     direction = [_value(settings, d, "direction") for d in _three(settings, "direction")]
     if not any(isinstance(d, str) for d in direction):
         length = hypot(*map(float, direction))
-        if length < 1e-12:
-            raise settings.error("direction", "direction is zero; give a vector of any other length")
+        settings.expect(length >= 1e-12, "direction", "direction is zero; give a vector of any other length")
         direction = [float(d) / length for d in direction]
     modulus = _value(settings, settings.get("modulus"), "modulus")
-    rows, interval = _rows(settings, context, on_conditions), interval_of(settings)
-    fix = not on_conditions and settings.flag("constrained", True)
-    return [
-        Action(settings, rows, f"{name}_{axis}", (d, modulus), interval, on_conditions, fix)
-        for axis, d in zip("XYZ", direction, strict=True)
-    ]
+    return [(d, modulus) for d in direction]
 
 
-def fix_vector(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
-    """Return the actions of fix_vector_variable_process: hold the values that are there."""
-    settings.check_keys([*COMMON, "constrained"])
-    name = _variable(settings, KNOWN_VECTORS, "vector")
-    rows, interval = _rows(settings, context, False), interval_of(settings)
-    return [
-        Action(settings, rows, f"{name}_{axis}", (), interval, fixed=True)
-        for axis, fix in zip("XYZ", _constrained(settings), strict=True)
-        if fix
-    ]
+def _kept(settings: Settings) -> list[Factors]:
+    return [(), (), ()]
 
 
-def fix_scalar(settings: Settings, context: RunContext, on_conditions: bool) -> list[Action]:
-    """Return the action of fix_scalar_variable_process: hold the value that is there."""
-    settings.check_keys([*COMMON, "constrained"])
-    name = _variable(settings, KNOWN_SCALARS, "scalar")
-    rows, interval = _rows(settings, context, False), interval_of(settings)
-    return (
-        [Action(settings, rows, name, (), interval, fixed=True)] if settings.flag("constrained", True) else []
-    )
+@dataclass(frozen=True)
+class Process:
+    """A kind of process: what it sets, and of what.
+
+    Attributes
+    ----------
+    factors : the factors of each component from the parameters; None leaves the component alone.
+    keys : parameters of its own.
+    on_conditions : it acts on conditions, and fixes nothing.
+    is_vector : it sets three components.
+    """
+
+    factors: Callable[[Settings], list[Factors]]
+    keys: tuple[str, ...] = ("value",)
+    on_conditions: bool = False
+    is_vector: bool = True
 
 
-PROCESSES: dict[str, tuple[Callable[[Settings, RunContext, bool], list[Action]], bool]] = {
-    "assign_vector_variable_process": (vector_variable, False),
-    "assign_scalar_variable_process": (scalar_variable, False),
-    "assign_vector_by_direction_process": (vector_by_direction, False),
-    "fix_vector_variable_process": (fix_vector, False),
-    "fix_scalar_variable_process": (fix_scalar, False),
-    "assign_vector_variable_to_conditions_process": (vector_variable, True),
-    "assign_scalar_variable_to_conditions_process": (scalar_variable, True),
-    "assign_vector_by_direction_to_condition_process": (vector_by_direction, True),
+DIRECTION = ("modulus", "direction")
+PROCESSES = {
+    "assign_vector_variable_process": Process(_vector),
+    "assign_scalar_variable_process": Process(_scalar, is_vector=False),
+    "assign_vector_by_direction_process": Process(_by_direction, DIRECTION),
+    "fix_vector_variable_process": Process(_kept, ()),
+    "fix_scalar_variable_process": Process(_kept, (), is_vector=False),
+    "assign_vector_variable_to_conditions_process": Process(_vector, on_conditions=True),
+    "assign_scalar_variable_to_conditions_process": Process(_scalar, on_conditions=True, is_vector=False),
+    "assign_vector_by_direction_to_condition_process": Process(_by_direction, DIRECTION, on_conditions=True),
 }
-"""Processes that set or fix values, by Kratos' module name; True: they act on conditions."""
+"""Processes that set or fix values, by Kratos' module name."""
 
 
 def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action]:
     """Return what a process of the table `PROCESSES` does."""
-    make, on_conditions = PROCESSES[module]
-    settings = entry.section("Parameters", required=True)
-    if settings.section("local_axes").values:
-        raise settings.error("local_axes", "local_axes are not supported; give the values along x, y, z")
-    return make(settings, context, on_conditions)
+    process, settings = PROCESSES[module], entry.section("Parameters", required=True)
+    refuse_local_axes(settings)
+    settings.check_keys([*COMMON, *process.keys, "entities" if process.on_conditions else "constrained"])
+    name, part = _variable(settings, process), context.part(settings)
+    rows, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
+    names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
+    found = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
+    return [
+        Action(settings, rows, component, factors, interval, process.on_conditions, fix)
+        for component, factors, fix in found
+        if factors or (fix and factors is not None)
+    ]
+
+
+def refuse_local_axes(settings: Settings) -> None:
+    """Raise InputError where the parameters of a process name local axes."""
+    used = settings.section("local_axes").values
+    settings.expect(not used, "local_axes", "local_axes are not supported; give the values along x, y, z")
+
+
+def _variable(settings: Settings, process: Process) -> str:
+    kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
+    name = settings.text("variable_name").rsplit(".", 1)[-1]
+    text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
+    settings.expect(name in known, "variable_name", f"{text} Known are {', '.join(known[:5])} …")
+    return name
+
+
+def _fixed(settings: Settings, process: Process) -> list[bool]:
+    """Return ``constrained`` for each component; one word stands for all."""
+    if process.on_conditions:
+        return [False] * 3
+    value = settings.get("constrained", True)
+    by_axis = process.is_vector and process.keys != DIRECTION
+    flags = value if by_axis and isinstance(value, list) else [value] * 3
+    fits = len(flags) == 3 and all(isinstance(flag, bool) for flag in flags)
+    words = "true, false or a list of three of them" if by_axis else "true or false"
+    settings.expect(fits, "constrained", f"constrained must be {words}; got {shown(value)}")
+    return flags
 
 
 def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
@@ -255,7 +222,7 @@ def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], context: Run
         if not active or not len(action.rows):
             why = "its interval holds no step" if not active else "its part has none to act on"
             notes.append(f"{where}: {action.component} is never set: {why}")
-        elif context.moved and active[-1] > 1 and action.depends_on_place():
+        elif context.moved and active[-1] > 1 and action.mentions("xyz"):
             # Before the first step nothing has moved yet.
             cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
             notes.append(
@@ -298,9 +265,9 @@ def _hold(actions: Sequence[Action], steps: Sequence[list[int]], last: int, valu
 
 def _check_history(action: Action, active: list[int], last: int) -> None:
     """Refuse a support whose value is the solution of an earlier step."""
-    if not action.factors and len(active) < last and action.component.startswith("DISPLACEMENT"):
-        raise action.settings.error(
-            "interval",
-            f"{action.component} is held only from a later step, at the value solved before; "
-            'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value',
-        )
+    is_later = not action.factors and len(active) < last and action.component.startswith("DISPLACEMENT")
+    text = (
+        f"{action.component} is held only from a later step on, at the value solved before; "
+        'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'
+    )
+    action.settings.expect(not is_later, "interval", text)

@@ -155,7 +155,7 @@ class ProcessesInTime:
         for k, later in enumerate(self.actions[i + 1 :], start=i + 1):
             if later.component == action.component and later.factors and self._acts_always(k):
                 rows = np.setdiff1d(rows, later.rows)
-        if not action.depends_on_time() or not len(rows):
+        if not action.mentions("t") or not len(rows):
             return
         if action.mentions("xyzXYZ"):
             raise action.settings.error(
@@ -175,7 +175,7 @@ class ProcessesInTime:
 
     def _is_steady(self, i: int) -> bool:
         """Whether an action does the same in all steps."""
-        return not self.actions[i].depends_on_time() and self._acts_always(i)
+        return not self.actions[i].mentions("t") and self._acts_always(i)
 
 
 def _begun(time: float) -> float:
@@ -200,7 +200,7 @@ class _LoadInTime:
             return None
         p = self.processes
         found = sorted((when, i) for i in self.mine if (when := p.at(i, time)) is not None)
-        key = [(i, when if p.actions[i].depends_on_time() else None) for when, i in found]
+        key = [(i, when if p.actions[i].mentions("t") else None) for when, i in found]
         if key != self.last[0]:
             values = self.base.copy()
             points = places_of(values.mesh)

@@ -1,0 +1,151 @@
+"""AffineBody: one matrix moves the whole body; what rigid and pseudo-rigid bodies share."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.bodies.body import Body
+from kratos_lite.bodies.rotations import check_rotation
+from kratos_lite.bodies.validation import Material, fitting, points_of, vector_of
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+
+class AffineBody(Body):
+    """A body, or many independent ones, that move as x = A (X - X̄) + x̄ with A (..., 3, 3).
+
+    q (..., 12): A in nine numbers, then the mass center x̄ in m.
+    u (..., dofs): the velocity of the mass center in m/s is in the last three.
+
+    Parameters
+    ----------
+    mesh, material, mass_properties, scheme, damping, tolerance : see `Body`.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh | None,
+        material: Material | None,
+        mass_properties: MassProperties,
+        scheme: str | None,
+        tolerance: float,
+        damping: float = 0.0,
+    ) -> None:
+        lead = np.shape(mass_properties.mass)
+        q = np.zeros((*lead, 12))
+        q[..., [0, 4, 8]] = 1.0
+        q[..., 9:] = mass_properties.center
+        self.tolerance = tolerance
+        u = np.zeros((*lead, self.dofs))
+        super().__init__(mesh, material, mass_properties, q, u, scheme, damping)
+
+    @staticmethod
+    @abstractmethod
+    def matrix_of(q: Array) -> Array:
+        """Return A of configurations.
+
+        Parameters
+        ----------
+        q : (..., 12).
+
+        Returns
+        -------
+        (..., 3, 3) float, a view.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def check_matrix(A: Array) -> None:
+        """Check that A is one of this kind of body.
+
+        Parameters
+        ----------
+        A : (..., 3, 3).
+
+        Raises
+        ------
+        InputError
+            It is no rotation, or its determinant is not positive.
+        """
+
+    def position(self, X: ArrayLike, q: Array | None = None) -> Array:
+        """Return x = A (X - X̄) + x̄; see `Body.position`."""
+        q = self.q if q is None else q
+        return self._moved(X, self.matrix_of(q), q[..., 9:])
+
+    def _moved(self, X: ArrayLike, A: Array, translation: Array) -> Array:
+        """Return A (X - X̄) + translation, (..., m, 3) or (..., 3)."""
+        points = points_of(X)
+        arms = np.atleast_2d(points) - self.center[..., None, :]
+        x = arms @ np.swapaxes(A, -1, -2) + translation[..., None, :]
+        return np.asarray(x if points.ndim == 2 else x[..., 0, :])
+
+    def set_configuration(self, q: ArrayLike) -> None:
+        """Set the configuration (..., 12); see `Body.set_configuration`.
+
+        Raises
+        ------
+        InputError
+            The shape is wrong, or A is none of this kind.
+        """
+        q = finite(q, "a configuration")
+        if q.shape != self.q.shape:
+            raise InputError(f"a configuration of this body has shape {self.q.shape}; got {q.shape}")
+        self.check_matrix(self.matrix_of(q))
+        self.q[...] = q
+
+    def rotate(self, rotation: ArrayLike) -> None:
+        """Set A to a rotation Λ (3, 3) or (..., 3, 3); see `Body.rotate`."""
+        self.matrix_of(self.q)[...] = fitting(check_rotation(rotation), self.q.shape[:-1], 2, "a rotation")
+
+    def _rigid_velocity(self, linear: ArrayLike, angular: ArrayLike) -> Array:
+        """Set the velocity of the mass center; return the spatial angular velocity, both checked."""
+        lead = self.q.shape[:-1]
+        w = fitting(vector_of(angular, "an angular velocity"), lead, 1, "an angular velocity")
+        self.u[..., -3:] = fitting(vector_of(linear, "a velocity"), lead, 1, "a velocity")
+        return w
+
+    def translation(self, v: Array) -> Array:
+        """Return v as the velocity of the mass center; see `Body.translation`."""
+        out = np.zeros_like(self.u)
+        out[..., -3:] = v
+        return out
+
+    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return A times the vector; see `Body.convected`."""
+        return np.asarray(self.matrix_of(q) @ vector)
+
+    def mass_center(self) -> Array:
+        """Return x̄ (..., 3) in m."""
+        return self.q[..., 9:].copy()
+
+    def gravity_potential(self, g: Array, q: Array) -> Array:
+        """Return -m g · x̄, (...) in J."""
+        return np.asarray(-self.mass * (q[..., 9:] @ g))
+
+    def linear_momentum(self) -> Array:
+        """Return m v̄ (..., 3) in kg m/s."""
+        return np.asarray(self.mass[..., None] * self.u[..., -3:])
+
+    def angular_momentum(self, about: ArrayLike | None = None) -> Array:
+        """Return the spin and the moment of the linear momentum, (..., 3) in kg m²/s; see `Body`."""
+        spin = self.spin()
+        if about is None:
+            return spin
+        arm = self.q[..., 9:] - vector_of(about, "a point")
+        return np.asarray(spin + np.cross(arm, self.linear_momentum()))
+
+    @abstractmethod
+    def spin(self) -> Array:
+        """Return the angular momentum about the mass center.
+
+        Returns
+        -------
+        (..., 3) float, kg m²/s.
+        """

@@ -1,0 +1,68 @@
+"""One Newton step towards equilibrium: K x = residual + H^T multipliers with H x = -gap."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite import solvers
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.bodies.linear_algebra import Entries
+from kratos_lite.solvers.supports import ConstraintMap
+from kratos_lite.typing import Array, Ints
+
+
+def dense_step(K: Array, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+    """Return x (n,) and multipliers (c,) for a full matrix K (k, k), k ≤ n, that leaves the rest free.
+
+    Least squares: a body that loads do not move needs no support, and redundant supports share their load.
+    """
+    n, c, k = len(residual), len(gap), len(K)
+    row, dof, value = entries
+    A = np.zeros((n + c, n + c))
+    A[:k, :k] = K
+    A[n + row, dof], A[dof, n + row] = value, value
+    size = np.abs(K).max()
+    scale = np.concatenate([np.full(n, size**-0.5), np.full(c, size**0.5)])
+    b = np.concatenate([residual, -gap])
+    x = scale * np.linalg.lstsq(scale[:, None] * A * scale, scale * b, rcond=1e-12)[0]
+    return x[:n], -x[n:]
+
+
+def sparse_step(
+    K: BlockMatrix, points: Array, residual: Array, entries: Entries, gap: Array
+) -> tuple[Array, Array]:
+    """Return x (3n,) and multipliers (c,) for a matrix K (3n, 3n) on points (n, 3)."""
+    row, dof, value = entries
+    if len(row) == len(gap) and len(set(row.tolist())) == len(row):  # each row prescribes one displacement
+        return _eliminated(K, points, residual, dof, value, gap)
+    return _with_multipliers(K, residual, entries, gap)
+
+
+def _eliminated(
+    K: BlockMatrix, points: Array, residual: Array, dof: Ints, value: Array, gap: Array
+) -> tuple[Array, Array]:
+    n = len(residual)
+    prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
+    prescribed[dof], free[dof] = -gap / value, False
+    constraints = ConstraintMap(np.flatnonzero(free), prescribed)
+    method, reason = solvers.choose("auto", len(constraints.free), n)
+    matrix: Any = K if method != "dense" else K.scipy().toarray()
+    x = solvers.LinearSolver(matrix, constraints, points, method, reason).solve(residual, 1e-12).x
+    reaction = (K @ x - residual)[dof] / value
+    twice = np.bincount(dof, minlength=n)[dof]
+    return x, np.asarray(reaction / twice)
+
+
+def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+    from scipy.sparse import block_array, csr_array, eye_array
+
+    n, c = len(residual), len(gap)
+    row, dof, value = entries
+    size = K.norm()
+    H = csr_array((value, (row, dof)), shape=(c, n)) * size
+    soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
+    A = block_array([[K.scipy(), H.T], [H, soft]], format="csr") if c else K.scipy().tocsr()
+    x = solvers.direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
+    return x[:n], -x[n:] * size
