@@ -83,7 +83,13 @@ class Outputs:
     mode: str | None = None
 
     def paths(self) -> list[str]:
-        """Return all files, in the order of this list."""
+        """Return all files.
+
+        Returns
+        -------
+        list of str
+            Results, json, picture, state.
+        """
         single = (self.json, self.picture, self.state)
         return [*self.results, *(path for path in single if path is not None)]
 
@@ -117,7 +123,7 @@ class Case:
 
     @property
     def analysis(self) -> str:
-        """Return the analysis: ``static``, ``steady``, ``transient``, ``modal`` or ``bodies``."""
+        """The analysis: ``static``, ``steady``, ``transient``, ``modal`` or ``bodies``."""
         if not self.is_of_model:
             return "bodies"
         if self.modes:
@@ -128,19 +134,31 @@ class Case:
 
     @property
     def is_of_model(self) -> bool:
-        """Return whether the subject is a model, not a body."""
+        """Whether the subject is a model, not a body."""
         return hasattr(self.subject, "supports")
 
     @property
     def model(self) -> Model:
-        """Return the model; ModelError where there is none."""
+        """The model.
+
+        Raises
+        ------
+        ModelError
+            The subject is a body.
+        """
         if not self.is_of_model:
             raise ModelError("this is a case of bodies; it has no model")
         return self.subject  # type: ignore[return-value]
 
     @property
     def body(self) -> Body:
-        """Return the body; ModelError where there is none."""
+        """The body.
+
+        Raises
+        ------
+        ModelError
+            The subject is a model.
+        """
         if self.is_of_model:
             raise ModelError("this is a case of a model; it has no body")
         return self.subject  # type: ignore[return-value]

@@ -526,21 +526,17 @@ def test_a_run_file_overwrites_nothing_that_is_read_and_names_no_useless_format(
 def test_no_file_that_is_read_is_overwritten(run, box):
     kl.write("set.elem", held(box))
     Path("run.json").write_text('{"model": "box.vtu"}')
-    Path("of_set.json").write_text('{"model": "set"}')
-    Path("kratos.json").write_text(
-        '{"solver_settings": {"model_import_settings": {"input_filename": "box"},'
-        ' "material_import_settings": {"materials_filename": "mat.json"}}}'
-    )
-    Path("mat.json").write_text("{}")
+    Path("of_set.json").write_text('{"model": "set.elem"}')
+    shutil.copytree(EXAMPLES / "cantilever", ".", dirs_exist_ok=True)
     before = fingerprints()
     for words in (
         ("convert", "set.elem", "set.node"),
         ("convert", "set", "set.init"),
         ("convert", "set.cond", "./set.elem"),
         ("convert", "of_set.json", "set.prop"),
-        ("convert", "kratos.json", "box.mdpa"),
+        ("convert", "ProjectParameters.json", "cantilever.mdpa"),
         ("solve", "run.json", "-o", "box.vtu"),
-        ("solve", "kratos.json", "--json", "mat.json"),
+        ("solve", "ProjectParameters.json", "--json", "StructuralMaterials.json"),
     ):
         assert run(*words).refuses("is an input or another output")
         assert fingerprints() == before
@@ -600,7 +596,7 @@ def test_a_file_that_fails_loses_no_summary(run, box, monkeypatch):
 
 
 def test_a_terminal_that_fails_loses_no_file(box, monkeypatch):
-    def closed(*_):
+    def closed(*_, **__):
         raise BrokenPipeError
 
     monkeypatch.setattr(kl.Outcome, "summary", closed)
