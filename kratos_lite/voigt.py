@@ -37,7 +37,7 @@ def acoustic_tensor(C: Array, direction: Array) -> Array:
     """
     gradients = np.eye(3)[:, :, None] * np.asarray(direction)  # of unit displacements along x, y, z
     strain = symmetric_gradient(gradients)
-    return np.asarray(strain @ C @ strain.T)
+    return strain @ C @ strain.T
 
 
 def von_mises(stress: ArrayLike) -> Array:
@@ -48,7 +48,7 @@ def von_mises(stress: ArrayLike) -> Array:
     """
     xx, yy, zz, xy, yz, zx = np.moveaxis(np.asarray(stress, dtype=float), -1, 0)
     normal = ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2
-    return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
+    return np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2))
 
 
 def symmetric_gradient(gradient: Array) -> Array:

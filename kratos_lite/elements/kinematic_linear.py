@@ -69,7 +69,7 @@ def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
 def determinant(J: Array) -> Array:
     """Return det of (..., 3, 3)."""
     a, b, c = np.moveaxis(J, -1, 0)
-    return np.asarray((a * np.cross(b, c)).sum(axis=-1))
+    return (a * np.cross(b, c)).sum(axis=-1)
 
 
 def cofactors(J: Array) -> Array:
@@ -163,7 +163,7 @@ class KinematicLinear:
     def dNdX(self, xi: ArrayLike) -> Array:
         """Return dN_a/dX_i at one point xi (3,) as (..., n, 3) in 1/m."""
         J = self.J(xi)
-        return np.asarray(self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None]))
+        return self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None])
 
     def B(self, xi: ArrayLike) -> Array:
         """Return the B-operator at one point xi (3,): strain = B u, as (..., 6, 3n) in 1/m."""
@@ -176,7 +176,7 @@ class KinematicLinear:
 
     def position(self, xi: ArrayLike) -> Array:
         """Return the point X(xi) of one point xi (3,) as (..., 3) in m."""
-        return np.asarray(self.N(xi) @ self.X)
+        return self.N(xi) @ self.X
 
     # ---- geometry at the Gauss points, made once per instance --------------------------------
 
@@ -200,7 +200,7 @@ class KinematicLinear:
 
     def volume(self) -> Array:
         """Return the volume as (...) in m³."""
-        return np.asarray(self.dV.sum(axis=-1))
+        return self.dV.sum(axis=-1)
 
     def gauss_points(self) -> Array:
         """Return the Gauss points X as (..., g, 3) in m."""
@@ -217,13 +217,13 @@ class KinematicLinear:
     def stress(self, C: ArrayLike, u: ArrayLike) -> Array:
         """Return σ = C ε at the Gauss points, (..., g, 6) in Pa; C (6, 6) or (..., 6, 6) in Pa."""
         C = np.asarray(C, dtype=float)
-        return np.asarray(self.strain(u) @ np.swapaxes(C, -1, -2))
+        return self.strain(u) @ np.swapaxes(C, -1, -2)
 
     def internal_load(self, stress: ArrayLike) -> Array:
         """Return r_int = Σ B^T σ γ det J as (..., n, 3) in N, of the stress (..., g, 6) in Pa."""
         dV, D = self._gauss
         s = voigt.tensor(stress) * dV[..., None, None]
-        return np.asarray((np.swapaxes(D, -1, -2) @ s).sum(axis=-3))
+        return (np.swapaxes(D, -1, -2) @ s).sum(axis=-3)
 
     def body_force(self, b: ArrayLike) -> Array:
         """Return r_ext = Σ N b γ det J as (..., n, 3) in N.
@@ -233,9 +233,9 @@ class KinematicLinear:
         """
         b = np.asarray(b, dtype=float)
         if b.ndim == self.X.ndim and b.shape[-2:] == self.nodes.shape:
-            return np.asarray(self.scalar_mass() @ b)
+            return self.scalar_mass() @ b
         share = self.dV @ tabulate(self.shape, self.rule)[0]
-        return np.asarray(share[..., :, None] * b[..., None, :])
+        return share[..., :, None] * b[..., None, :]
 
     def stiffness(self, C: ArrayLike) -> Array:
         """Return K = Σ B^T C B γ det J as (..., 3n, 3n) in N/m; C (6, 6) or (..., 6, 6) in Pa."""
@@ -263,7 +263,7 @@ class KinematicLinear:
             trace = lame[1] * (P[..., 0, :, 0, :] + P[..., 1, :, 1, :] + P[..., 2, :, 2, :])
             for i in range(3):
                 K[..., i, :, i, :] += trace
-            return np.asarray(K)
+            return K
         B = np.zeros((*D.shape[:-2], 6, 3, n))
         for row, (i, j) in enumerate(voigt.PAIRS):
             B[..., row, i, :] = D[..., j, :]
@@ -273,7 +273,7 @@ class KinematicLinear:
         K = np.swapaxes(B.reshape(*B.shape[:-3], 6 * g, 3 * n), -1, -2) @ CB.reshape(
             *B.shape[:-3], 6 * g, 3 * n
         )
-        return np.asarray(K.reshape(*K.shape[:-2], 3, n, 3, n))
+        return K.reshape(*K.shape[:-2], 3, n, 3, n)
 
     def _affine_stiffness(self, C: Array) -> Array:
         """Return K (..., 3, n, 3, n) of elements with one J each, by the products of the reference cell.
@@ -318,14 +318,14 @@ class KinematicLinear:
         """Return Σ ρ N N^T γ det J as (..., n, n) in kg: the mass matrix of one axis."""
         N, dN = tabulate(self.shape, self.mass_rule)
         dV = determinant(self._jacobian(dN)) * self.mass_rule.weights * np.asarray(density)[..., None]
-        return np.asarray((N.T * dV[..., None, :]) @ N)
+        return (N.T * dV[..., None, :]) @ N
 
     def mass(self, density: ArrayLike) -> Array:
         """Return the consistent mass matrix as (..., 3n, 3n) in kg; density (...) in kg/m³."""
         m = self.scalar_mass(density)
         n = len(self.nodes)
         M = m[..., :, None, :, None] * np.eye(3)[:, None, :]
-        return np.asarray(M.reshape(*m.shape[:-2], 3 * n, 3 * n))
+        return M.reshape(*m.shape[:-2], 3 * n, 3 * n)
 
     def lumped_mass(self, density: ArrayLike) -> Array:
         """Return the mass of each node as (..., n) in kg; always positive, sums to the mass.
@@ -337,8 +337,8 @@ class KinematicLinear:
         sums, diagonal = m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1)
         scaled = diagonal * (sums.sum(axis=-1) / diagonal.sum(axis=-1))[..., None]
         if not has_positive_row_sums(self.shape, self.mass_rule):
-            return np.asarray(scaled)
-        return np.asarray(np.where((sums > 0).all(axis=-1)[..., None], sums, scaled))
+            return scaled
+        return np.where((sums > 0).all(axis=-1)[..., None], sums, scaled)
 
 
 def lame_constants(C: Array) -> tuple[float, float] | None:

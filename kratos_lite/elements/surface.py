@@ -57,8 +57,8 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
     else:
         measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
     if t.ndim == X.ndim and t.shape[-2:] == (len(shape.nodes), 3):
-        return np.asarray((N.T * measure[..., None, :]) @ (N @ t))
-    return np.asarray((measure @ N)[..., :, None] * t[..., None, :])
+        return (N.T * measure[..., None, :]) @ (N @ t)
+    return (measure @ N)[..., :, None] * t[..., None, :]
 
 
 def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
@@ -66,7 +66,7 @@ def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
     rule = face_rule(shape)
     N, _ = tabulate(shape, rule)
     measure = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
-    return np.asarray((N.T * measure[..., None, :]) @ N)
+    return (N.T * measure[..., None, :]) @ N
 
 
 def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
@@ -85,4 +85,4 @@ def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> A
         at_points = (p @ N.T)[..., None]
     else:
         at_points = p[..., None, None]
-    return np.asarray(-N.T @ (area_vectors(shape, X, rule) * at_points))
+    return -N.T @ (area_vectors(shape, X, rule) * at_points)

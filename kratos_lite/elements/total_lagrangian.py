@@ -87,7 +87,7 @@ def internal_load(element: KinematicLinear, at: Motion) -> Array:
     """Return ∫ P grad N dV as (..., n, 3) in N."""
     dV, D = element._gauss
     S = voigt.tensor(at.S) * dV[..., None, None]
-    return np.asarray((np.swapaxes(D, -1, -2) @ (S @ np.swapaxes(at.F, -1, -2))).sum(axis=-3))
+    return (np.swapaxes(D, -1, -2) @ (S @ np.swapaxes(at.F, -1, -2))).sum(axis=-3)
 
 
 def stiffness_by_axis(element: KinematicLinear, C: Array, at: Motion) -> Array:
@@ -108,7 +108,7 @@ def stiffness_by_axis(element: KinematicLinear, C: Array, at: Motion) -> Array:
     initial = (np.swapaxes(D, -1, -2) @ S @ D).sum(axis=-3)
     for i in range(3):
         K[..., i, :, i, :] += initial
-    return np.asarray(K)
+    return K
 
 
 def _variation(F: Array, D: Array) -> Array:
@@ -126,4 +126,4 @@ def strain_energy(element: KinematicLinear, C: Array, q: Array, prestress: Array
     """Return ∫ (½ E:C:E + S0:E) dV as (...) in J."""
     E = green_strain(element, q)
     density = (E * (E @ C.T / 2 + prestress)).sum(axis=-1)
-    return np.asarray((density * element.dV).sum(axis=-1))
+    return (density * element.dV).sum(axis=-1)

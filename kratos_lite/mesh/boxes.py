@@ -41,7 +41,7 @@ def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
 def _deviations(shape: type[Shape], X: Array) -> Array:
     """Return how far the nodes beyond the corners of X (m, n, 3) lie off the straight cell, (m, n - c, 3)."""
     straight = LINEAR[shape.cell].N(shape.nodes[shape.corners :]) @ X[:, : shape.corners]
-    return np.asarray(X[:, shape.corners :] - straight)
+    return X[:, shape.corners :] - straight
 
 
 def curvature(shape: type[Shape], X: Array) -> Array:
@@ -54,7 +54,7 @@ def curvature(shape: type[Shape], X: Array) -> Array:
     corners, edge = shape.nodes[: shape.corners], 2.0 if shape.cell == "hexahedron" else 1.0
     J = np.swapaxes(X[:, : shape.corners], 1, 2) @ LINEAR[shape.cell].dN(corners.mean(axis=0))
     there = np.linalg.pinv(J) @ np.swapaxes(_deviations(shape, X), 1, 2)
-    return np.asarray(np.abs(there).max(axis=(1, 2)) / edge)
+    return np.abs(there).max(axis=(1, 2)) / edge
 
 
 class BoxTree:

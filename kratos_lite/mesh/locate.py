@@ -57,7 +57,7 @@ class Located:
     @property
     def inside(self) -> Mask:
         """Whether each point lies in the mesh, (...)."""
-        return np.asarray(self.rows >= 0)
+        return self.rows >= 0
 
     def __getitem__(self, chosen: Any) -> Located:
         """Return some of the points: by number, rows or a mask such as `inside`."""
@@ -182,7 +182,7 @@ class _Search:
 
     def block_of(self, rows: Ints) -> Ints:
         """Return the number of the block of each element row."""
-        return np.asarray(np.searchsorted(self.starts, rows, side="right") - 1)
+        return np.searchsorted(self.starts, rows, side="right") - 1
 
     def find(self, x: Array) -> tuple[Ints, Array]:
         """Return element rows (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
@@ -218,7 +218,7 @@ class _Search:
 
     def _nodes(self, number: int, rows: Ints) -> Array:
         """Return the nodes (m, k, 3) of elements of a block."""
-        return np.asarray(self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]])
+        return self.mesh.points[self.mesh.blocks[number].nodes[rows - self.starts[number]]]
 
     def _retry(self, x: Array, at: Ints, rows: Ints, found: Ints, xi: Array) -> None:
         """Try strongly curved cells again from elsewhere; from the middle Newton may reach another xi."""
@@ -257,4 +257,4 @@ class _Search:
 def _starts(shape: type[Shape]) -> Array:
     """Return points (k, 3) on the way from the centroid to each node."""
     middle = shape.nodes[: shape.corners].mean(axis=0)
-    return np.asarray(middle + 0.8 * (shape.nodes - middle))
+    return middle + 0.8 * (shape.nodes - middle)

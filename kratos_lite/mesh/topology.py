@@ -68,7 +68,7 @@ def components(n: int, pairs: Ints) -> Ints:
     """
     compiled = kernels("mesh")
     if compiled is not None:
-        return np.asarray(compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64)))
+        return compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64))
     labels = np.arange(n)
     while True:
         before = labels.copy()
@@ -186,7 +186,7 @@ def mirror(shape: type[Shape]) -> Ints:
     """
     swapped = shape.nodes[:, [1, 0, 2]]
     distance = np.abs(swapped[:, None, :] - shape.nodes[None, :, :]).max(axis=2)
-    return np.asarray(distance.argmin(axis=1))
+    return distance.argmin(axis=1)
 
 
 def inverted(block: Block, points: Array) -> Mask:
@@ -195,4 +195,4 @@ def inverted(block: Block, points: Array) -> Mask:
         return np.zeros(len(block), dtype=bool)
     center = block.shape.nodes[: block.shape.corners].mean(axis=0)
     J = np.swapaxes(points[block.nodes], 1, 2) @ block.shape.dN(center)
-    return np.asarray(np.linalg.det(J) < 0)
+    return np.linalg.det(J) < 0

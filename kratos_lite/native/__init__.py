@@ -25,14 +25,28 @@ from kratos_lite.errors import InputError
 
 @cache
 def kernels(name: str) -> Any:
-    """Return the compiled module of a name, or None if it is not there or not wanted."""
+    """Return a compiled module.
+
+    Parameters
+    ----------
+    name : of the module, without the underscore.
+
+    Returns
+    -------
+    The module, or None if it is not there or not wanted.
+
+    Raises
+    ------
+    InputError
+        An environment variable has an unknown value.
+    """
     if _chosen("KRATOS_LITE_KERNELS", "numpy", "compiled") == "numpy":
         return None
     _chosen("KRATOS_LITE_ISA", "base", "avx2", "avx512")
     try:
         module = import_module(f"kratos_lite.native._{name}")
     except ImportError as error:
-        _say_once(str(error))
+        _warn_once(str(error))
         return None
     module.set_threads(threads())
     return module
@@ -47,16 +61,16 @@ def _chosen(variable: str, *known: str) -> str:
 
 
 @cache
-def _said() -> list[str]:
-    """Return what was said so far about missing kernels."""
+def _warnings() -> list[str]:
+    """Return the warnings about missing kernels so far."""
     return []
 
 
-def _say_once(why: str) -> None:
+def _warn_once(why: str) -> None:
     """Warn of the first kernel that is missing; the others are missing for the same reason."""
-    if _said():
+    if _warnings():
         return
-    _said().append(why)
+    _warnings().append(why)
     import logging
 
     log = logging.getLogger("kratos_lite")
@@ -64,7 +78,13 @@ def _say_once(why: str) -> None:
 
 
 def threads() -> int:
-    """Return the number of threads that kernels use."""
+    """Return the number of threads that kernels use.
+
+    Raises
+    ------
+    InputError
+        KRATOS_LITE_THREADS is no positive whole number.
+    """
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     wanted = os.environ.get("KRATOS_LITE_THREADS", "")
@@ -76,7 +96,7 @@ def threads() -> int:
 
 
 def described() -> str:
-    """Return in a few words what computes: the instruction set and the threads, or NumPy."""
+    """Return what computes, in a few words: the instruction set and the threads, or NumPy."""
     module = kernels("sparse")
     if module is None:
         return "NumPy"

@@ -38,7 +38,7 @@ inline std::pair<double, double> extent(const Graph& g, const double* X, int64_t
 }
 
 // Of some nodes of the whole mesh, have a few both near and far ones?
-inline bool looks_stretched(const Graph& g, const double* X) {
+inline bool is_stretched(const Graph& g, const double* X) {
     const int64_t step = std::max<int64_t>(1, g.rows / SAMPLE);
     int64_t seen = 0, stretched = 0;
     for (int64_t i = 0; i < g.rows; i += step, ++seen) {
@@ -82,7 +82,7 @@ public:
         members_of(of, found, starts, members);
         Ints position(g.rows);
         over(1024, [&](int64_t first, int64_t last) {
-            for (int64_t c = first; c < last; ++c) arrange(g, c, position);
+            for (int64_t c = first; c < last; ++c) reorder(g, c, position);
         });
     }
 
@@ -145,20 +145,20 @@ private:
         return left;
     }
 
-    // Take the order of a cluster's nodes that a search in breadth gives, if it is better than theirs.
-    void arrange(const Graph& g, int64_t c, Ints& position) {
+    // Take the order of a cluster's nodes that a breadth-first search gives, if it is better than theirs.
+    void reorder(const Graph& g, int64_t c, Ints& position) {
         const int32_t start = starts[c], size = starts[c + 1] - start;
         if (size < 3) return;
         const int64_t before = envelope(g, c, position);
-        const Ints given(members.begin() + start, members.begin() + start + size);
-        const Ints there = breadth(g, c, given[0], position);
-        Ints found = breadth(g, c, there.back(), position);  // from one end to the other
+        const Ints original(members.begin() + start, members.begin() + start + size);
+        const Ints outwards = breadth_first(g, c, original[0], position);
+        Ints found = breadth_first(g, c, outwards.back(), position);  // from one end to the other
         std::copy(found.rbegin(), found.rend(), members.begin() + start);
-        if (envelope(g, c, position) >= before) std::copy(given.begin(), given.end(), members.begin() + start);
+        if (envelope(g, c, position) >= before) std::copy(original.begin(), original.end(), members.begin() + start);
     }
 
     // Nodes of cluster c from one of them outwards; those without links to it come last.
-    Ints breadth(const Graph& g, int64_t c, int32_t from, Ints& position) const {
+    Ints breadth_first(const Graph& g, int64_t c, int32_t from, Ints& position) const {
         const Ints all(members.begin() + starts[c], members.begin() + starts[c + 1]);
         for (int32_t i : all) position[i] = -1;
         Ints found;
@@ -251,18 +251,18 @@ inline Lengths lengths(const Graph& g, const double* X) {
 // The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
 // clusters that a gap sets apart from the links between them, and that are cheap to factorize.
 inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta) {
-    if (!looks_stretched(g, X)) return {};
+    if (!is_stretched(g, X)) return {};
     const Lengths links = lengths(g, X);
     Ints label(g.rows);
-    int64_t apart = 0;
+    int64_t clustered = 0;
     for (int32_t i = 0; i < g.rows; ++i) {
         const int32_t c = links.label[i];
         const bool gap = links.size[c] > 1 && links.far[c] >= links.size[c] &&
                          links.between[c] <= BETWEEN * links.far[c];
         label[i] = gap ? c : i;
-        apart += gap;
+        clustered += gap;
     }
-    if (2 * apart < g.rows) return {};
+    if (2 * clustered < g.rows) return {};
     Clusters found;
     found.collect(g, label);
     Ints position(g.rows);

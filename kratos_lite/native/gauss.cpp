@@ -73,7 +73,8 @@ PYBIND11_MODULE(_gauss, m) {
     geometry("volumes", [](const Elements& w) { return per_element(volumes, w, {w.last, w.g}); }, "γ det J (m, g)");
     weighted("shares", [](const Elements& w) { return scattered<1>(row_sums, w); }, "∫ N dV of each node, (n, 1)");
     weighted("mass_sums", mass_sums, "row sums and diagonal of ∫ N N dV, each (m, k)");
-    strains("stress", [](const Elements& w) { return per_element(stress, w, {w.last, w.g, 6}); }, "C ε + σ0 (m, g, 6)");
+    strains("stress", [](const Elements& w) { return per_element(stress, w, {w.last, w.g, 6}); },
+            "C ε + σ0 (m, g, 6)");
     strains("internal_load", [](const Elements& w) { return scattered<3>(internal_load, w); },
             "∫ B^T (C ε + σ0) dV, (n, 3)");
     strains("totals", energy_and_stress, "½ ∫ ε C ε dV, largest von Mises stress, its element");

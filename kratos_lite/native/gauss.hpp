@@ -42,7 +42,7 @@ struct Elements {
     const double* weights;    // (g)
     const double* field;      // (n, 3) displacement or force per volume, or null
     const double* increment;  // (n, 3) of the displacement in a step, or null
-    double damping;           // share of the increment of stress that is added to the mean stress
+    double damping;           // fraction of the stress increment that is added to the mean stress
     Law law;
     const double* prestress;  // (m, 6) or null
     const double* to_nodes;   // (k, g) extrapolation

@@ -24,8 +24,8 @@ void add(Numbers points, Indices nodes, Numbers N, Numbers dN, Numbers weights, 
               optional(G, indices), optional(H, indices), {}};
     require(has_shape(velocity, 3, 4), "velocity must be (3, 4)");
     const Graph graph = pattern(indptr, indices, w.n);
-    w.wide.assign(static_cast<int64_t>(w.g) * w.wide_k(), 0.0);
-    for (int q = 0; q < w.g; ++q) std::copy_n(w.N + q * w.k, w.k, w.wide.data() + q * w.wide_k());
+    w.N_padded.assign(static_cast<int64_t>(w.g) * w.padded_k(), 0.0);
+    for (int q = 0; q < w.g; ++q) std::copy_n(w.N + q * w.k, w.k, w.N_padded.data() + q * w.padded_k());
     py::gil_scoped_release release;
     const int V = vector_width();
     for_chunks({w.nodes, w.last, w.k}, graph, V, w.size(V), [&](const Chunk& chunk) {

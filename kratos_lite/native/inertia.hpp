@@ -20,14 +20,14 @@ constexpr int TILE_ROWS = 2, TILE_COLUMNS = 4;  // eight sums at a time keep the
 
 // Elements, their flow, and what is asked for.
 struct Inertia : Elements {
-    const double* velocity;    // (3, 4): A and b
-    double *M, *G, *H;         // data of a matrix, or null where it is not asked for
-    std::vector<double> wide;  // N (g, wide_k), padded with zeros
+    const double* velocity;        // (3, 4): A and b
+    double *M, *G, *H;             // data of a matrix, or null where it is not asked for
+    std::vector<double> N_padded;  // (g, padded_k), zeros behind N
 
-    int wide_k() const { return (k + TILE_COLUMNS - 1) / TILE_COLUMNS * TILE_COLUMNS; }
+    int padded_k() const { return (k + TILE_COLUMNS - 1) / TILE_COLUMNS * TILE_COLUMNS; }
     bool flows() const { return G || H; }
     // Numbers that one chunk needs: coordinates, velocities, volumes, c·grad N, and weighted rows of a tile.
-    int64_t size(int V) const { return V * (6 * k + static_cast<int64_t>(g) * (1 + wide_k() + TILE_ROWS)); }
+    int64_t size(int V) const { return V * (6 * k + static_cast<int64_t>(g) * (1 + padded_k() + TILE_ROWS)); }
 };
 
 // Coordinates from the first node of each element on, and the velocity at its nodes.
@@ -42,10 +42,10 @@ KL_INLINE void gather_flow(const Inertia& w, int64_t e, vec<double, V>* X, vec<d
     shift_to_first_node<V>(X, w.k);
 }
 
-// ρ dV and c·grad N (wide_k) at one Gauss point.
+// ρ dV and c·grad N (padded_k) at one Gauss point.
 template <int V>
 KL_INLINE void inertia_at(const Inertia& w, const vec<double, V>* X, const vec<double, V>* c, int q,
-                          vec<double, V>& dV, vec<double, V>* along) {
+                          vec<double, V>& dV, vec<double, V>* convective) {
     typedef vec<double, V> Vec;
     Vec cofactors[3][3], det;
     jacobian<V>(w, X, q, cofactors, det);
@@ -58,8 +58,8 @@ KL_INLINE void inertia_at(const Inertia& w, const vec<double, V>* X, const vec<d
     const Vec scale = 1.0 / det;
     for (int j = 0; j < 3; ++j)
         r[j] = scale * (cofactors[j][0] * flow[0] + cofactors[j][1] * flow[1] + cofactors[j][2] * flow[2]);
-    for (int a = 0; a < w.k; ++a) along[a] = dN[3 * a] * r[0] + dN[3 * a + 1] * r[1] + dN[3 * a + 2] * r[2];
-    for (int a = w.k; a < w.wide_k(); ++a) along[a] = Vec{};
+    for (int a = 0; a < w.k; ++a) convective[a] = dN[3 * a] * r[0] + dN[3 * a + 1] * r[1] + dN[3 * a + 2] * r[2];
+    for (int a = w.k; a < w.padded_k(); ++a) convective[a] = Vec{};
 }
 
 template <int V>
@@ -75,9 +75,9 @@ KL_INLINE void add_value(const Inertia& w, const Chunk& chunk, int a, int b, con
 template <int V, class Column>
 KL_INLINE void add_tile(const Inertia& w, const Chunk& chunk, const vec<double, V>* rows,
                         const Column* columns, int a0, int b0, bool symmetric, double* data) {
-    const int k = w.k, wide = w.wide_k();
+    const int k = w.k, padded = w.padded_k();
     vec<double, V> sum[TILE_ROWS][TILE_COLUMNS] = {};
-    for (int q = 0; q < w.g; ++q, rows += TILE_ROWS, columns += wide)
+    for (int q = 0; q < w.g; ++q, rows += TILE_ROWS, columns += padded)
         for (int i = 0; i < TILE_ROWS; ++i)
             for (int j = 0; j < TILE_COLUMNS; ++j) sum[i][j] += rows[i] * columns[b0 + j];
     for (int i = 0; i < TILE_ROWS; ++i)
@@ -102,24 +102,24 @@ template <int V, class Column>
 KL_INLINE void weigh(const Inertia& w, const vec<double, V>* dV, const Column* columns, int a0,
                      vec<double, V>* rows) {
     for (int q = 0; q < w.g; ++q)
-        for (int i = 0; i < TILE_ROWS; ++i) rows[TILE_ROWS * q + i] = dV[q] * columns[q * w.wide_k() + a0 + i];
+        for (int i = 0; i < TILE_ROWS; ++i) rows[TILE_ROWS * q + i] = dV[q] * columns[q * w.padded_k() + a0 + i];
 }
 
 template <int V>
 KL_INLINE void add_inertia(const Inertia& w, const Chunk& chunk) {
     typedef vec<double, V> Vec;
     Vec* X = reinterpret_cast<Vec*>(chunk.work);
-    Vec *c = X + 3 * w.k, *dV = c + 3 * w.k, *rows = dV + w.g, *along = rows + TILE_ROWS * w.g;
+    Vec *c = X + 3 * w.k, *dV = c + 3 * w.k, *rows = dV + w.g, *convective = rows + TILE_ROWS * w.g;
     gather_flow<V>(w, chunk.first, X, c);
-    for (int q = 0; q < w.g; ++q) inertia_at<V>(w, X, c, q, dV[q], along + q * w.wide_k());
-    const double* N = w.wide.data();
+    for (int q = 0; q < w.g; ++q) inertia_at<V>(w, X, c, q, dV[q], convective + q * w.padded_k());
+    const double* N = w.N_padded.data();
     for (int a0 = 0; a0 < w.k; a0 += TILE_ROWS) {
         if (w.M || w.G) weigh<V>(w, dV, N, a0, rows);
         if (w.M) add_rows<V>(w, chunk, rows, N, a0, true, w.M);
-        if (w.G) add_rows<V>(w, chunk, rows, along, a0, false, w.G);
+        if (w.G) add_rows<V>(w, chunk, rows, convective, a0, false, w.G);
         if (!w.H) continue;
-        weigh<V>(w, dV, along, a0, rows);
-        add_rows<V>(w, chunk, rows, along, a0, true, w.H);
+        weigh<V>(w, dV, convective, a0, rows);
+        add_rows<V>(w, chunk, rows, convective, a0, true, w.H);
     }
 }
 

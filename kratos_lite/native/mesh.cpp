@@ -1,6 +1,4 @@
-// Connections of a mesh: sets of nodes that occur more than once, and what hangs together.
-
-#include <pybind11/stl.h>
+// Connections of a mesh: sets of nodes that occur more than once, and connected parts.
 
 #include <vector>
 
@@ -8,8 +6,7 @@
 
 namespace {
 
-using kl::Array;
-namespace py = pybind11;
+using namespace kl;
 
 constexpr int64_t GRAIN = 4096;  // cells of one task
 
@@ -30,7 +27,7 @@ struct Cells {
 };
 
 void add_keys(const Cells& cells, uint64_t* key) {
-    kl::parallel_ranges(cells.m, GRAIN, [&](int64_t first, int64_t last) {
+    parallel_ranges(cells.m, GRAIN, [&](int64_t first, int64_t last) {
         for (int64_t p = 0; p < cells.p; ++p) {
             const int32_t* pick = cells.picks + p * cells.w;
             for (int64_t cell = first; cell < last; ++cell) {
@@ -43,7 +40,7 @@ void add_keys(const Cells& cells, uint64_t* key) {
     });
 }
 
-// For each key the place of the next equal one, or -1: keys are dealt into buckets by their last
+// For each key the position of the next equal one, or -1: keys are dealt into buckets by their last
 // bits, about one to a bucket, and keep their order there.
 std::vector<int32_t> next_equal(const std::vector<uint64_t>& key) {
     const size_t n = key.size();
@@ -62,19 +59,19 @@ std::vector<int32_t> next_equal(const std::vector<uint64_t>& key) {
 }
 
 py::tuple equal_sets(const std::vector<Array<int32_t>>& nodes, const std::vector<Array<int32_t>>& picks) {
-    kl::require(nodes.size() == picks.size(), "nodes and picks must come in pairs");
+    require(nodes.size() == picks.size(), "nodes and picks must come in pairs");
     std::vector<Cells> groups;
     int64_t total = 0;
     for (size_t i = 0; i < nodes.size(); ++i) {
-        kl::require(nodes[i].ndim() == 2 && picks[i].ndim() == 2, "nodes and picks must be matrices");
+        require(nodes[i].ndim() == 2 && picks[i].ndim() == 2, "nodes and picks must be matrices");
         const Cells cells{nodes[i].data(),  nodes[i].shape(0), nodes[i].shape(1),
                           picks[i].data(), picks[i].shape(0), picks[i].shape(1)};
         for (int64_t j = 0; j < picks[i].size(); ++j)
-            kl::require(cells.picks[j] < cells.k, "picks must be columns of the nodes");
+            require(cells.picks[j] < cells.k, "picks must be columns of the nodes");
         total += cells.m * cells.p;
         groups.push_back(cells);
     }
-    kl::require(total < INT32_MAX, "there are too many sets");
+    require(total < INT32_MAX, "there are too many sets");
     std::vector<int32_t> next;
     int64_t pairs = 0;
     {
@@ -102,10 +99,10 @@ int64_t root(int64_t* parent, int64_t i) {
 
 // The smaller root becomes the parent, so that the root of a part is its smallest member.
 Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
-    kl::require(pairs.ndim() == 2 && pairs.shape(1) == 2, "pairs must be (p, 2)");
+    require(pairs.ndim() == 2 && pairs.shape(1) == 2, "pairs must be (p, 2)");
     const int64_t* ends = pairs.data();
     for (int64_t i = 0; i < pairs.size(); ++i)
-        kl::require(0 <= ends[i] && ends[i] < n, "pairs must name members");
+        require(0 <= ends[i] && ends[i] < n, "pairs must name members");
     Array<int64_t> labels(n);
     int64_t* parent = labels.mutable_data();
     py::gil_scoped_release release;
@@ -114,16 +111,14 @@ Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
         const int64_t a = root(parent, ends[2 * i]), b = root(parent, ends[2 * i + 1]);
         parent[a < b ? b : a] = a < b ? a : b;
     }
-    for (int64_t i = 0; i < n; ++i) parent[i] = parent[parent[i]];  // members before i are labelled
+    for (int64_t i = 0; i < n; ++i) parent[i] = parent[parent[i]];  // members before i are labeled
     return labels;
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_mesh, m) {
-    kl::common(m);
-    m.def("equal_sets", &equal_sets, "pairs of sets that have the same nodes", py::arg("nodes").noconvert(),
-          py::arg("picks").noconvert());
-    m.def("components", &components, "smallest member of the part of each of n members", py::arg("n"),
-          py::arg("pairs").noconvert());
+    common(m);
+    define(m, "equal_sets", equal_sets, "pairs of sets that have the same nodes", "nodes", "picks");
+    define(m, "components", components, "smallest member of the part of each of n members", py::arg("n"), "pairs");
 }

@@ -124,17 +124,17 @@ KL_INLINE void linear_step(const PseudoGroup& g, int at, const D* F, const D* U,
 template <class D>
 KL_INLINE void energy_momentum(const PseudoGroup& g, int at, const D* F, const D* U, const D* f, D* change, D& flaw) {
     const double h = g.h;
-    D E[6], S[6], euler[9], volume, eta, initial, share;
+    D E[6], S[6], euler[9], volume, eta, initial, fraction;
     load<9>(g.euler, at, euler);
     load<1>(g.volume, at, &volume);
     load<1>(g.damping, at, &eta);
     green_strain(F, E);
     stress(g.C, at, E, S);
     dot<9>(U, U, initial);
-    share = 0.5 + eta / h;  // of the increment of strain in the mean stress
+    fraction = 0.5 + eta / h;  // of the increment of strain in the mean stress
     for (int k = 0; k < 9; ++k) change[k] = D{};
-    auto going = volume == volume;
-    for (int step = 0; step < NEWTON_STEPS && any(going); ++step) {
+    auto active = volume == volume;
+    for (int step = 0; step < NEWTON_STEPS && any(active); ++step) {
         D dF[9], middle[9], end[9], e[6], de[6], P[9], r[9], A[81], block[9], moved, size;
         for (int k = 0; k < 9; ++k) {
             dF[k] = h * (U[k] + 0.5 * change[k]);
@@ -142,26 +142,26 @@ KL_INLINE void energy_momentum(const PseudoGroup& g, int at, const D* F, const D
             end[k] = F[k] + dF[k];
         }
         row_block(euler, h * h / 4 * volume, S, block);
-        tangent(block, h * h / 2 * share * volume, middle, g.C, at, end, A);
+        tangent(block, h * h / 2 * fraction * volume, middle, g.C, at, end, A);
         strain_rate(middle, dF, e);
-        for (int a = 0; a < 6; ++a) e[a] = E[a] + share * e[a];
+        for (int a = 0; a < 6; ++a) e[a] = E[a] + fraction * e[a];
         stress(g.C, at, e, S);
         first_stress(middle, S, P);
         for (int k = 0; k < 9; k += 3) apply(euler, change + k, r + k);
         for (int k = 0; k < 9; ++k) r[k] = h * (f[k] - volume * P[k]) - r[k];
         solve<9>(A, r);
         strain_rate(end, r, de);
-        for (int a = 0; a < 6; ++a) e[a] += h / 2 * share * de[a];
+        for (int a = 0; a < 6; ++a) e[a] += h / 2 * fraction * de[a];
         stress(g.C, at, e, S);
         for (int k = 0; k < 9; ++k) {
-            change[k] = going ? change[k] + r[k] : change[k];
+            change[k] = active ? change[k] + r[k] : change[k];
             end[k] = U[k] + change[k];
         }
         dot<9>(r, r, moved);
         dot<9>(end, end, size);
-        going &= !(moved <= g.tolerance * g.tolerance * (size + initial));
+        active &= !(moved <= g.tolerance * g.tolerance * (size + initial));
     }
-    flaw = going ? 1.0 : flaw;
+    flaw = active ? 1.0 : flaw;
 }
 
 template <int V>

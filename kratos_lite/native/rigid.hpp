@@ -84,8 +84,8 @@ KL_INLINE void implicit_velocity(const D* J, const D* A, double h, double tolera
         const D magnitude = A[i] < 0 ? -A[i] : A[i];
         size = magnitude > size ? magnitude : size;
     }
-    auto going = size == size;
-    for (int step = 0; step < NEWTON_STEPS && any(going); ++step) {
+    auto active = size == size;
+    for (int step = 0; step < NEWTON_STEPS && any(active); ++step) {
         D E[9], JW[3], r[3], d[3], rr, dd, ww, H[9], HH[9], tangent[9], change[9];
         const D psi[3] = {h / 2 * W[0], h / 2 * W[1], h / 2 * W[2]};
         dot<3>(psi, psi, t2);
@@ -95,8 +95,8 @@ KL_INLINE void implicit_velocity(const D* J, const D* A, double h, double tolera
         apply_transposed(E, A, r);
         for (int i = 0; i < 3; ++i) r[i] -= JW[i];
         dot<3>(r, r, rr);
-        going &= !(rr <= tolerance * tolerance * size * size);
-        if (!any(going)) break;
+        active &= !(rr <= tolerance * tolerance * size * size);
+        if (!any(active)) break;
         // tangent J - h/2 hat(J W) T, where T = 1 - b hat(ψ) + c hat(ψ)² is the right Jacobian
         const D zero = {};
         const D hat_psi[9] = {zero, -psi[2], psi[1], psi[2], zero, -psi[0], -psi[1], psi[0], zero};
@@ -106,12 +106,12 @@ KL_INLINE void implicit_velocity(const D* J, const D* A, double h, double tolera
         product(hat_JW, H, change);
         for (int k = 0; k < 9; ++k) tangent[k] = J[k] - h / 2 * change[k];
         solve3(tangent, r, d);
-        for (int i = 0; i < 3; ++i) W[i] = going ? W[i] + d[i] : W[i];
+        for (int i = 0; i < 3; ++i) W[i] = active ? W[i] + d[i] : W[i];
         dot<3>(d, d, dd);
         dot<3>(W, W, ww);
-        going &= !(dd <= ROUND_OFF * ROUND_OFF * ww);
+        active &= !(dd <= ROUND_OFF * ROUND_OFF * ww);
     }
-    flaw = going ? 1.0 : flaw;
+    flaw = active ? 1.0 : flaw;
 }
 
 template <int V>

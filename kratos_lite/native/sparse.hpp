@@ -22,8 +22,8 @@ struct BlockMatrix : Graph {
     uint32_t columns;
 };
 
-// y = A x for some rows of blocks.  Four lanes hold the products of one column of a block, so
-// that a row of blocks costs three multiply-adds each and one sum at its end.
+// y = A x for some rows of blocks; false at an index that is no column.  Four lanes hold the products of one
+// column of a block, so that a row of blocks costs three multiply-adds each and one sum at its end.
 KL_INLINE bool multiply_rows(const BlockMatrix& A, const double* from, double* y, int64_t first, int64_t last) {
     typedef vec<double, 4> Vec;
     for (int64_t i = first; i < last; ++i) {
@@ -49,7 +49,8 @@ KL_INLINE bool multiply_rows(const BlockMatrix& A, const double* from, double* y
 inline void multiply(const BlockMatrix& A, const double* x, double* y) {
     parallel_ranges(A.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
         dispatch<double>([=](auto) KL_INLINE_LAMBDA {
-            if (!multiply_rows(A, x, y, first, last)) throw std::invalid_argument("an index is no column of the matrix");
+            if (!multiply_rows(A, x, y, first, last))
+                throw std::invalid_argument("an index is no column of the matrix");
         });
     });
 }

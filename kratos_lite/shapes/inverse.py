@@ -43,7 +43,7 @@ def outside_by(cell: str, xi: Array) -> Array:
         distances = [-t, np.abs(r) + t - 1, np.abs(s) + t - 1]
     else:
         distances = [np.abs(r) - 1, np.abs(s) - 1, np.abs(t) - 1]
-    return np.asarray(np.max(distances, axis=0))
+    return np.max(distances, axis=0)
 
 
 def inverse_map(
@@ -147,4 +147,4 @@ def _solve(J: Array, r: Array) -> Array:
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     det = (a * bc).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.stack([(m * r).sum(axis=1) for m in (bc, ca, ab)], axis=1) / det[:, None])
+        return np.stack([(m * r).sum(axis=1) for m in (bc, ca, ab)], axis=1) / det[:, None]

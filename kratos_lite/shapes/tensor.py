@@ -15,7 +15,7 @@ from kratos_lite.typing import Array
 
 
 def _product(f: Array) -> Array:
-    return np.asarray(f.prod(axis=-1))
+    return f.prod(axis=-1)
 
 
 def _gradient(f: Array, df: Array) -> Array:
@@ -68,12 +68,12 @@ class Multilinear(Shape):
     @classmethod
     def N(cls, xi: ArrayLike) -> Array:
         """Return the multilinear functions (..., n)."""
-        return np.asarray(_product(_linear_factors(xi, cls.nodes)[0]) / 2 ** cls.nodes.shape[1])
+        return _product(_linear_factors(xi, cls.nodes)[0]) / 2 ** cls.nodes.shape[1]
 
     @classmethod
     def dN(cls, xi: ArrayLike) -> Array:
         """Return their derivatives (..., n, d)."""
-        return np.asarray(_gradient(*_linear_factors(xi, cls.nodes)) / 2 ** cls.nodes.shape[1])
+        return _gradient(*_linear_factors(xi, cls.nodes)) / 2 ** cls.nodes.shape[1]
 
 
 class Lagrange(Shape):

@@ -1,27 +1,25 @@
-"""Matrices of one sparsity pattern, factorized and solved in every time step of a small body.
+"""Band matrices: one sparsity pattern, factorized in every time step of a small body by LAPACK.
 
-Nodes are renumbered once so that all entries lie near the diagonal; the place of every entry in the
-band is known from then on, and LAPACK factorizes the band.  Where the band is so wide that a sparse
-factorization takes less work, that one is taken.
+Nodes are renumbered once so that all entries lie near the diagonal; from then on the place of every entry
+in the band is known.  Where the band is so wide that a sparse factorization takes less work, `direct`
+makes that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import direct
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-    from kratos_lite.assembly.sparsity_pattern import Pattern
 
 BAND_LIMIT = 16.0
 """Widths w up to this many times √n take the band: it needs n w² multiplications, a sparse solid some n²."""
@@ -29,11 +27,17 @@ BAND_NUMBERS = 50_000_000
 """A band of more numbers than this (0.4 GB) is not made."""
 
 
-class Factors(Protocol):
-    """A factorized matrix A."""
+class BandFactors:
+    """The factors of a band, of which `apply` solves for one right side, or several, in its own order."""
+
+    def __init__(self, apply: Callable[[Array], Array], dofs: Ints) -> None:
+        self.apply, self._dofs = apply, dofs
 
     def solve(self, b: Array) -> Array:
         """Return x of A x = b, both (3n,) or (3n, k)."""
+        x = np.empty(b.shape)
+        x[self._dofs] = self.apply(b[self._dofs])
+        return x
 
 
 class Factorizer:
@@ -75,7 +79,7 @@ class Factorizer:
             self._dofs = (3 * self._nodes[:, None] + np.arange(3)).ravel()
             self._prepare(rows, pattern.indices)
 
-    def _prepare(self, rows: Ints, columns: NDArray[np.int32]) -> None:
+    def _prepare(self, rows: Ints, columns: Rows) -> None:
         """Note where the entries of a matrix go: column by column, as LAPACK wants a band."""
         place = np.empty_like(self._nodes)
         place[self._nodes] = np.arange(len(place))
@@ -88,8 +92,8 @@ class Factorizer:
         self._from = kept[np.argsort(to[kept])]
         self._to = to[self._from]
 
-    def factorize(self, A: BlockMatrix) -> Factors:
-        """Return the factors of a matrix with the pattern.
+    def factorize(self, A: BlockMatrix) -> BandFactors | direct.Factorization:
+        """Return the factors of a matrix with the pattern; their `solve` gives x of A x = b.
 
         Raises
         ------
@@ -101,52 +105,33 @@ class Factorizer:
             return direct.factorize(A.scipy().tocsr(), symmetric=self.symmetric)
         band = np.zeros(len(self._dofs) * self._height)
         band[self._to] = A.data.ravel().take(self._from)
-        matrix = band.reshape(-1, self._height).T
-        return (Cholesky if self.symmetric else LU)(matrix, self.width, self._dofs)
+        columns = band.reshape(-1, self._height).T
+        apply = (_cholesky if self.symmetric else _lu)(columns, self.width, self._dofs)
+        return BandFactors(apply, self._dofs)
 
 
-class Cholesky:
-    """The Cholesky factor of a symmetric band, (width + 1, n) by columns from the diagonal down."""
+def _cholesky(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:
+    """Factorize a symmetric band (width + 1, n), by columns from the diagonal down."""
+    from scipy.linalg.lapack import dpbtrf, dpbtrs
 
-    def __init__(self, band: Array, width: int, dofs: Ints) -> None:
-        from scipy.linalg.lapack import dpbtrf
-
-        self._dofs = dofs
-        self._factor, info = dpbtrf(band, lower=1, overwrite_ab=1)
-        if info:
-            node, axis = divmod(int(dofs[info - 1]), 3)
-            raise SolveError(
-                f"the matrix is not positive definite: the pivot of node row {node}, axis {'xyz'[axis]}, is "
-                "not > 0; the body has lost its stiffness or can still move; take a smaller step or hold it"
-            )
-
-    def solve(self, b: Array) -> Array:
-        """Return x of A x = b, both (3n,) or (3n, k)."""
-        from scipy.linalg.lapack import dpbtrs
-
-        x = np.empty(b.shape)
-        x[self._dofs] = dpbtrs(self._factor, b[self._dofs], lower=1, overwrite_b=1)[0]
-        return x
+    factor, info = dpbtrf(band, lower=1, overwrite_ab=1)
+    if info:
+        node, axis = divmod(int(dofs[info - 1]), 3)
+        raise SolveError(
+            f"the matrix is not positive definite: the pivot of node row {node}, axis {'xyz'[axis]}, is "
+            "not > 0; the body has lost its stiffness or can still move; take a smaller step or hold it"
+        )
+    return lambda b: dpbtrs(factor, b, lower=1, overwrite_b=1)[0]
 
 
-class LU:
-    """The LU factors of a band with exchanges of rows, (3 width + 1, n) by columns."""
+def _lu(band: Array, width: int, dofs: Ints) -> Callable[[Array], Array]:
+    """Factorize a band (3 width + 1, n) by columns, with exchanges of rows."""
+    from scipy.linalg.lapack import dgbtrf, dgbtrs
 
-    def __init__(self, band: Array, width: int, dofs: Ints) -> None:
-        from scipy.linalg.lapack import dgbtrf
-
-        self._dofs, self._width = dofs, width
-        self._factors, self._pivots, info = dgbtrf(band, width, width, overwrite_ab=1)
-        if info:
-            raise direct.singular()
-
-    def solve(self, b: Array) -> Array:
-        """Return x of A x = b, both (3n,) or (3n, k)."""
-        from scipy.linalg.lapack import dgbtrs
-
-        w, x = self._width, np.empty(b.shape)
-        x[self._dofs] = dgbtrs(self._factors, w, w, b[self._dofs], self._pivots, overwrite_b=1)[0]
-        return x
+    factors, pivots, info = dgbtrf(band, width, width, overwrite_ab=1)
+    if info:
+        raise direct.singular()
+    return lambda b: dgbtrs(factors, width, width, b, pivots, overwrite_b=1)[0]
 
 
 def choose(n: int, width: int, height: int) -> tuple[str, str]:
@@ -161,9 +146,6 @@ def choose(n: int, width: int, height: int) -> tuple[str, str]:
     if n * height > BAND_NUMBERS:
         return "sparse", f"{n * height} numbers > {BAND_NUMBERS}: a band takes too much memory"
     return "band", f"width {width} ≤ {limit}: a band is fastest"
-
-
-# ---- numbering -------------------------------------------------------------------------------------
 
 
 def _numbering(pattern: Pattern, rows: Ints) -> tuple[Ints, int]:
@@ -193,10 +175,10 @@ def _orders(pattern: Pattern) -> Iterator[Ints]:
 
 
 def _layers(graph: csr_array, order: Ints) -> Ints:
-    """Return the nodes by their distance from the face farthest from the last one of an order.
+    """Return the nodes by their distance from the end farthest from the last node of an order.
 
     Within a layer they follow the mean place of their neighbors in the layer before.  The first layers
-    of Cuthill–McKee, from one corner, are wider than those of a long body.
+    of Cuthill–McKee start from one corner and are wider than those of a long body.
     """
     from scipy.sparse.csgraph import dijkstra
 
@@ -209,8 +191,8 @@ def _layers(graph: csr_array, order: Ints) -> Ints:
     layers = [np.flatnonzero(layer == step) for step in np.unique(layer)]
     for before, nodes in zip([None, *layers], layers, strict=False):
         if before is not None:
-            links = graph[nodes][:, before]
-            place[nodes] = links @ place[before] / np.maximum(links.sum(axis=1), 1)
+            near = graph[nodes][:, before]
+            place[nodes] = near @ place[before] / np.maximum(near.sum(axis=1), 1)
         first = 0 if before is None else place[before].max() + 1
         place[nodes[np.argsort(place[nodes], kind="stable")]] = first + np.arange(len(nodes))
     return np.argsort(place)

@@ -17,7 +17,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
 from kratos_lite.solvers.coarse_level import linear_level
-from kratos_lite.solvers.common import DENSE_MAX
+from kratos_lite.solvers.linear_solver import DENSE_MAX
 from kratos_lite.solvers.supports import Links, Supports, reduction
 from kratos_lite.typing import Array, Ints, Progress
 

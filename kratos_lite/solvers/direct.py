@@ -54,7 +54,7 @@ class Factorization:
         Source: Higham, Accuracy and Stability of Numerical Algorithms (2002), chapter 12.
         """
         x = self.apply(b)
-        return np.asarray(x + self.apply(b - self.A @ x))
+        return x + self.apply(b - self.A @ x)
 
 
 def factorize_dense(A: Array) -> Factorization:
@@ -69,7 +69,7 @@ def factorize_dense(A: Array) -> Factorization:
         inverse = np.linalg.inv(A)
     except np.linalg.LinAlgError:
         raise singular() from None
-    return Factorization("dense", A, lambda b: np.asarray(inverse @ b))
+    return Factorization("dense", A, lambda b: inverse @ b)
 
 
 def factorize(A: csr_array, symmetric: bool = True) -> Factorization:
@@ -121,7 +121,7 @@ def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
         raise (MemoryError if error.value == NO_MEMORY else Unsuitable) from None
     if solver.get_iparm(REPLACED_PIVOTS):
         raise Unsuitable
-    return lambda b: np.asarray(solver.solve(half, b))
+    return lambda b: solver.solve(half, b)
 
 
 def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
@@ -139,7 +139,7 @@ def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
         factors = splu(A.tocsc(), **options)
     except RuntimeError as error:
         raise singular(f" ({error})") from None
-    return lambda b: np.asarray(factors.solve(b))
+    return factors.solve
 
 
 def singular(detail: str = "") -> SolveError:

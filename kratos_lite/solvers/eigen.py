@@ -53,7 +53,7 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
         from scipy.linalg import eigh
 
         squares, shapes = eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
-        return np.sqrt(np.maximum(squares, 0.0)), np.asarray(shapes)
+        return np.sqrt(np.maximum(squares, 0.0)), shapes
     return _by_iteration(K, M, count)
 
 
@@ -68,4 +68,4 @@ def _by_iteration(K: Any, M: Any, count: int) -> tuple[Array, Array]:
     start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
     squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start)
     order = np.argsort(squares)
-    return np.sqrt(np.maximum(squares[order], 0.0)), np.asarray(shapes[:, order])
+    return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]

@@ -1,7 +1,8 @@
-"""Conjugate gradients, and when to give them up."""
+"""Conjugate gradients, the share of the work they have done, and when to give them up."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,44 @@ MAX_ITERATIONS = 1000
 """A multigrid that needs more than these does not converge."""
 STALLED = 200
 """Nor does one that finds no smaller residual in as many iterations."""
+
+
+PATIENCE, PATIENCE_FROM = 400, 60
+"""Iterations that take as long as a factorization, and those that show a rate."""
+
+
+class ConvergenceForecast:
+    """Forecasts from the residuals so far, as shares of the first, whether an iteration ends soon.
+
+    It does not if, after 60 iterations, their rate promises more than `PATIENCE` in all.  The rate is
+    that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
+
+    Attributes
+    ----------
+    stopped : whether the forecast was too many iterations.
+
+    Examples
+    --------
+    >>> fast, slow = ConvergenceForecast(1e-8), ConvergenceForecast(1e-8)
+    >>> all(fast(0.9**k) for k in range(150)), [slow(0.99**k) for k in range(100)].index(False)
+    (True, 59)
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance, self.stopped = tolerance, False
+        self._logs: list[float] = []
+
+    def __call__(self, residual: float) -> bool:
+        """Take the next residual; return whether to go on."""
+        self._logs.append(math.log(max(residual, 1e-300)))
+        done, left = len(self._logs), self._logs[-1] - math.log(self.tolerance)
+        if done < PATIENCE_FROM or left <= 0:
+            return True
+        quarter = done // 4
+        before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
+        rate = (math.fsum(before) - math.fsum(now)) / quarter**2
+        self.stopped = (PATIENCE - done) * rate < left
+        return not self.stopped
 
 
 class Share:

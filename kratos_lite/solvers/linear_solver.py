@@ -1,8 +1,7 @@
-"""LinearSolver: one matrix with its supports, solved for many right sides."""
+"""LinearSolver: one matrix with its supports, solved for many right sides by a method chosen for it."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,58 +9,79 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import SolveError
+from kratos_lite.native import kernels
 from kratos_lite.solvers import direct, multigrid
 from kratos_lite.solvers.coarse_level import LinearLevel
-from kratos_lite.solvers.common import DIRECT_LIMIT, Solution, backward_error
+from kratos_lite.solvers.iteration import PATIENCE, ConvergenceForecast
 from kratos_lite.solvers.supports import ConstraintMap
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Ints, Mask, Progress
+from kratos_lite.validation import choice
 
+DENSE_LIMIT = 600
+"""Up to this many unknowns a full matrix needs no sparse library at all."""
+COMPILED_DENSE_LIMIT = 60
+"""Up to this many it is faster than compiled multigrid, which needs none either."""
+DENSE_MAX = 10_000
+"""Above this many degrees of freedom a full matrix is refused (it would take 0.8 GB several times)."""
+DIRECT_LIMIT = 10_000
+"""Up to this many unknowns factorizing is the fastest sparse way."""
+METHODS = ("auto", "dense", "direct", "amg")
 FALLBACK_LIMIT = 150_000
 """Up to this many unknowns a factorization is tried when the iteration fails."""
 SUPERLU_LIMIT = 30_000
 """Up to this many unknowns SuperLU factorizes in less time than a slow iteration takes."""
-PATIENCE, PATIENCE_FROM = 400, 60
-"""Iterations that take as long as a factorization, and those that show a rate."""
 ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
 
 
-class Outlook:
-    """Tells from the residuals so far, as shares of the first, whether an iteration is worth going on with.
-
-    It is not when, after 60 iterations, their rate promises more than `PATIENCE` in all.  The rate is
-    that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
+@dataclass(frozen=True)
+class Solution:
+    """The solution of A x = b and how it was found.
 
     Attributes
     ----------
-    stopped : whether it has said so.
+    x : (n,) float.
+    method, reason : ``dense``, ``direct`` or ``amg``, and why.
+    iterations : 0 for a factorization.
+    backward_error : |b - A x| / (|A| |x| + |b|) in the maximum norm.
+    """
+
+    x: Array
+    method: str
+    reason: str
+    iterations: int
+    backward_error: float
+
+
+def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) -> tuple[str, str]:
+    """Return the method to use for `unknowns` free ones of `dofs`, and the reason in words.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
 
     Examples
     --------
-    >>> fast, slow = Outlook(1e-8), Outlook(1e-8)
-    >>> all(fast(0.9**k) for k in range(150)), [slow(0.99**k) for k in range(100)].index(False)
-    (True, 59)
+    >>> choose("auto", 24)[0]
+    'dense'
     """
-
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance, self.stopped = tolerance, False
-        self._logs: list[float] = []
-
-    def __call__(self, residual: float) -> bool:
-        """Take the next residual; return whether to go on."""
-        self._logs.append(math.log(max(residual, 1e-300)))
-        done, left = len(self._logs), self._logs[-1] - math.log(self.tolerance)
-        if done < PATIENCE_FROM or left <= 0:
-            return True
-        quarter = done // 4
-        before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
-        rate = (math.fsum(before) - math.fsum(now)) / quarter**2
-        self.stopped = (PATIENCE - done) * rate < left
-        return not self.stopped
+    if choice(method, "solver", METHODS) != "auto":
+        return method, "asked for"
+    compiled = symmetric and kernels("multigrid") is not None
+    limit = COMPILED_DENSE_LIMIT if compiled else DENSE_LIMIT
+    if unknowns <= limit and dofs <= 4 * DENSE_LIMIT:
+        return "dense", f"{unknowns} unknowns ≤ {limit}: a full matrix is fastest"
+    if compiled:
+        return "amg", f"{unknowns} unknowns > {limit}: multigrid is fastest and takes least memory"
+    if unknowns <= DIRECT_LIMIT:
+        return "direct", f"{unknowns} unknowns ≤ {DIRECT_LIMIT}: sparse factorization is fastest"
+    if not symmetric:
+        return "direct", "the matrix is not symmetric: conjugate gradients do not apply"
+    return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"
 
 
 @dataclass(eq=False)
@@ -125,8 +145,8 @@ class LinearSolver:
         """The reduced matrix as a full array."""
         T = self.reduced.T
         if T is None:
-            return np.asarray(self.K[np.ix_(self.reduced.free, self.reduced.free)])
-        return np.asarray(T.T @ self.K @ T)
+            return self.K[np.ix_(self.reduced.free, self.reduced.free)]
+        return T.T @ self.K @ T
 
     @cached_property
     def _sparse(self) -> Any:
@@ -144,12 +164,12 @@ class LinearSolver:
 
     @cached_property
     def _blocks(self) -> BlockMatrix:
-        """The matrix on all components in 3x3 blocks, links worked in; only its free components count."""
+        """The matrix on all components, constraints worked in, of which only the free ones count."""
         T = self.reduced.T
-        return self.K if T is None else linked(self.K, T, self.reduced.free)
+        return self.K if T is None else constrained(self.K, T, self.reduced.free)
 
     @cached_property
-    def _free(self) -> NDArray[np.bool_]:
+    def _free(self) -> Mask:
         free = np.zeros(len(self.reduced.c), dtype=bool)
         free[self.reduced.free] = True
         return free
@@ -169,18 +189,18 @@ class LinearSolver:
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorization.
         aim = min(tolerance, ROUND_OFF) if len(b) <= DIRECT_LIMIT else tolerance
-        outlook = Outlook(tolerance) if quick_to_factorize(len(b)) else None
-        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, outlook)
+        forecast = ConvergenceForecast(tolerance) if quick_to_factorize(len(b)) else None
+        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, forecast)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
         error = float(np.abs(b - (self._blocks @ x)[free]).max() / scale) if scale > 0 else 0.0
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
-        if outlook and outlook.stopped:
+        if forecast and forecast.stopped:
             stopped += f", at a rate that takes more than {PATIENCE}: a factorization is faster"
         return Solution(q, "amg", "" if converged else stopped, iterations, error)
 
 
 def quick_to_factorize(unknowns: int) -> bool:
-    """Tell whether a factorization takes less time than some hundred iterations.
+    """Return whether a factorization takes less time than some hundred iterations.
 
     >>> quick_to_factorize(FALLBACK_LIMIT + 1)
     False
@@ -188,13 +208,27 @@ def quick_to_factorize(unknowns: int) -> bool:
     return unknowns <= (FALLBACK_LIMIT if find_spec("pypardiso") else SUPERLU_LIMIT)
 
 
-def linked(K: BlockMatrix, T: Any, free: NDArray[np.int64]) -> BlockMatrix:
+def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
     from scipy.sparse import csr_array
 
     n = K.shape[0]
-    spread = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), n))
-    whole = T @ spread
-    A = (whole.T @ K.scipy().tocsr() @ whole).tobsr((3, 3))
+    pick = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), n))
+    full = T @ pick
+    A = (full.T @ K.scipy().tocsr() @ full).tobsr((3, 3))
     A.sort_indices()
     return BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
+
+
+def matrix_norm(A: Any) -> float:
+    """Return the largest row sum of |A|."""
+    if isinstance(A, BlockMatrix):
+        return A.norm()
+    return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
+
+
+def backward_error(A: Any, x: Array, b: Array, norm_A: float | None = None) -> float:
+    """Return |b - A x| / (|A| |x| + |b|) in the maximum norm; |A| may be given."""
+    norm_A = matrix_norm(A) if norm_A is None else norm_A
+    scale = norm_A * np.abs(x).max() + np.abs(b).max()
+    return float(np.abs(b - A @ x).max() / scale) if scale > 0 else 0.0

@@ -95,7 +95,7 @@ class Compiled:
 
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,)."""
-        return np.asarray(self._kernel.cycle(r))
+        return self._kernel.cycle(r)
 
     def solve(
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
@@ -137,7 +137,7 @@ class Pyamg:
 
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,)."""
-        return np.asarray(self._cycle @ r)
+        return self._cycle @ r
 
     def solve(
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None

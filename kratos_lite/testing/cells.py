@@ -21,7 +21,7 @@ C_ISOTROPIC = Isotropic3D(E=2.0, nu=0.3).C
 def anisotropic() -> Array:
     """Return a C without any symmetry but its own, positive definite: it tells all components apart."""
     L = np.random.default_rng(5).uniform(-1, 1, (6, 6))
-    return np.asarray(C_ISOTROPIC + 0.2 * L @ L.T)
+    return C_ISOTROPIC + 0.2 * L @ L.T
 
 
 def affine(element: Element) -> tuple[Array, float]:
@@ -36,7 +36,7 @@ def distorted(element: Element) -> Array:
     X = element.shape.nodes
     corners = X[: element.shape.corners]
     edge = min(float(np.abs(a - b).max()) for a, b in combinations(corners, 2))
-    return np.asarray(X + 0.05 * edge * np.random.default_rng(3).uniform(-1, 1, X.shape))
+    return X + 0.05 * edge * np.random.default_rng(3).uniform(-1, 1, X.shape)
 
 
 def linear_field(X: Array) -> tuple[Array, Array]:
@@ -58,4 +58,4 @@ def rotations(shape: type[Shape]) -> Array:
     maps = maps[np.abs(np.linalg.det(maps) - 1) < 1e-9]
     distance = np.abs((H @ maps)[:, :, None, :] - H).max(axis=3)
     kept = distance[(distance.min(axis=2) < 1e-9).all(axis=1)]
-    return np.asarray(kept.argmin(axis=2))
+    return kept.argmin(axis=2)

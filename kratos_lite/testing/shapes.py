@@ -90,7 +90,7 @@ def unsaved(shape: type[Shape]) -> list[str]:
 
 def distances(X: Array, Y: Array) -> Array:
     """Return the largest coordinate difference of each point of X (n, d) to each of Y (m, d), as (n, m)."""
-    return np.asarray(np.abs(X[:, None] - Y).max(axis=2, initial=0.0))
+    return np.abs(X[:, None] - Y).max(axis=2, initial=0.0)
 
 
 def inside(shape: type[Shape], count: int) -> Array:
@@ -100,7 +100,7 @@ def inside(shape: type[Shape], count: int) -> Array:
     """
     corners = shape.nodes[: shape.corners]
     share = np.random.default_rng(7).dirichlet(np.ones(len(corners)), count)
-    return np.asarray((share @ corners).round(2))
+    return (share @ corners).round(2)
 
 
 def values(shape: type[Shape], points: Array) -> Array:

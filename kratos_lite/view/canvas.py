@@ -66,7 +66,7 @@ def colors_of(value: Array) -> tuple[Any, Array]:
         half = 0.5 * max(abs(low), abs(high)) or 1.0
         low, high = low - half, high + half
     shown = ScalarMappable(Normalize(low, high), colormaps["viridis"])
-    return shown, np.asarray(shown.to_rgba(value))
+    return shown, shown.to_rgba(value)
 
 
 def color_bar(figure: Any, axes: Any, colors: Any, unit: str) -> None:

@@ -186,7 +186,7 @@ def _outline(mesh: Mesh) -> Array:
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).
     sharp = (counts == 2) & (np.linalg.norm(mean, axis=1) < 2 * np.cos(np.radians(15)))
-    return np.asarray(mesh.points[unique[sharp]] @ ISOMETRIC[:2].T)
+    return mesh.points[unique[sharp]] @ ISOMETRIC[:2].T
 
 
 def _rulers(axes: Any, X: Array, moved: Array) -> None:

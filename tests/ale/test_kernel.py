@@ -176,3 +176,6 @@ def test_wrong_arguments_are_refused():
         add(points, nodes - 1, one, np.zeros((3, 8, 3)), *rest)
     with pytest.raises(ValueError, match=r"data must be float \(nnz,\)"):
         add(points, nodes, one, np.zeros((3, 8, 3)), *rest, M=np.zeros(3))
+    far = pattern.indices + np.int32(len(points))
+    with pytest.raises(ValueError, match="column that is not there"):
+        add(points, nodes, one, np.zeros((3, 8, 3)), *rest[:-1], far, M=np.zeros(len(far)))

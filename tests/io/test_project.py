@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scenes import case, present
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
@@ -318,16 +319,21 @@ def test_nodal_point_load_acts_once_where_faces_share_the_node(folder):
 
 
 @pytest.mark.parametrize(
-    ("case", "component", "expected"),
+    ("name", "part", "component", "expected"),
     [
-        ("patch_3D_shear_hexa", "DISPLACEMENT_Y", 7.8e-3),
-        ("patch_3D_tension_tetra", "DISPLACEMENT_X", 2.73e-3),
+        row
+        for row in (
+            ("bar_8N", "Pulled", "DISPLACEMENT_X", 8e-3),
+            ("patch_3D_shear_hexa", "SurfaceLoad3D_Load_on_surfaces_Auto", "DISPLACEMENT_Y", 7.8e-3),
+            ("patch_3D_tension_tetra", "SurfaceLoad3D_Load_on_surfaces_Auto", "DISPLACEMENT_X", 2.73e-3),
+        )
+        if present(row[0])
     ],
 )
-def test_2019_folder_runs_and_its_own_check_passes(shared, case, component, expected):
-    project = read_case(shared / "cases" / case / "ProjectParameters.json")
+def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expected):
+    project = read_case(case(name) / "ProjectParameters.json")
     (line,) = project.compare(project.model.solve())
-    assert line.startswith(f"check {component} on SurfaceLoad3D_Load_on_surfaces_Auto")
+    assert line.startswith(f"check {component} on {part}")
     assert (
         f"passed (node {line.split('node ')[1].split(':')[0]}: found {expected:g}, expected {expected:g}"
         in line
@@ -345,6 +351,30 @@ def test_cantilever_beam_runs_as_kratos_computed_it(shared):
     hand.fix("DISPLACEMENT_support", "xyz")
     hand.add(kl.PointLoad("PointLoad3D_load_point", (0.0, -1e4, 0.0)))
     np.testing.assert_allclose(found.displacement(), hand.solve().displacement(), rtol=0, atol=1e-17)
+
+
+def test_a_law_that_is_not_linear_is_refused_by_name_and_part(folder):
+    law = {"name": "SmallStrainIsotropicPlasticityFactory", "yield_surface": "VonMises"}
+    body = MATERIALS["properties"][0]
+    body = body | {"Material": body["Material"] | {"constitutive_law": law}}
+    (folder / "materials.json").write_text(json.dumps({"properties": [body]}))
+    with pytest.raises(InputError, match=r"materials.json:\d+:\d+: part Structure.Body: 'SmallStrainIso"):
+        read_case(write(folder, run_file([CLAMP], [])))
+
+
+def test_a_solver_of_eigenvalues_is_refused(folder):
+    content = run_file([CLAMP], [], solver_type="eigen_value", eigensolver_settings={"solver_type": "feast"})
+    with pytest.raises(InputError, match="solver_type 'eigen_value': run files are solved as"):
+        read_case(write(folder, content))
+
+
+def test_a_run_without_supports_and_with_unknown_settings_is_read_and_refused_when_solved(folder):
+    content = run_file([], []) | {"rve_settings": {"perturbation": 1e-6}}
+    del content["processes"]
+    project = read_case(write(folder, content))
+    assert "key 'rve_settings' is not used" in project.model.notes
+    with pytest.raises(ModelError, match="rigid motions"):
+        project.model.solve()
 
 
 def test_plastic_law_is_refused_by_name_and_part(shared):

@@ -52,6 +52,33 @@ def test_wrong_shapes_are_refused():
         A @ np.zeros(5)
 
 
+@compiled
+@pytest.mark.parametrize("wrong", [-1, 2500])
+def test_columns_out_of_range_are_refused(wrong):
+    A = matrix()
+    A.indices[5] = wrong
+    with pytest.raises(ValueError, match="no column of the matrix"):
+        A @ np.zeros(A.shape[0])
+    nodes, n = np.array([[A.rows()[5]]], np.int32), len(A.indptr) - 1
+    with pytest.raises(ValueError, match="column that is not there"):
+        kernels("stiffness").add_matrices(nodes, np.ones((1, 1, 1, 3, 3)), A.indptr, A.indices, A.data)
+    with pytest.raises(ValueError, match="columns of the matrix"):
+        kernels("multigrid").Matrix(A.indptr, A.indices, A.data)
+    with pytest.raises(ValueError, match="rows of the matrix"):
+        kernels("stiffness").add_matrices(nodes + n, np.ones((1, 1, 1, 3, 3)), A.indptr, A.indices, A.data)
+
+
+@compiled
+@pytest.mark.parametrize("at", [1, -1])
+def test_rows_beyond_the_blocks_are_refused(at):
+    A = matrix()
+    A.indptr[at] += 1000
+    with pytest.raises(ValueError, match="indptr must"):
+        A @ np.zeros(A.shape[0])
+    with pytest.raises(ValueError, match="indptr must"):
+        A.norm()
+
+
 def test_norm_and_diagonal_blocks():
     A = matrix()
     assert A.norm() == pytest.approx(abs(A.scipy()).sum(axis=1).max(), rel=1e-14)

@@ -498,7 +498,7 @@ def test_a_linear_level_of_the_wrong_shape_is_refused():
     wrong = {
         0: (corners[:-1], "one entry for each linear unknown"),
         1: (level.indptr[:-1], "one row for each node"),
-        2: (level.indices[:-1], "one weight for each"),
+        2: (level.indices + len(corners), "nodes of the linear level"),
         3: (level.weights[:-1], "one weight for each"),
         5: (np.zeros((3, 6)), "modes must be"),
     }

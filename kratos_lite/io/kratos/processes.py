@@ -187,8 +187,9 @@ def refuse_local_axes(settings: Settings) -> None:
 def _variable(settings: Settings, process: Process) -> str:
     kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
     name = settings.text("variable_name").rsplit(".", 1)[-1]
-    text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
-    settings.expect(name in known, "variable_name", f"{text} Known are {', '.join(known[:5])} …")
+    if name not in known:
+        text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
+        raise settings.error("variable_name", f"{text} Known are {', '.join(known[:5])} …")
     return name
 
 
