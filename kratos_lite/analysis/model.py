@@ -12,7 +12,7 @@ from kratos_lite.ale.checks import attach
 from kratos_lite.ale.motion import Motion
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis, solve_static
-from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.assembly.element_groups import ElementGroup, element_groups_of
 from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -52,9 +52,7 @@ class Model:
     def __init__(
         self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
     ) -> None:
-        if not isinstance(mesh, Mesh):
-            raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
-        self.mesh = mesh
+        self.mesh = checks.checked_mesh(mesh)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self.motion: Motion | None = None
@@ -76,8 +74,7 @@ class Model:
 
     def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
         """Give elements a material: all, those of a part, of a property id, or of given rows."""
-        if not isinstance(material, LinearMaterial):
-            raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
+        checks.checked_material(material)
         rows = self.mesh.elements(where)
         self._materials.append(material)
         self._material_of[rows] = len(self._materials) - 1
@@ -208,11 +205,7 @@ class Model:
         MeshError, InputError
             With every element that is wrong.
         """
-        kinds = [element_class(self.mesh, block) for block in self.mesh.blocks]
-        checks.check_blocks(self.mesh, kinds)
-        checks.check_points(self.mesh)
-        checks.check_repeated_nodes(self.mesh)
-        return checks.check_jacobians(self.mesh, kinds)
+        return checks.check_geometry(self.mesh)
 
     def check(self) -> list[str]:
         """Check the model as `solve` does, without solving; return the warnings.

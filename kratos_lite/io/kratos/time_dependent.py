@@ -127,13 +127,13 @@ class ProcessesInTime:
             name = action.component
             if steps[0] == 0 and action.factors:
                 value = action.value(points[action.rows], self.context.times[0])
-                start.set_nodes(name, action.rows, value)
+                start.nodal.put(name, action.rows, value)
                 is_still = not name.startswith("ACCELERATION") or not np.any(value)
                 text = f"{name} cannot be given; the acceleration at the start is 0"
                 action.settings.expect(is_still, "variable_name", text)
             if action.fixed and name.startswith("DISPLACEMENT"):
                 start.fix(name, action.rows)
-        u, v = start.vector("DISPLACEMENT"), start.vector("VELOCITY")
+        u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
         held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
         if v[np.transpose(held)].any():
             self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
