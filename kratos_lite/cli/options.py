@@ -217,7 +217,7 @@ def motion(model: Model, options: Namespace) -> Motion | None:
     rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
     try:
         if passes:
-            return Translation(*rates, ends=options.boundaries or "absorbing", damping=damping)
+            return Translation(*rates, boundaries=options.boundaries or "absorbing", damping=damping)
         center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
         return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
     except InputError as error:

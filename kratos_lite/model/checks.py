@@ -17,9 +17,10 @@ from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.model.loads import Gravity, Load
+from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
-from kratos_lite.solvers.supports import Supports
 from kratos_lite.typing import Array
 
 SLOWEST, QUICKEST = 1.0, 2e4
@@ -274,6 +275,20 @@ def check_rounding(
     if noise > 1e-2 * size:
         raise SolveError(text)
     return [text]
+
+
+def check_loads(
+    loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
+) -> list[str]:
+    """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
+    moved = supports.values.any() or any(c.constant for c in supports.constraints)
+    if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
+        return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
+    if not forces.any() and not moved:
+        return ["no load acts and no displacement is prescribed, so nothing moves"]
+    if not forces[~supports.fixed].any() and not moved:
+        return ["all loads act on fixed components, so nothing moves"]
+    return []
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:

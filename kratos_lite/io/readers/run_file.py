@@ -17,7 +17,7 @@ from kratos_lite.io.readers.time import load_of, read_time
 from kratos_lite.io.readers.values import is_by_part, number_or_series, read_material
 from kratos_lite.io.settings import Settings, find_file, inside, shown
 from kratos_lite.io.writers.endings import check_series
-from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
+from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, TimeDependentLoad, Traction
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
@@ -80,7 +80,7 @@ def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: boo
 
 def _changes(model: Model) -> bool:
     """Whether loads or supports change in time."""
-    return bool(model.supports.movements) or any(isinstance(load, Varying) for load in model.loads)
+    return bool(model.supports.motions) or any(isinstance(load, TimeDependentLoad) for load in model.loads)
 
 
 def _gravity(settings: Settings) -> Load:

@@ -11,7 +11,7 @@ from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.readers.values import number_or_series
 from kratos_lite.io.settings import Settings, find_file, is_number, shown
-from kratos_lite.model.loads import Load, Varying
+from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
@@ -137,4 +137,4 @@ def load_of(section: Settings, key: str, make: Callable[[Settings, str], Load]) 
         return make(section, key)
     table = section.section(key)
     table.check_keys(("value", "amplitude"))
-    return section.placed(key, Varying, make(table, "value"), number_or_series(table, "amplitude"))
+    return section.placed(key, ScaledLoad, make(table, "value"), number_or_series(table, "amplitude"))

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis import Moment, Transient
-from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import vector
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import draw
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import NodalForces, Timed
+from kratos_lite.model.loads import NodalForces, TimeDependentLoad
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Progress
 
 
@@ -30,19 +30,19 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Transient, It
     given["scheme"] = given.pop("integrator")
     transient = case.model.transient(**given)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
-        transient = _held_at_first(transient).transient(**given)
+        transient = Transient(_held_at_first(transient), **given)
     if time.restart is not None:
         transient.put(Moment.load(time.restart))
     return transient, placed(time, lambda: transient.march(time.step, time.steps, every=time.every))
 
 
-def _held_at_first(transient: Transient) -> Model:
+def _held_at_first(transient: Transient) -> Structure:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
     inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)
-    balance = NodalForces(e.system.whole(inner))
+    balance = NodalForces(e.system.scatter(inner))
     model = copy(e.model)
-    model.loads = [*model.loads, Timed(lambda time: None if time > 0 else balance)]
+    model.loads = [*model.loads, TimeDependentLoad(lambda time: None if time > 0 else balance)]
     return model
 
 
