@@ -38,17 +38,17 @@ class BodyMotion:
         return self.integrator.critical_step(self.body)
 
     def prepare(self, h: float, parts: int) -> None:
-        """Check steps of h s in so many parts, and meet the constraints."""
+        """Check steps of h s in so many parts."""
         body, self.parts = self.body, parts
         self.integrator.check_stable(body, h / parts)
         self.integrator.check(body, h / parts)
-        moved = body.integrated_velocity is None or not np.array_equal(body.u, body.integrated_velocity)
-        if body.constraints and moved:
-            project_velocity(body, h / parts)
 
     def advance(self, h: float, count: int) -> None:
         """Take steps of h s."""
         body, part = self.body, h / self.parts
+        moved = body.integrated_velocity is None or not np.array_equal(body.u, body.integrated_velocity)
+        if body.constraints and moved:
+            project_velocity(body, part)
         free = not body.constraints and all(load.is_constant for load in body.loads)
         self._free = free and self.integrator.free_steps(body, part, count * self.parts)
         with self.integrator.running():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,14 +17,11 @@ from kratos_lite.analysis.outputs import result_of, velocity_of_material
 from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State
-from kratos_lite.analysis.static import same_state
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none, number
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 _log = logging.getLogger("kratos_lite")
 DIVERGED = 1e9
@@ -35,11 +32,9 @@ OFF_BALANCE = 1e-4
 """Share of the largest force by which the accelerations of a state may miss the balance."""
 
 
-def model_state(model: Model) -> list[Any]:
-    """Return what must stay as it is while a model moves in time."""
-    supports = model.supports
-    values = supports.values[supports.fixed].copy()
-    return [*model.state(), values, tuple(map(id, model.loads)), id(model.motion), tuple(supports.movements)]
+def _version(model: Structure) -> list[Any]:
+    """Return what must stay as it is while a model moves in time; equal as long as it does."""
+    return [model.version, model.supports.value_version, model.motion, *model.loads]
 
 
 class TransientAnalysis:
@@ -83,7 +78,7 @@ class TransientAnalysis:
 
     def __init__(
         self,
-        model: Model,
+        model: Structure,
         *,
         integrator: ModelIntegrator | str | None = None,
         displacement: ArrayLike | None = None,
@@ -101,7 +96,7 @@ class TransientAnalysis:
         e = EquationsOfMotion(model, lumped=lumped, rayleigh=rayleigh, progress=progress)
         self.equations = e
         self.integrator.check(e)
-        self._model_state = model_state(model)
+        self._version = _version(model)
         self._critical, self._of_mesh = self._critical_rate()
         self._watching = self._critical < np.inf
         self._watch_rate(0.0)
@@ -142,7 +137,7 @@ class TransientAnalysis:
         given, n = finite(values, what), self.equations.system.n_nodes
         if given.shape != (n, 3):
             raise InputError(f"{what} needs shape ({n}, 3); got {given.shape}")
-        return self.equations.system.local(given).copy()
+        return self.equations.system.gather(given).copy()
 
     def _balanced(self, prescribed: Array) -> Array:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
@@ -177,13 +172,13 @@ class TransientAnalysis:
             The model has changed.
         """
         e = self.equations
-        if not same_state(self._model_state, model_state(e.model)):
+        if self._version != _version(e.model):
             raise ModelError(
                 "the model has changed since this transient was made; make a new one and restore the state"
             )
         check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
         e.step, self.parts = h / parts, parts
-        if not self.step and e.model.supports.movements:
+        if not self.step and e.model.supports.motions:
             self._start(*at_start(e, e.step))
         elif self._restored is not None:
             self._settle(self._restored)
@@ -249,7 +244,7 @@ class TransientAnalysis:
         """
         left = self._left()
         values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
-        values["reactions"] = self.equations.model.supports.carried(self._whole(left))
+        values["reactions"] = self.equations.model.supports.supported(self._whole(left))
         values["imbalance"] = np.array(self._free_part(left))
         return State("model", str(self.integrator), self.time, self.step, values, self.parts)
 
@@ -318,7 +313,7 @@ class TransientAnalysis:
             With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, local, left = self.state() if state is None else state, self.equations.system.local, None
+        at, local, left = self.state() if state is None else state, self.equations.system.gather, None
         if self.integrator.balanced:
             free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
             left = free / largest if largest else 0.0
@@ -332,7 +327,7 @@ class TransientAnalysis:
         -------
         (n, 3) float, N; 0 where nothing acts.
         """
-        return self.equations.model.supports.carried(self._whole(self._left()))
+        return self.equations.model.supports.supported(self._whole(self._left()))
 
     def energy(self, state: State | None = None) -> float:
         """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
@@ -366,9 +361,9 @@ class TransientAnalysis:
         """Return u, v (3a,) and the time, of now or of a state."""
         if state is None:
             return self.u, self.v, self.time
-        local = self.equations.system.local
+        local = self.equations.system.gather
         return local(state.u), local(state.v), state.time
 
     def _whole(self, x: Array) -> Array:
         """Return vectors (3a,) as (n, 3) of all nodes."""
-        return np.asarray(self.equations.system.whole(x))
+        return np.asarray(self.equations.system.scatter(x))

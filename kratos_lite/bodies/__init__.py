@@ -14,11 +14,11 @@ from kratos_lite.bodies.constraints import (
     RigidLink,
 )
 from kratos_lite.bodies.conversion import convert
+from kratos_lite.bodies.equilibrium import find_equilibrium
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.loads import Callback, FollowerPressure, Force, Spring, Torque
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
-from kratos_lite.bodies.statics import find_equilibrium
 from kratos_lite.time_series import TimeSeries
 
 __all__ = [

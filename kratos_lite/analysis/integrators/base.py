@@ -46,7 +46,7 @@ class ModelIntegrator(ABC):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if "name" in cls.__dict__:
-            INTEGRATORS.add(cls.name, cls, [cls.__name__])
+            INTEGRATORS.add(cls.name, cls)
 
     @property
     def balanced(self) -> bool:

@@ -17,7 +17,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
-from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.typing import Array
 
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
@@ -74,12 +74,12 @@ class ProcessesInTime:
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
-            self._later.append(Timed(_LoadInTime(self, mine, base.only(group), load_of)))
+            self._later.append(TimeDependentLoad(_LoadInTime(self, mine, base.only(group), load_of)))
         values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
-        loads: list[Load] = [Varying(load, _begun) for load in model.loads]
+        loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
         for rows, axis, course in self._moving:
             model.fix(rows, axis, course, override=True)

@@ -1,14 +1,14 @@
-"""How a Kratos run file marches: its scheme, damping, steps and start."""
+"""Time integration of a Kratos run file: its integrator, damping, steps and start."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from kratos_lite.errors import InputError
+from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import times_of
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
-from kratos_lite.io.project.settings import Settings
-from kratos_lite.io.scene import March
+from kratos_lite.io.settings import Settings
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
@@ -21,8 +21,8 @@ DYNAMIC_KEYS = (
 )  # fmt: skip
 
 
-def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
-    """Return the march of a dynamic run file of Kratos; InputError with the place of what is wrong."""
+def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
+    """Return the steps of a dynamic run file of Kratos; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
     text = f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
@@ -30,10 +30,10 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
     for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
         solver.expect(value >= 0, key, f"{key} must be ≥ 0; got {value:g}")
-    return March(
+    return TimeIntegration(
         solver.section("time_stepping").number("time_step"),
         len(times) - 1,
-        scheme=_scheme(solver),
+        integrator=_integrator(solver),
         rayleigh=(rayleigh[0], rayleigh[1]),
         displacement=processes.displacement,
         velocity=processes.velocity,
@@ -41,8 +41,8 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
     )
 
 
-def _scheme(solver: Settings) -> ModelIntegrator:
-    """Return the scheme that Kratos would take."""
+def _integrator(solver: Settings) -> ModelIntegrator:
+    """Return the integrator that Kratos would take."""
     from kratos_lite.analysis.integrators import Bossak, Newmark
 
     method = solver.text("time_integration_method", "implicit")
@@ -50,7 +50,7 @@ def _scheme(solver: Settings) -> ModelIntegrator:
         raise solver.error(
             "time_integration_method",
             f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
-            "the option --scheme central_difference then marches explicitly",
+            "the option --integrator central_difference then steps explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
     text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"
