@@ -10,7 +10,7 @@ from kratos_lite.ale.boundaries import end_nodes, periodic_pairs
 from kratos_lite.ale.matrices import MotionMatrices
 from kratos_lite.ale.motion import Motion, Rotation, Translation
 from kratos_lite.ale.symmetry import leak
-from kratos_lite.elements.kinematic_linear import lame_constants
+from kratos_lite.elements.tables import lame_constants
 from kratos_lite.errors import ModelError
 from kratos_lite.solvers.supports import MultiPointConstraint
 from kratos_lite.voigt import acoustic_tensor
