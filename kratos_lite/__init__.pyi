@@ -73,9 +73,8 @@ from kratos_lite.model.loads import LineLoad as LineLoad
 from kratos_lite.model.loads import NodalForces as NodalForces
 from kratos_lite.model.loads import PointLoad as PointLoad
 from kratos_lite.model.loads import Pressure as Pressure
-from kratos_lite.model.loads import Timed as Timed
+from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads import Traction as Traction
-from kratos_lite.model.loads import Varying as Varying
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
 

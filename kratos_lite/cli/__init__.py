@@ -176,7 +176,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         "--translation", metavar="AXIS:RATE[:ACCELERATION]", help="of the window, in m/s and m/s²"
     )
     ale.add_argument(
-        "--ends",
+        "--boundaries",
         choices=("absorbing", "periodic", "fixed", "natural"),
         help="what the cut faces of the window do (absorbing)",
     )

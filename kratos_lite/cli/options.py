@@ -109,7 +109,7 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
     if turns and passes:
         raise InputError("--rotation and --translation: a model has one motion; give one of them")
-    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("ends", "translation")):
+    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("boundaries", "translation")):
         if getattr(options, option) and not getattr(options, owner):
             raise InputError(f"--{option} belongs to --{owner}; give that too")
     text, option = turns or passes, "--rotation" if turns else "--translation"
@@ -120,7 +120,7 @@ def motion(model: Model, options: Namespace) -> Motion | None:
     rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
     try:
         if passes:
-            return Translation(*rates, ends=options.ends or "absorbing", damping=damping)
+            return Translation(*rates, boundaries=options.boundaries or "absorbing", damping=damping)
         center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
         return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
     except InputError as error:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import ModelError
-from kratos_lite.model.loads import NodalForces, Timed
+from kratos_lite.model.loads import NodalForces, TimeDependentLoad
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Progress
 from kratos_lite.validation import flag, positive_step, whole_number
 
@@ -93,14 +94,14 @@ class Scene:
 
         Raises ModelError where the input says nothing of a march, and the errors of `kratos_lite.Transient`.
         """
-        from kratos_lite.analysis import Moment
+        from kratos_lite.analysis import Moment, Transient
 
         march = self._march()
         names = ("scheme", "rayleigh", "lumped", "displacement", "velocity")
         given = {name: getattr(march, name) for name in names} | {"progress": progress}
         transient = self.model.transient(**given)
         if not march.balanced and not (march.displacement is None and march.velocity is None):
-            transient = _held_at_first(transient).transient(**given)
+            transient = Transient(_held_at_first(transient), **given)
         if march.restart is not None:
             transient.put(Moment.load(march.restart))
         return transient
@@ -116,11 +117,11 @@ class Scene:
         return self.march
 
 
-def _held_at_first(transient: Transient) -> Model:
+def _held_at_first(transient: Transient) -> Structure:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
     inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)
-    balance = NodalForces(e.system.whole(inner))
+    balance = NodalForces(e.system.scatter(inner))
     model = copy(e.model)
-    model.loads = [*model.loads, Timed(lambda time: None if time > 0 else balance)]
+    model.loads = [*model.loads, TimeDependentLoad(lambda time: None if time > 0 else balance)]
     return model

@@ -54,7 +54,7 @@ class Mesh:
         source: str = "",
     ) -> None:
         try:
-            self.points: Array = np.ascontiguousarray(points, dtype=float)
+            self.points: Array = np.array(points, dtype=float, order="C")
         except (TypeError, ValueError):
             raise MeshError(f"points must be real numbers of shape (n, 3); got {points!r:.80}") from None
         if self.points.ndim != 2 or self.points.shape[1] != 3:

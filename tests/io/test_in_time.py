@@ -7,6 +7,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.io.project import is_in_time, read_project
+from kratos_lite.model.loads import ScaledLoad
 
 TO_NODES = "assign_scalar_variable_process"
 TO_CONDITIONS = "assign_scalar_variable_to_conditions_process"
@@ -100,7 +101,7 @@ def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
     scene = read_project(
         write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", "-9.81*(1+Z)"), ("Top", "SURFACE_LOAD_X", 1e4))
     )
-    assert [type(load).__name__ for load in scene.model.loads] == ["Varying", "Varying"]
+    assert [type(load).__name__ for load in scene.model.loads] == ["ScaledLoad", "ScaledLoad"]
     calls = []
     for kind in (kl.Gravity, type(scene.model.loads[1].load)):
         forces = kind.forces
@@ -123,7 +124,7 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     assert forces[2] is not forces[1]
     assert forces[4] is forces[3]
     ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
-    expected = by_hand(kl.Varying(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), scheme=kl.bossak())
+    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), scheme=kl.bossak())
     for one, other in zip(moments(scene), expected, strict=True):
         same(one, other)
 
@@ -132,7 +133,7 @@ def test_gravity_stays_assembled_while_another_load_changes(write):
     scene = read_project(
         write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", -9.81), ("Top", "SURFACE_LOAD_X", "t"))
     )
-    assert [type(load).__name__ for load in scene.model.loads] == ["Varying", "Timed"]
+    assert [type(load).__name__ for load in scene.model.loads] == ["ScaledLoad", "TimeDependentLoad"]
 
 
 def test_supports_that_move_with_t(write):
@@ -148,15 +149,15 @@ def test_supports_that_move_with_t(write):
 
 def test_a_constant_support_replaces_a_moving_one_that_comes_before(write):
     scene = read_project(write(("Bottom", "DISPLACEMENT_X", "t"), *CLAMP))
-    assert not scene.model.supports.movements
+    assert not scene.model.supports.motions
     scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "t")))
-    assert len(scene.model.supports.movements) == 1
+    assert len(scene.model.supports.motions) == 1
 
 
 def test_a_start_on_a_support_leaves_its_movement(write):
     pulled = ("Structure", "DISPLACEMENT_X", "0.01*Z", {"interval": [0.0, 0.0], "constrained": False})
     scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
-    assert len(scene.model.supports.movements) == 1
+    assert len(scene.model.supports.motions) == 1
     end = moments(scene)[-1]
     bottom = scene.model.mesh.nodes("Bottom")
     np.testing.assert_allclose(end.u[bottom, 0], 0.01 * end.time, rtol=1e-12)
@@ -202,7 +203,7 @@ def test_options_change_a_dynamic_run_file(write, run):
     assert done.rows["scheme"] == "newmark(0.25, 0.5)"
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom")
-    model.add(kl.Varying(kl.Traction("Top", (1e5, 0.0, 0.0)), lambda t: t))
+    model.add(kl.Traction("Top", (1e5, 0.0, 0.0)), amplitude=lambda t: t)
     *_, last = model.transient().march(dt=5e-3, steps=40)
     with np.load("end.npz") as file:
         np.testing.assert_allclose(file["u"][-1], last.u, rtol=0, atol=1e-10 * np.abs(last.u).max())

@@ -85,13 +85,16 @@ def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, c
 
 def test_a_translation_in_words_and_in_a_run_file_are_the_same(folder):
     common = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "y-:xyz", "--traction", "y+:1e3,0,0")
-    assert run("bar.mdpa", *common, "--translation", "x:-5", "--ends", "fixed", "--json", "a.json", "-q") == 0
+    assert (
+        run("bar.mdpa", *common, "--translation", "x:-5", "--boundaries", "fixed", "--json", "a.json", "-q")
+        == 0
+    )
     path = write(
         folder,
         model="bar.mdpa",
         fix={"y-": "xyz"},
         traction={"y+": [1e3, 0, 0]},
-        ale={"translation": {"direction": [1, 0, 0], "rate": -5, "ends": "fixed"}},
+        ale={"translation": {"direction": [1, 0, 0], "rate": -5, "boundaries": "fixed"}},
         json="b.json",
     )
     assert run(str(path), "-q") == 0
@@ -158,10 +161,10 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
         (("--rotation", "z:1", "--translation", "x:1"), "a model has one motion"),
         (("--center", "-1,0,0"), "--center belongs to --rotation"),
         (("--stiffening", "--translation", "x:1"), "--stiffening belongs to --rotation"),
-        (("--ends", "fixed"), "--ends belongs to --translation"),
+        (("--boundaries", "fixed"), "--boundaries belongs to --translation"),
         (("--rotation", "x:1"), "not one of revolution about the axis"),
         (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
-        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number in 1/s, ≥ 0; got -2.0"),
+        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number ≥ 0, in 1/s; got -2.0"),
         (("--damping", "2"), "--damping belongs to --rotation or --translation"),
         (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
     ],
@@ -185,7 +188,10 @@ def test_options_that_are_wrong_end_in_one_line(folder, capsys, words, message):
         ({"rotation": {"rate": 1, "skew": 1}}, "ale.rotation.skew must be true or false"),
         ({"rotation": {"rate": 1, "damping": -1}}, "ale.rotation: a damping must be"),
         ({"rotation": {"rate": {"times": [0, 0], "values": [1, 2]}}}, "ale.rotation.rate: times of a series"),
-        ({"translation": {"rate": 1, "ends": "open"}}, "ale.translation: ends must be one of absorbing"),
+        (
+            {"translation": {"rate": 1, "boundaries": "open"}},
+            "ale.translation: boundaries must be one of",
+        ),
     ],
 )
 def test_a_wrong_section_is_refused_with_its_line(folder, ale, message):

@@ -697,7 +697,7 @@ BAD = {
         changed(model_import_settings={"input_type": "use_input_model_part"}),
         "input_type 'use_input_model_part' is not supported",
     ),
-    "misplaced list": (misplaced(), "belongs into the object 'processes'"),
+    "misplaced list": (misplaced(), "belongs in the object 'processes'"),
     "unknown process": (
         processes({"python_module": "assign_vector_variable_proces", "Parameters": {}}),
         "unknown process 'assign_vector_variable_proces'. Did you mean assign_vector_variable_process",

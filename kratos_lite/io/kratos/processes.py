@@ -86,8 +86,8 @@ class Action:
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""
         value = self.value(places[self.on_conditions][self.rows], time)
-        setter = values.set_conditions if self.on_conditions else values.set_nodes
-        setter(self.component, self.rows, value)
+        fields = values.conditional if self.on_conditions else values.nodal
+        fields.put(self.component, self.rows, value)
 
 
 def _value(settings: Settings, value: Any, key: str) -> Value:

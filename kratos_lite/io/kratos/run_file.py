@@ -92,61 +92,48 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
 
 def _check_root(settings: Settings) -> list[str]:
     for key in ("modelers", "stages", "orchestrator", "restart_load_file_label"):
-        if settings.values.get(key):
-            raise settings.error(key, f"{key!r} is not supported; name the mesh in model_import_settings")
+        text = f"{key!r} is not supported; name the mesh in model_import_settings"
+        settings.expect(not settings.values.get(key), key, text)
     unknown = settings.unknown(ROOT_KEYS)
     for key in unknown:
-        if key.endswith("_process_list"):
-            raise settings.error(key, f"{key!r} belongs into the object 'processes'; Kratos ignores it here")
+        text = f"{key!r} belongs in the object 'processes'; Kratos ignores it here"
+        settings.expect(not key.endswith("_process_list"), key, text)
     return [f"key {key!r} is not used" for key in unknown if not key.startswith("_")]
 
 
 def _check_solver(solver: Settings) -> list[str]:
     """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
-    kind = solver.text("solver_type")
-    if kind not in ("Static", "static", *DYNAMIC):
-        raise solver.error(
-            "solver_type",
-            f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', "
-            "then --modes for frequencies",
-        )
-    if solver.integer("domain_size") != 3:
-        raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
-    analysis = solver.text("analysis_type", "non_linear")
-    if analysis not in ("linear", "non_linear"):
-        raise solver.error(
-            "analysis_type", f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
-        )
+    kind, analysis = solver.text("solver_type"), solver.text("analysis_type", "non_linear")
+    text = (
+        f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', then --modes "
+    )
+    solver.expect(kind in ("Static", "static", *DYNAMIC), "solver_type", text + "for frequencies")
+    size = solver.integer("domain_size")
+    solver.expect(size == 3, "domain_size", f"domain_size must be 3; got {size}")
+    text = f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+    solver.expect(analysis in ("linear", "non_linear"), "analysis_type", text)
     for key in OTHER_PHYSICS:
-        if solver.values.get(key):
-            raise solver.error(
-                key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
-            )
+        text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
+        solver.expect(not solver.values.get(key), key, text)
     known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
     notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
     if analysis == "non_linear":
-        notes.append(
-            "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"
-        )
+        notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
-    if chosen:
-        notes.append(f"linear solver {chosen}: kratos_lite chooses its own")
-    return notes
+    return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
 
 
 def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) -> Document:
     source = solver.section("model_import_settings", required=True)
     kind = source.text("input_type", "mdpa")
-    if kind != "mdpa":
-        raise source.error("input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
+    source.expect(kind == "mdpa", "input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
     path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
     document = read_document(path)
     check_elements(document)
     notes += [note] if note else []
-    if not solver.flag("multi_point_constraints_used", True) and document.constraints:
-        notes.append(
-            f"multi_point_constraints_used is false: {len(document.constraints)} constraints left out"
-        )
+    unused = len(document.constraints)
+    if unused and not solver.flag("multi_point_constraints_used", True):
+        notes.append(f"multi_point_constraints_used is false: {unused} constraints left out")
         document.constraints = []
     return document
 
@@ -180,15 +167,12 @@ def _read_processes(
                 elif module in COMPARISONS:
                     checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
                 elif module.endswith("_output_process") or module in OUTPUTS:
-                    notes.append(
-                        f"{entry.path}: {module} is not run; ask kratos_lite for files with --output"
-                    )
+                    text = f"{module} is not run; ask kratos_lite for files with --output"
+                    notes.append(f"{entry.path}: {text}")
                 else:
-                    place = entry.values.places.get("python_module") or entry.values.places["name"]
                     known = [*PROCESSES, *COMPARISONS]
-                    problems.add(
-                        f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}",
-                        *place,
-                    )
+                    text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
+                    places = entry.values.places
+                    problems.add(text, *(places.get("python_module") or places["name"]))
     problems.raise_if_any()
     return actions, checks

@@ -17,7 +17,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
-from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.typing import Array
 
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
@@ -74,12 +74,12 @@ class ProcessesInTime:
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
-            self._later.append(Timed(_LoadInTime(self, mine, base.only(group), load_of)))
+            self._later.append(TimeDependentLoad(_LoadInTime(self, mine, base.only(group), load_of)))
         values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
-        loads: list[Load] = [Varying(load, _begun) for load in model.loads]
+        loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
         for rows, axis, course in self._moving:
             model.fix(rows, axis, course, override=True)
@@ -127,13 +127,13 @@ class ProcessesInTime:
             name = action.component
             if steps[0] == 0 and action.factors:
                 value = action.value(points[action.rows], self.context.times[0])
-                start.set_nodes(name, action.rows, value)
+                start.nodal.put(name, action.rows, value)
                 is_still = not name.startswith("ACCELERATION") or not np.any(value)
                 text = f"{name} cannot be given; the acceleration at the start is 0"
                 action.settings.expect(is_still, "variable_name", text)
             if action.fixed and name.startswith("DISPLACEMENT"):
                 start.fix(name, action.rows)
-        u, v = start.vector("DISPLACEMENT"), start.vector("VELOCITY")
+        u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
         held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
         if v[np.transpose(held)].any():
             self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")

@@ -25,14 +25,11 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
     """Return the march of a dynamic run file of Kratos; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
-    if times[0] != 0:
-        raise problem.error(
-            "start_time", f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
-        )
+    text = f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
+    problem.expect(times[0] == 0, "start_time", text)
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
     for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
-        if value < 0:
-            raise solver.error(key, f"{key} must be ≥ 0; got {value:g}")
+        solver.expect(value >= 0, key, f"{key} must be ≥ 0; got {value:g}")
     return March(
         solver.section("time_stepping").number("time_step"),
         len(times) - 1,
@@ -56,8 +53,8 @@ def _scheme(solver: Settings) -> Implicit:
             "the option --scheme central_difference then marches explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
-    if beta != 0.25:
-        raise solver.error("newmark_beta", f"newmark_beta must be 0.25, which is stable; got {beta:g}")
+    text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"
+    solver.expect(beta == 0.25, "newmark_beta", text)
     try:
         if kind == "newmark":
             return newmark()

@@ -14,7 +14,7 @@ from kratos_lite.time_series import TimeSeries
 COMMON = ("rate", "acceleration", "damping")
 KEYS = {
     "rotation": ("axis", "center", "skew", "stiffening", *COMMON),
-    "translation": ("direction", "ends", *COMMON),
+    "translation": ("direction", "boundaries", *COMMON),
 }
 
 
@@ -22,7 +22,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
 
     It is ``{"rotation": {"axis", "rate", "acceleration", "center", "skew", "stiffening", "damping"}}`` or
-    ``{"translation": {"direction", "rate", "acceleration", "ends", "damping"}}`` with the arguments of
+    ``{"translation": {"direction", "rate", "acceleration", "boundaries", "damping"}}`` with the arguments of
     `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.  Given a
     `time` in s, such tables stay what they are then.
 
@@ -59,7 +59,7 @@ def read_motion(section: Settings, kind: str, time: float | None = None) -> Moti
             given[key] = section.vector(key)
         elif key in ("skew", "stiffening"):
             given[key] = section.flag(key)
-        elif key == "ends":
+        elif key == "boundaries":
             given[key] = section.text(key)
         else:
             value = section.number(key) if key == "damping" else number_or_series(section, key)

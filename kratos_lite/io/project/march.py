@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.project.settings import Settings, inside, is_number, shown
 from kratos_lite.io.scene import March
-from kratos_lite.model.loads import Load, Varying
+from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.validation import positive_step, whole_number
 
@@ -130,4 +130,6 @@ def varying(section: Settings, key: str, make: Callable[[Settings, str], Load]) 
     table = section.section(key)
     table.check_keys(("value", "times", "factors"))
     load = make(table, "value")
-    return Varying(load, _checked(section, key, TimeSeries, table.numbers("times"), table.numbers("factors")))
+    return ScaledLoad(
+        load, _checked(section, key, TimeSeries, table.numbers("times"), table.numbers("factors"))
+    )

@@ -17,7 +17,7 @@ from kratos_lite.io.project.march import NO_RESULT, SERIES, march_of, varying
 from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
 from kratos_lite.io.scene import Scene
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, Traction, Varying
+from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, TimeDependentLoad, Traction
 
 SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
@@ -101,7 +101,7 @@ def _read_own(settings: Settings, folder: Path, outside: bool) -> Scene:
 
 def _changes(model: Model) -> bool:
     """Whether loads or supports change with the time."""
-    return bool(model.supports.movements) or any(isinstance(load, Varying) for load in model.loads)
+    return bool(model.supports.motions) or any(isinstance(load, TimeDependentLoad) for load in model.loads)
 
 
 def _gravity(settings: Settings) -> Load:
