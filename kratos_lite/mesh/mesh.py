@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, distinct, rows_of_ids, select, without_repeats
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Part,
+    distinct,
+    ids_of,
+    rows_of_ids,
+    select,
+    without_repeats,
+)
 from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.topology import Faces, inverted, mirror
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -103,7 +112,7 @@ class Mesh:
     @property
     def element_ids(self) -> Ints:
         """(m,) element ids through all blocks in order."""
-        return np.concatenate([NO_ROWS, *(block.ids for block in self.blocks)])
+        return ids_of(self.blocks)
 
     @cached_property
     def _node_order(self) -> Ints:
