@@ -2,7 +2,7 @@
 # # A pulse in a moving window
 #
 # A window of 20 m moves with 0.4 c along an endless bar.  A bump of 1 mm that is let go splits into two
-# waves: seen from the window one is slow, the other fast.  Both leave through absorbing ends.
+# waves: seen from the frame one is slow, the other fast.  Both leave through absorbing boundaries.
 
 # %%
 import sys
@@ -18,7 +18,7 @@ rate = 0.4 * c
 
 model = kl.Model(bar, soil)
 model.fix(range(bar.n_nodes), "yz")
-model.add(kl.ale.Translation("x", rate, ends="absorbing"))
+model.add(kl.ale.Translation("x", rate, boundaries="absorbing"))
 
 
 def bump(x):

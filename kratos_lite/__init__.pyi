@@ -52,12 +52,18 @@ from kratos_lite.errors import MaterialError as MaterialError
 from kratos_lite.errors import MeshError as MeshError
 from kratos_lite.errors import ModelError as ModelError
 from kratos_lite.errors import SolveError as SolveError
+from kratos_lite.io.case import Case as Case
+from kratos_lite.io.case import Outputs as Outputs
+from kratos_lite.io.case import TimeIntegration as TimeIntegration
 from kratos_lite.io.files import read as read
+from kratos_lite.io.files import read_case as read_case
 from kratos_lite.io.files import write as write
+from kratos_lite.io.run import run as run
+from kratos_lite.io.runners.outcome import Outcome as Outcome
 from kratos_lite.io.writers.pictures import draw as draw
 from kratos_lite.io.writers.pictures import draw_element as draw_element
-from kratos_lite.io.writers.pictures import draw_trajectory as draw_trajectory
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
+from kratos_lite.io.writers.trajectory import draw_trajectory as draw_trajectory
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import Isotropic3D as Isotropic3D
 from kratos_lite.materials import LinearMaterial as LinearMaterial
@@ -73,9 +79,8 @@ from kratos_lite.model.loads import LineLoad as LineLoad
 from kratos_lite.model.loads import NodalForces as NodalForces
 from kratos_lite.model.loads import PointLoad as PointLoad
 from kratos_lite.model.loads import Pressure as Pressure
-from kratos_lite.model.loads import Timed as Timed
+from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads import Traction as Traction
-from kratos_lite.model.loads import Varying as Varying
 from kratos_lite.model.mass_properties import MassProperties as MassProperties
 from kratos_lite.shapes import Shape as Shape
 

@@ -13,12 +13,17 @@ from kratos_lite.validation import finite
 
 
 class TimeSeries:
-    """A piecewise linear function of the time; before the first and after the last time it is constant.
+    """A piecewise linear function of time; before the first and after the last time it is constant.
 
     Parameters
     ----------
     times : (k,) s, strictly ascending.
     values : (k,) floats.
+
+    Raises
+    ------
+    InputError
+        If there are not as many values as times, or the times do not ascend.
 
     Examples
     --------
@@ -42,8 +47,18 @@ class TimeSeries:
         return float(np.interp(time, self.times, self.values))
 
     def slope(self, time: float) -> float:
-        """Return the derivative at a time in s; at a kink the mean of both sides, at 0 the later one.
+        """Return the derivative; at a kink the mean of both sides, at time 0 that of the later one.
 
+        Parameters
+        ----------
+        time : s.
+
+        Returns
+        -------
+        float
+
+        Examples
+        --------
         >>> ramp = TimeSeries([0.0, 2.0], [0.0, 10.0])
         >>> ramp.slope(0.0), ramp.slope(1.0), ramp.slope(2.0), ramp.slope(3.0)
         (5.0, 5.0, 2.5, 0.0)
@@ -58,7 +73,16 @@ class TimeSeries:
         return float(before + after) / 2
 
     def integral(self, start: float, end: float) -> float:
-        """Return the integral from start to end, exactly."""
+        """Return the exact integral over time.
+
+        Parameters
+        ----------
+        start, end : s.
+
+        Returns
+        -------
+        float
+        """
         inner = self.times[(self.times > start) & (self.times < end)]
         knots = np.concatenate([[start], inner, [end]])
         return float(np.trapezoid(np.interp(knots, self.times, self.values), knots))

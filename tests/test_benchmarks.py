@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import OURS
 
 import kratos_lite as kl
 
@@ -184,6 +185,14 @@ def test_a_run_is_stopped_at_its_limit(tmp_path):
     short = driver.Driver(tmp_path, 1, limit=0.01, tell=lambda line: None)
     (row,) = short.measure([driver.Run("goal", "kratos_lite", "block", "8N", 1)])
     assert row["failed"] == "stopped at the time limit"
+
+
+def test_scenes_of_a_folder_are_written_whole(tmp_path):
+    files = cases.prepared(OURS, tmp_path)
+    assert sorted(path.name for path in files) == ["bar_8N.mdpa", "elem_column_27N.mdpa"]
+    model = kl.read(tmp_path / "bar_8N.mdpa")
+    assert model.supports.fixed.sum() == 4 + 6 + 6
+    assert model.loads
 
 
 def test_real_scenes_are_written_whole(shared, tmp_path):

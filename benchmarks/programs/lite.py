@@ -38,7 +38,7 @@ def work(job: Job) -> Array | None:
         return None
     if job.task == "assembly":
         return assembly(job, model)
-    system = model.system(**{word: job.given[word] for word in WORDS if word in job.given})
+    system = model.static(**{word: job.given[word] for word in WORDS if word in job.given})
     for _ in range(job.given.get("cases", 1)):
         result = system.solve()
     for _ in range(1, job.given.get("again", 1)):

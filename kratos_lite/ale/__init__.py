@@ -1,4 +1,4 @@
-"""ALE terms: a rotating body of revolution, and a uniformly translated window of a long body."""
+"""ALE terms: a rotating body of revolution, and a frame that moves along a long body."""
 
 from kratos_lite.ale.matrices import MotionMatrices
 from kratos_lite.ale.motion import Motion, Rotation, Translation

@@ -1,39 +1,61 @@
-"""The ends of a window: the two faces at which it cuts the body, and what they do."""
+"""Boundaries: where material passes through a mesh, and the two cut faces of a moving frame."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kratos_lite.ale.motion import Translation
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.elements.surface import surface_mass
+from kratos_lite.elements.surface import area_vectors, face_rule, surface_mass
 from kratos_lite.errors import ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints
 from kratos_lite.voigt import acoustic_tensor
 
-if TYPE_CHECKING:
-    from kratos_lite.solvers.constrained_system import ConstrainedSystem
-
-
 FLAT = 1e-6
-"""Share of the length of the window by which an end face may be uneven."""
+"""Share of the length of the frame by which a cut face may be uneven."""
 
 
-def end_nodes(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
-    """Return the rows of the nodes at the lower and the upper end along the direction."""
-    x = mesh.points @ motion.direction
+def cut_nodes(mesh: Mesh, direction: Array) -> tuple[Ints, Ints]:
+    """Return the rows of the nodes on the lower and the upper cut face along a unit direction (3,)."""
+    x = mesh.points @ direction
     used = mesh.used_nodes()
     low, high = float(x[used].min()), float(x[used].max())
     near = FLAT * (high - low)
     return np.flatnonzero((x <= low + near) & used), np.flatnonzero((x >= high - near) & used)
 
 
-def dashpots(mesh: Mesh, motion: Translation, system: ConstrainedSystem) -> BlockMatrix:
-    """Return the damping of absorbing ends, (3a, 3a) in N s/m; see `impedance`.
+def leak(mesh: Mesh, velocity: Callable[[Array], Array], open_faces: Sequence[Ints] = ()) -> float:
+    """Return the largest normal velocity at the boundary as a share of the largest velocity there.
+
+    Parameters
+    ----------
+    mesh : the elements.
+    velocity : of the material through the mesh at points (..., 3).
+    open_faces : nodes of each plane face that the material may pass through.
+    """
+    normal, largest, is_open = 0.0, 0.0, np.zeros((len(open_faces) + 1, mesh.n_nodes), dtype=bool)
+    for mask, nodes in zip(is_open, open_faces, strict=False):
+        mask[nodes] = True
+    for block in mesh.boundary:
+        if block.shape is None or not len(block):
+            continue
+        rule = face_rule(block.shape)
+        X = mesh.points[block.nodes[~is_open[:, block.nodes].all(axis=2).any(axis=0)]]
+        n = area_vectors(block.shape, X, rule)
+        n = n / np.linalg.norm(n, axis=-1, keepdims=True)
+        N = np.array([block.shape.N(xi) for xi in rule.points])
+        c = velocity(N @ X)
+        normal = max(normal, float(np.abs((c * n).sum(axis=-1)).max(initial=0.0)))
+        largest = max(largest, float(np.linalg.norm(c, axis=-1).max(initial=0.0)))
+    return normal / largest if largest else 0.0
+
+
+def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem) -> BlockMatrix:
+    """Return the damping of absorbing boundaries, (3a, 3a) in N s/m; see `impedance`.
 
     Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
     """
@@ -45,22 +67,21 @@ def dashpots(mesh: Mesh, motion: Translation, system: ConstrainedSystem) -> Bloc
     local[system.nodes] = np.arange(len(system.nodes))
     of_element = np.zeros((mesh.n_elements, 3, 3))
     for group in system.groups:
-        of_element[group.rows] = impedance(group.material, motion.direction)
-    for nodes in end_nodes(mesh, motion):
+        of_element[group.rows] = impedance(group.material, direction)
+    for nodes in cut_nodes(mesh, direction):
         faces = mesh.faces(nodes)
         if not faces:
             raise ModelError(
-                "an end of the window has no face across the direction "
-                f"{motion.direction.tolist()}, so nothing can absorb waves there; cut the body across it, or "
-                "take ends='natural'"
+                f"the body has no face across the direction {direction.tolist()} at one end, so nothing can "
+                "absorb waves there; cut the body across it, or take boundaries='natural'"
             )
         for block in faces:
             assert block.shape is not None
             m = surface_mass(block.shape, mesh.points[block.nodes])
             blocks = m[..., None, None] * of_element[block.ids][:, None, None]
             cells = local[block.nodes]
-            places = np.searchsorted(keys, cells[:, :, None] * pattern.n_nodes + cells[:, None, :])
-            np.add.at(data, places, blocks)
+            at = np.searchsorted(keys, cells[:, :, None] * pattern.n_nodes + cells[:, None, :])
+            np.add.at(data, at, blocks)
     return BlockMatrix(data, pattern.indices, pattern.indptr)
 
 
@@ -69,6 +90,8 @@ def impedance(material: LinearMaterial, direction: Array) -> Array:
 
     Of an isotropic material it is ρ c_p along the direction and ρ c_s across it.
 
+    Examples
+    --------
     >>> from kratos_lite.materials import Isotropic3D
     >>> impedance(Isotropic3D(E=4.0, nu=0.0, density=1.0), np.array([1.0, 0, 0])).round(9).diagonal().tolist()
     [2.0, 1.414213562, 1.414213562]
@@ -77,16 +100,16 @@ def impedance(material: LinearMaterial, direction: Array) -> Array:
     return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)
 
 
-def periodic_pairs(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
-    """Return the nodes of the upper end and those of the lower one that they meet.
+def periodic_pairs(mesh: Mesh, direction: Array) -> tuple[Ints, Ints]:
+    """Return the nodes of the upper cut face and the opposite ones of the lower.
 
     Raises
     ------
     ModelError
-        If the nodes of the two ends do not lie opposite one another.
+        If the nodes of the two faces do not lie opposite one another.
     """
-    low, high = end_nodes(mesh, motion)
-    across = np.eye(3) - np.outer(motion.direction, motion.direction)
+    low, high = cut_nodes(mesh, direction)
+    across = np.eye(3) - np.outer(direction, direction)
     a, b = mesh.points[low] @ across, mesh.points[high] @ across
     size = float(np.ptp(mesh.points, axis=0).max())
     if len(low) == len(high):
@@ -95,6 +118,6 @@ def periodic_pairs(mesh: Mesh, motion: Translation) -> tuple[Ints, Ints]:
         if len(set(nearest.tolist())) == len(high) and distance.min(axis=0).max() <= FLAT * size:
             return high, low[nearest]
     raise ModelError(
-        f"periodic ends need nodes that lie opposite one another; there are {len(low)} and {len(high)}, "
-        "not in the same places"
+        "periodic boundaries need nodes that lie opposite one another; "
+        f"there are {len(low)} and {len(high)}, not in the same places"
     )

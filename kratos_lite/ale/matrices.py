@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kratos_lite.ale.motion import Motion, Rotation
+from kratos_lite.ale.motion import Motion
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
@@ -36,6 +36,14 @@ class MotionMatrices:
     All are data (nnz,) on one pattern.  Loads come from `mass`, which is consistent also where that of the
     equations is lumped.
 
+    Parameters
+    ----------
+    motion : of the material.
+    points : (n, 3) nodes in m.
+    groups : the elements.
+    pattern : of the matrices.
+    mass : of the same elements.
+
     Attributes
     ----------
     G : ∫ ρ N_i c·grad N_j, row i of the test function.
@@ -52,24 +60,24 @@ class MotionMatrices:
         self._made: dict[str, Array] = {}
 
     def make(self, names: str) -> None:
-        """Make G, H or both, of those not made before, in one pass over the elements."""
+        """Make G, H or both, of those not made before, in one pass over the elements.
+
+        Parameters
+        ----------
+        names : ``"G"``, ``"H"`` or ``"GH"``.
+        """
         missing = "".join(name for name in names if name not in self._made)
         if missing:
-            points, velocity = self._flow()
+            motion = self.motion  # points from the center on, where no digits are lost
+            velocity = np.column_stack([motion.A, motion.field(motion.center)])
             self._made |= inertia_matrices(
-                points,
+                self.points - motion.center,
                 self.groups,
                 self.pattern,
                 missing,
                 lambda element: exact_rule(element.shape),
                 velocity,
             )
-
-    def _flow(self) -> tuple[Array, Array]:
-        """Return the points and (3, 4): A and b of the velocity c = A X + b at them."""
-        if isinstance(self.motion, Rotation):  # from the axis on, where no digits are lost
-            return self.points - self.motion.center, np.column_stack([self.motion.A, np.zeros(3)])
-        return self.points, np.column_stack([np.zeros((3, 3)), self.motion.field(np.zeros(3))])
 
     @property
     def G(self) -> Array:
@@ -88,6 +96,16 @@ class MotionMatrices:
         """The skew part (G - G^T) / 2."""
         return (self.G - self._transposed(self.G)) / 2
 
+    @property
+    def gyroscopic(self) -> Array:
+        """What 2 rate multiplies in the damping: S, or G where that is asked for."""
+        return self.S if self.motion.skew else self.G
+
+    @property
+    def circulatory(self) -> Array:
+        """What the acceleration multiplies in the stiffness; G where material passes through open faces."""
+        return self.G if self.motion.is_open else self.gyroscopic
+
     def _transposed(self, data: Array) -> Array:
         from scipy.sparse import csr_array
 
@@ -97,7 +115,17 @@ class MotionMatrices:
         return np.asarray(matrix.data)
 
     def times(self, data: Array, v: Array) -> Array:
-        """Return the matrix of `data` times nodal vectors v (n, 3)."""
+        """Return a product with nodal vectors.
+
+        Parameters
+        ----------
+        data : (nnz,) of a matrix on the pattern.
+        v : (n, 3).
+
+        Returns
+        -------
+        (n, 3).
+        """
         from scipy.sparse import csr_array
 
         n = self.pattern.n_nodes
@@ -108,26 +136,29 @@ class MotionMatrices:
     @cached_property
     def centrifugal(self) -> Array:
         """-∫ ρ N A² (X - X0), outward, as nodal forces (n, 3) for the rate 1; 0 for a translation."""
-        if not isinstance(self.motion, Rotation):
-            return np.zeros_like(self.points)
         return self._inertia(-self.motion.A @ self.motion.A)
 
     @cached_property
     def euler(self) -> Array:
         """-∫ ρ N A (X - X0) as nodal forces (n, 3) for the acceleration 1; 0 for a translation."""
-        if not isinstance(self.motion, Rotation):
-            return np.zeros_like(self.points)
         return self._inertia(-self.motion.A)
 
     def _inertia(self, A: Array) -> Array:
-        assert isinstance(self.motion, Rotation)
-        arms = (self.points - self.motion.center) @ A.T
-        return np.asarray(self.mass.scalar @ arms)
+        return np.asarray(self.mass.scalar @ ((self.points - self.motion.center) @ A.T))
 
     # ---- centrifugal stiffening ---------------------------------------------------------------------
 
     def stiffening(self, u0: Array) -> Array:
-        """Return ∫ σ(u0) : (grad N_i ⊗ grad N_j) as data (nnz,) in N/m, of displacements u0 (n, 3)."""
+        """Return the stiffness of the centrifugal stress, ∫ σ(u0) : (grad N_i ⊗ grad N_j).
+
+        Parameters
+        ----------
+        u0 : (n, 3) displacements in m.
+
+        Returns
+        -------
+        (nnz,) in N/m.
+        """
         data = np.zeros(len(self.pattern.indices))
         for number, group in enumerate(self.groups):
             stress = tensor(gauss_point_fields.at_gauss(self.points, group, u0))

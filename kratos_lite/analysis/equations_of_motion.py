@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import solvers
-from kratos_lite.ale import MotionMatrices, Rotation, Translation
-from kratos_lite.ale.boundaries import dashpots
-from kratos_lite.ale.checks import warnings_of
+from kratos_lite.ale import MotionMatrices
 from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.ale.symmetry import check_materials
-from kratos_lite.analysis.time_dependent_loads import AppliedLoads, Prescribed
+from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.rigid_body_modes import check_supports
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.supports import resolve
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 Solve: TypeAlias = Callable[[Array, Array], Array]
 """Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
@@ -63,7 +57,7 @@ class EquationsOfMotion:
 
     def __init__(
         self,
-        model: Model,
+        model: Structure,
         *,
         lumped: bool = False,
         rayleigh: tuple[float, float] = (0.0, 0.0),
@@ -74,25 +68,23 @@ class EquationsOfMotion:
         self.model, self._steady = model, steady
         self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)
-        self.groups, part, self.warnings = model.checked(free=free)
+        self.groups, _, self.warnings = model.checked(free=free)
         for group in self.groups:
             if not group.material.density > 0:
                 raise ModelError(
                     f"{type(group.material).__name__} has density {group.material.density:g}, but what moves "
                     "needs mass; give each material a density > 0 kg/m³"
                 )
-        links = resolve(model.supports, part >= 0) if model.supports.links else {}
         self.system = ConstrainedSystem(
             model.mesh.points,
             self.groups,
-            model.supports,
-            links,
+            model.supports.constraint_map,
             solver="direct",
             patterns=model.patterns,
             progress=progress,
         )
         self.applied = AppliedLoads(model, self.system, self.groups)
-        self.prescribed = Prescribed(model, self.system)
+        self.prescribed = PrescribedDisplacement(model, self.system)
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
@@ -101,7 +93,7 @@ class EquationsOfMotion:
             self.mass = Mass(*placed, True, exact.rule_of) if lumped else exact
             self.terms = MotionMatrices(model.motion, *placed, exact)
             check_materials(self.terms)
-            self.warnings += warnings_of(self.terms, model)
+            self.warnings += model.motion.warnings(model, self.system.groups)
             if self.rayleigh[1]:
                 self.warnings.append(
                     "Rayleigh's β K u' damps in fixed axes, not along with the material that moves; take the "
@@ -161,7 +153,7 @@ class EquationsOfMotion:
                 out = out + rate**2 * self.stiffening
         carried = acceleration + motion.damping * rate
         if carried:
-            flow = carried * (terms.G if isinstance(motion, Translation) else self._convective)
+            flow = carried * terms.circulatory
             out = flow if out is None else out + flow
         return out
 
@@ -170,33 +162,23 @@ class EquationsOfMotion:
         alpha = self.rayleigh[0] + (self.terms.motion.damping if self.terms else 0.0)
         out: Array | None = alpha * self.mass_data if alpha else None
         if self.terms is not None and (rate := self.terms.motion.rate(time)):
-            gyroscopic = 2 * rate * self._convective
+            gyroscopic = 2 * rate * self.terms.gyroscopic
             out = gyroscopic if out is None else out + gyroscopic
         return out
 
     @property
-    def _convective(self) -> Array:
-        """G, or its skew part where that is asked for: a window takes it for 2 s G u', with its dashpots."""
-        assert self.terms is not None
-        motion = self.terms.motion
-        return self.terms.G if isinstance(motion, Rotation) and not motion.skew else self.terms.S
-
-    @property
     def stiffened(self) -> bool:
         """Whether the motion has centrifugal stiffening."""
-        return (
-            self.terms is not None
-            and isinstance(self.terms.motion, Rotation)
-            and self.terms.motion.stiffening
-        )
+        return self.terms is not None and self.terms.motion.stiffening
 
     @cached_property
     def stiffening(self) -> Array:
         """Stiffness by the stress of the centrifugal load for the rate 1, data (nnz,) in kg/s²."""
         assert self.terms is not None
-        at_zero = replace(self.system.reduced, c=np.zeros_like(self.system.reduced.c))
-        equations = solvers.LinearSolver(self.K, at_zero, self.system.points, "direct", "")
-        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12).x
+        reduced = self.system.reduced
+        equations = solvers.LinearSolver(self.K, reduced, self.system.points, "direct", "")
+        at_zero = np.zeros_like(reduced.c)
+        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, prescribed=at_zero).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
     @cached_property
@@ -215,11 +197,8 @@ class EquationsOfMotion:
 
     @cached_property
     def dashpots(self) -> BlockMatrix | None:
-        """Damping of the absorbing ends of a window, (3a, 3a) in N s/m, or None."""
-        motion = self.terms.motion if self.terms else None
-        if not isinstance(motion, Translation) or motion.ends != "absorbing":
-            return None
-        return dashpots(self.model.mesh, motion, self.system)
+        """Damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
+        return self.terms.motion.boundary_damping(self.model.mesh, self.system) if self.terms else None
 
     def times_mass(self, v: Array) -> Array:
         """Return M v."""
@@ -309,15 +288,7 @@ class EquationsOfMotion:
         iterate = symmetric and len(reduced.free) > DIRECT_MAX
         method = "amg" if iterate else "direct"
         equations = solvers.LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
-
-        def solve(f: Array, prescribed: Array) -> Array:
-            reduced.c, kept = prescribed, reduced.c
-            try:
-                return equations.solve(f, 1e-13).x
-            finally:
-                reduced.c = kept
-
-        return solve
+        return lambda f, prescribed: equations.solve(f, 1e-13, prescribed=prescribed).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.eigen import DENSE_MODES, modes
 from kratos_lite.typing import Array, Complexes
 from kratos_lite.validation import whole_number
 
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
-
 FEW = 40
 """Up to this many unknowns there is nothing to iterate for."""
 
 
-def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array, Array]:
+def natural_modes(model: Structure, count: int, lumped: bool = False) -> tuple[Array, Array]:
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
     equations = EquationsOfMotion(model, lumped=lumped)
     K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
@@ -29,7 +27,7 @@ def natural_modes(model: Model, count: int, lumped: bool = False) -> tuple[Array
     return omega, expanded(equations, shapes)
 
 
-def complex_modes(model: Model, count: int) -> tuple[Complexes, Complexes]:
+def complex_modes(model: Structure, count: int) -> tuple[Complexes, Complexes]:
     """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
     e = EquationsOfMotion(model, steady=True)
     M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
@@ -74,7 +72,7 @@ def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Comple
     return 1 / values, vectors
 
 
-def critical_rate(model: Model, count: int = 1) -> Array:
+def critical_rate(model: Structure, count: int = 1) -> Array:
     """Return the lowest rates (count,) at which K - rate² H is singular, in rad/s or m/s.
 
     They are those of the mesh, and fall with ever finer ones.
@@ -155,12 +153,12 @@ def _dense(K: Any, H: Any) -> Array:
 
 def reduced(equations: EquationsOfMotion, A: BlockMatrix) -> Any:
     """Return T^T A T on the free degrees of freedom as CSR."""
-    return equations.system.reduced.restrict(A.scipy().tocsr())
+    return equations.system.reduced.reduce_matrix(A.scipy().tocsr())
 
 
 def expanded(equations: EquationsOfMotion, shapes: Any) -> Any:
     """Return shapes on the free degrees of freedom (q, k) as nodal ones (k, n, 3), 0 where held."""
     system, count = equations.system, shapes.shape[1]
     out = np.zeros((count, system.n_nodes, 3), dtype=shapes.dtype)
-    out[:, system.nodes] = system.reduced.follow(shapes).T.reshape(count, -1, 3)
+    out[:, system.nodes] = system.reduced.transform(shapes).T.reshape(count, -1, 3)
     return out

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.ale import Rotation
 from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.moment import Moment
 from kratos_lite.analysis.result import Report, Result
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 
 class Reacting(Protocol):
@@ -30,7 +27,7 @@ class Reacting(Protocol):
 
 
 def reaction_resultant(
-    model: Model, of: Reacting, where: Where | None = None, center: ArrayLike | None = None
+    model: Structure, of: Reacting, where: Where | None = None, center: ArrayLike | None = None
 ) -> tuple[Array, Array]:
     """Return the force of the supports on the body and its moment about a point, as those of a hub.
 
@@ -71,15 +68,15 @@ def reaction_resultant(
     rows = np.arange(model.mesh.n_nodes) if where is None else model.mesh.nodes(where)
     if not len(rows):
         raise ModelError(f"no node is chosen by {where!r}")
-    given = model.motion.center if isinstance(model.motion, Rotation) else np.zeros(3)
-    point = given if center is None else finite(center, "a center")
+    hub = np.zeros(3) if model.motion is None else model.motion.center
+    point = hub if center is None else finite(center, "a center")
     if point.shape != (3,):
         raise InputError(f"a center must have shape (3,); got {point.shape}")
     forces = of.reactions[rows]
     return forces.sum(axis=0), np.cross(model.mesh.points[rows] - point, forces).sum(axis=0)
 
 
-def material_velocity(model: Model, displacement: ArrayLike, time: float = 0.0) -> Array:
+def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0.0) -> Array:
     """Return the velocity of the material in space where nothing changes with the time: (n, 3) in m/s.
 
     It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
@@ -112,8 +109,8 @@ def material_velocity(model: Model, displacement: ArrayLike, time: float = 0.0) 
     if u.shape != model.mesh.points.shape:
         raise InputError(f"a displacement needs shape {model.mesh.points.shape}; got {u.shape}")
     e = EquationsOfMotion(model)
-    local = e.system.local(u)
-    return e.system.whole(velocity_of_material(e, local, np.zeros_like(local), time))
+    local = e.system.gather(u)
+    return e.system.scatter(velocity_of_material(e, local, np.zeros_like(local), time))
 
 
 def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) -> Array:
@@ -122,8 +119,7 @@ def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) 
     if e.terms is None or not rate:
         return v.copy()
     along = e.mass.solve(e.terms.times(e.terms.G, u.reshape(-1, 3)).ravel())
-    if isinstance(e.terms.motion, Rotation):
-        along = along + e.terms.motion.field(e.system.points).ravel()
+    along = along + e.terms.motion.body_velocity(e.system.points).ravel()
     return np.asarray(v + rate * along)
 
 
@@ -134,12 +130,11 @@ def motion_summary(
     assert e.terms is not None
     (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
     critical = None if critical == np.inf else critical
-    turns = isinstance(e.terms.motion, Rotation)
     noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
     force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))
     return {
-        "kind": "rotation" if turns else "translation",
-        "unit": "rad/s" if turns else "m/s",
+        "kind": e.terms.motion.kind,
+        "unit": e.terms.motion.unit,
         "direction": e.terms.motion.direction.tolist(),
         "rate": rate,
         "acceleration": acceleration,
@@ -155,7 +150,7 @@ def result_of(
     e: EquationsOfMotion, at: Moment, scheme: str, left: float | None, critical: float | None
 ) -> Result:
     """Return a moment as a result; `left` is what its balance misses, where that is known."""
-    model, loads = e.model, e.system.whole(e.load(at.time)).copy()
+    model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=loads.sum(axis=0),

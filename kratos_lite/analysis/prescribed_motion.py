@@ -20,19 +20,19 @@ Course = tuple[Array, Array, Array]
 def prescribed_part(e: EquationsOfMotion, x: Array) -> Array:
     """Return what vectors (3a,) have beyond their free components and what constraints make of those."""
     reduced = e.system.reduced
-    return np.asarray(x - reduced.follow(x[reduced.free]))
+    return np.asarray(x - reduced.transform(x[reduced.free]))
 
 
 def with_prescribed(e: EquationsOfMotion, x: Array, prescribed: Array) -> Array:
     """Return vectors (3a,) with the free components of x; the others follow from supports and constraints."""
     reduced = e.system.reduced
-    return np.asarray(reduced.follow(x[reduced.free]) + prescribed)
+    return np.asarray(reduced.transform(x[reduced.free]) + prescribed)
 
 
 def at_start(e: EquationsOfMotion, h: float = np.inf) -> Course:
     """Return the course at the time 0, by one-sided differences of order 2 over steps no longer than h."""
     g, zero = e.prescribed(0.0), np.zeros(e.size)
-    if not e.model.supports.movements:
+    if not e.model.supports.motions:
         return g, zero, zero
     short, long = min(h, 1e-6), min(h, 1e-5)
     velocity = (-3 * g + 4 * e.prescribed(short) - e.prescribed(2 * short)) / (2 * short)

@@ -1,4 +1,4 @@
-"""Statics: from a model to displacements, one linear solve for each set of loads."""
+"""Static analysis: from a structure to displacements, one linear solution for each set of loads."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,11 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks
-from kratos_lite.model.loads import Load, check_loads
+from kratos_lite.model.loads import Load
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
-from kratos_lite.solvers.supports import resolve
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 
 class Phases:
@@ -43,16 +40,9 @@ class Phases:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
 
 
-def solve_static(
-    model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
-) -> Result:
-    """Solve K u = f with the supports of a model eliminated; see `Model.solve`."""
-    return StaticAnalysis(model, solver, tolerance, progress).solve()
-
-
 @dataclass(eq=False)
 class LoadSet:
-    """Loads, their nodal forces (n, 3) in N alone and with initial stress, and the parts that they move."""
+    """Loads, their nodal forces (n, 3) in N without and with initial stress, and the parts that they move."""
 
     loads: list[Load]
     external: Array
@@ -62,7 +52,7 @@ class LoadSet:
 
 
 def check_arguments(solver: str, tolerance: float, progress: Progress | None) -> None:
-    """Raise InputError for arguments of a solution that are none."""
+    """Raise InputError for an unknown solver, a tolerance beyond 0 … 1, or no function of progress."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
     function_or_none(progress, "progress must be a function of a phase and a share")
@@ -70,20 +60,32 @@ def check_arguments(solver: str, tolerance: float, progress: Progress | None) ->
 
 
 class StaticAnalysis:
-    """A model made ready to be solved for many load sets; made by `Model.system`.
+    """The static analysis of a structure, for many sets of loads; made by `Model.static`.
 
-    It follows its model: new prescribed values are taken over, and anything else that changed what K is
-    (points, elements, materials, rules, which degrees of freedom are prescribed, constraints, initial
-    stress) has it checked and made anew at the next solution.
+    It follows its structure: new prescribed values are taken over; anything else that changes K (materials,
+    rules, which degrees of freedom are prescribed, constraints, initial stress) has all checked and made
+    anew at the next solution.
+
+    Parameters
+    ----------
+    model : the structure.
+    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
+    tolerance : relative residual at which the iterative solver stops.
+    progress : called with the phase and the share done, 0 … 1.
 
     Attributes
     ----------
-    equations : the `ConstrainedSystem` that is solved, or None as long as nothing has moved.
+    system : the `ConstrainedSystem` that is solved, or None as long as nothing has moved.
+
+    Raises
+    ------
+    MeshError, ModelError, InputError
+        The structure is broken, its supports leave rigid-body modes free, or it has a motion.
     """
 
     def __init__(
         self,
-        model: Model,
+        model: Structure,
         solver: str = "auto",
         tolerance: float = 1e-10,
         progress: Progress | None = None,
@@ -96,9 +98,22 @@ class StaticAnalysis:
         self._prepare()
 
     def solve(self, loads: Sequence[Load] | None = None) -> Result:
-        """Solve for some loads in place of those of the model, or for those of the model.
+        """Solve for some loads, or for those of the model.
 
-        Errors as of `Model.solve`.
+        Parameters
+        ----------
+        loads : in place of those of the model.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            A load does not fit, or a change of the model has broken it.
+        SolveError
+            If the accuracy asked for cannot be reached.
         """
         self._follow()
         case = self._load(self.model.loads if loads is None else loads)
@@ -116,26 +131,28 @@ class StaticAnalysis:
     # ---- what is kept from one solution to the next ------------------------------------------------
 
     def _prepare(self) -> None:
-        """Check the model and take note of its state."""
+        """Check the model; what fails is tried again at the next solution."""
         model = self.model
-        self._state: list[Any] = []  # so that what fails below is tried again
+        self._version: tuple[int, int] | None = None
         with self._phase("check"):
+            version = model.version
             self.groups, self.part, self.warnings = model.checked()
             self._used = self.part >= 0
-            self._prescribe()
+            self._read_supports()
             self.initial = initial_loads(model, self.groups)
-            self.equations: ConstrainedSystem | None = None
+            self.system: ConstrainedSystem | None = None
+            self._prescribed: Array | None = None  # where it differs from that of the system
             self._solved = np.zeros(0, dtype=bool)  # parts in the equations
             self._still = 0  # elements left out of them
-            self._state = model.state()
+            self._version = version
 
-    def _prescribe(self) -> None:
-        """Take note of the values that supports prescribe, and of what they hold at rest."""
+    def _read_supports(self) -> None:
+        """Find the nodes that supports displace, and those that they hold at rest."""
         supports = self.model.supports
-        links = resolve(supports, self._used) if supports.links else {}  # first, as it may refuse them
-        self.links, self._values = links, supports.values.copy()
+        slaves = supports.slaves()  # first, as it may refuse them
+        self._value_version = supports.value_version
         moved = supports.fixed & (supports.values != 0)
-        pushed = [slave for slave, (_, constant) in self.links.items() if constant]
+        pushed = [slave for slave, (_, constant) in slaves.items() if constant]
         moved.flat[np.array(pushed, dtype=np.int64)] = True
         self._moved = _any_axis(moved)
         self._held = ~_any_axis(~supports.fixed) & ~self._moved
@@ -143,15 +160,16 @@ class StaticAnalysis:
 
     def _follow(self) -> None:
         """Take over what has changed in the model."""
-        if not same_state(self._state, self.model.state()):
+        supports = self.model.supports
+        if self._version != self.model.version:
             self._prepare()
-        elif not np.array_equal(self._values, self.model.supports.values):
+        elif self._value_version != supports.value_version:
             held = self._held
-            self._prescribe()
-            if self.equations and not np.array_equal(held, self._held):
-                self.equations = None  # elements that were left out may be needed now
-            elif self.equations:
-                self.equations.prescribe(self.links)
+            self._read_supports()
+            if not np.array_equal(held, self._held):
+                self.system = None  # elements that were left out may be needed now
+            if self.system:
+                self._prescribed = supports.constraint_map(self.system.nodes).c
 
     def _load(self, loads: Sequence[Load]) -> LoadSet:
         """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
@@ -172,47 +190,47 @@ class StaticAnalysis:
             moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
         return LoadSet(list(loads), external, forces, moving, phase)
 
-    def _equations_of(self, moving: Mask) -> ConstrainedSystem:
-        """Return the equations of the elements in moving parts, made anew only for a part that is new."""
-        if self.equations is None or (moving & ~self._solved).any():
+    def _system_of(self, moving: Mask) -> ConstrainedSystem:
+        """Return the system of the elements in moving parts, made anew only for a part that is new."""
+        if self.system is None or (moving & ~self._solved).any():
             model = self.model
-            solved = moving if self.equations is None else moving | self._solved
+            solved = moving if self.system is None else moving | self._solved
             parts = solved[self.part] & self._used
             every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
-            self.equations = ConstrainedSystem(
+            self.system = ConstrainedSystem(
                 model.mesh.points,
                 groups,
-                model.supports,
-                self.links,
+                model.supports.constraint_map,
                 solver=self.solver,
                 tolerance=self.tolerance,
                 patterns=model.patterns,
                 progress=self.progress,
             )
+            self._prescribed = None
             self._still = sum(map(len, every)) - sum(map(len, groups))
             self._solved = solved
-        return self.equations
+        return self.system
 
     # ---- one solution ------------------------------------------------------------------------------
 
     def _solve(self, case: LoadSet, moving: Mask) -> Result:
         """Solve for a load set with the equations of all parts in `moving`."""
         model, phase = self.model, case.phase
-        warnings = self.warnings + check_loads(case.loads, self.groups, case.forces, model.supports)
+        warnings = self.warnings + checks.check_loads(case.loads, self.groups, case.forces, model.supports)
         u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
         solution = solvers.Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():
             with phase("assemble"):
-                system = self._equations_of(moving)
+                system = self._system_of(moving)
                 noise = float(np.finfo(float).eps * system.norm)
             with phase("solve"):
-                u, solution = system.solve(case.forces)
+                u, solution = system.solve(case.forces, self._prescribed)
                 u = self._complete(u, system, case.moving)
                 noise *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
-            reactions = model.supports.carried(reactions)
+            reactions = model.supports.supported(reactions)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, noise * count)
@@ -232,7 +250,7 @@ class StaticAnalysis:
         warnings: list[str],
     ) -> Report:
         return Report(
-            unknowns=3 * int(self._used.sum()) - self._fixed - len(self.links),
+            unknowns=3 * int(self._used.sum()) - self._fixed - len(self.model.supports.slaves()),
             total_load=case.external.sum(axis=0),
             total_reaction=reactions.sum(axis=0),
             **quality(solution, balance),
@@ -244,7 +262,7 @@ class StaticAnalysis:
 
     def _at_rest(self) -> Array:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""
-        return np.where(self.model.supports.fixed, self._values, 0.0)
+        return np.where(self.model.supports.fixed, self.model.supports.values, 0.0)
 
     def _complete(self, u: Array, system: ConstrainedSystem, moving: Mask) -> Array:
         """Fill in what is prescribed on nodes without equations; parts that nothing moves stay at rest."""
@@ -257,24 +275,24 @@ class StaticAnalysis:
         return u
 
     def _skipped(self, moving: Mask) -> list[str]:
-        """Say what this solution did without."""
-        said = []
+        """Return what this solution did without, in words."""
+        skipped = []
         if not moving.any():
-            said.append("assembly and solution, as nothing moves")
+            skipped.append("assembly and solution, as nothing moves")
         elif not moving.all():
             count = int((~moving[self.part] & self._used).sum())
-            said.append(
+            skipped.append(
                 f"{int((~moving).sum())} of {len(moving)} parts ({count} nodes), as nothing moves them"
             )
-        if moving.any() and self.equations and self._still:
-            said.append(f"{self._still} elements, as all their nodes are held")
+        if moving.any() and self.system and self._still:
+            skipped.append(f"{self._still} elements, as all their nodes are held")
         if self._fixed:
-            said.append(f"{self._fixed} prescribed degrees of freedom")
+            skipped.append(f"{self._fixed} prescribed degrees of freedom")
         if not self._used.all():
-            said.append(f"{int((~self._used).sum())} nodes without elements")
-        if moving.any() and self.equations:
-            said += self.equations.skipped
-        return [*said, "load steps, as the law is linear", "mass", "strains and stresses until asked for"]
+            skipped.append(f"{int((~self._used).sum())} nodes without elements")
+        if moving.any() and self.system:
+            skipped += self.system.skipped
+        return skipped
 
 
 def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:
@@ -294,13 +312,13 @@ def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) ->
     if not np.isfinite(u).all() or solution.backward_error > 1e-8:
         raise SolveError(
             f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
-            "ask for a smaller tolerance, or look for very thin elements, very unlike stiffnesses or "
+            "ask for a smaller tolerance, or look for very thin elements, a large stiffness contrast or "
             "nearly free parts"
         )
     if max(balance) > 1e-2:
         raise SolveError(
             f"loads and reactions miss equilibrium by {balance[0]:.1e} (forces) and {balance[1]:.1e} "
-            "(moments) of their size; look for very unlike stiffnesses, spurious modes or nearly free "
+            "(moments) of their size; look for a large stiffness contrast, spurious modes or nearly free "
             "parts, and please report a model that has none"
         )
 
@@ -313,7 +331,7 @@ def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[L
     return total
 
 
-def initial_loads(model: Model, groups: Sequence[ElementGroup]) -> Array | None:
+def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | None:
     """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
     u0 = model.initial_displacement
     if u0 is None and model.prestress is None:
@@ -325,11 +343,3 @@ def initial_loads(model: Model, groups: Sequence[ElementGroup]) -> Array | None:
 def _any_axis(mask: Mask) -> Mask:
     """Return mask.any(axis=1) of a mask (n, 3), faster."""
     return mask[:, 0] | mask[:, 1] | mask[:, 2]
-
-
-def same_state(state: list[Any], other: list[Any]) -> bool:
-    """Return whether two states of a model are equal."""
-    return len(state) == len(other) and all(
-        np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
-        for a, b in zip(state, other, strict=True)
-    )

@@ -1,8 +1,6 @@
-"""Steady motion: what rests in space while its material moves through the mesh."""
+"""Steady motion: the state at rest in space of a body whose material moves through the mesh."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 from kratos_lite import solvers
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
@@ -11,17 +9,14 @@ from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.outputs import motion_summary
 from kratos_lite.analysis.result import Report, Result
 from kratos_lite.analysis.static import Phases, check_arguments, judge, quality
-from kratos_lite.model.checks import equilibrium
-from kratos_lite.model.loads import check_loads
+from kratos_lite.model.checks import check_loads, equilibrium
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
 from kratos_lite.typing import Progress
 
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
-
 
 def solve_steady(
-    model: Model, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+    model: Structure, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
 ) -> Result:
     """Solve (K - rate² H + …) u = f of a model with a motion, at the time 0; see `Model.solve`."""
     check_arguments(solver, tolerance, progress)
@@ -35,7 +30,7 @@ def solve_steady(
             ]
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
-        nodal = e.system.whole(forces).copy()
+        nodal = e.system.scatter(forces).copy()
         warnings += check_loads(model.loads, e.system.groups, nodal, model.supports)
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
@@ -47,9 +42,9 @@ def solve_steady(
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
-        left = e.system.whole(A @ u - forces)
-        reactions = model.supports.carried(left)
-        inner = e.system.whole(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
+        left = e.system.scatter(A @ u - forces)
+        reactions = model.supports.supported(left)
+        inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
         balance = equilibrium(model.mesh.points, nodal - inner, reactions)
         judge(solution, u, balance)
         critical = None
@@ -69,7 +64,7 @@ def solve_steady(
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
     )
     u0 = model.initial_displacement
-    result = Result(model.mesh, e.groups, e.system.whole(u), reactions, nodal, report, u0)
+    result = Result(model.mesh, e.groups, e.system.scatter(u), reactions, nodal, report, u0)
     report.motion = motion_summary(e, result, critical)
     return result
 

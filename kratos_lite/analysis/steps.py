@@ -20,7 +20,7 @@ def implicit_step(e: EquationsOfMotion, s: Implicit, now: Course, start: float, 
     a_old = v / (s.beta * h) + (1 / (2 * s.beta) - 1) * a  # minus a⁺ for Δu = 0
     v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / (2 * s.beta)) * a
     held, more_a = prescribed_part(e, u), 0.0 * a
-    if e.model.supports.movements:
+    if e.model.supports.motions:
         given = held, prescribed_part(e, v), prescribed_part(e, a)
         more_v, more_a = beyond_newmark(s, h, given, at_end(e, end, h))
         v_new, a_old = v_new + more_v, a_old - more_a

@@ -1,114 +1,79 @@
-"""Forcing: what drives a model in time, loads and supports that move, as vectors (3a,) of its equations."""
+"""Loads and prescribed motion of a structure in time, as vectors (3a,) of its equations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.analysis.static import initial_loads
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.supports import reduction, resolve
 from kratos_lite.typing import Array
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 
 class AppliedLoads:
-    """The nodal forces of the loads of a model at a time; what does not change is made once."""
+    """The nodal forces of the loads of a structure at a time; what does not change is made once."""
 
-    def __init__(self, model: Model, system: ConstrainedSystem, groups: list[ElementGroup]) -> None:
-        self.model, self.system, self._batches = model, system, groups
+    def __init__(self, model: Structure, system: ConstrainedSystem, groups: list[ElementGroup]) -> None:
+        self.model, self.system, self._groups = model, system, groups
 
     def __call__(self, time: float) -> Array:
         """Return the nodal forces (3a,) in N at a time in s."""
         total = self._constant.copy()
-        for factor, forces in self._scaled:
-            total += factor(time) * forces
-        for timed in self._timed:
-            total += timed(time)
+        for history in self._histories:
+            total += history(time)
         return total
 
-    def _of(self, load: Load) -> Array:
-        return self.system.local(load.forces(self.model.mesh, self._batches))
+    def _forces_of(self, load: Load) -> Array:
+        return self.system.gather(load.forces(self.model.mesh, self._groups))
 
     @cached_property
     def _constant(self) -> Array:
         total = np.zeros(3 * len(self.system.nodes))
-        initial = initial_loads(self.model, self._batches)
+        initial = initial_loads(self.model, self._groups)
         if initial is not None:
-            total -= self.system.local(initial)
+            total -= self.system.gather(initial)
         for load in self.model.loads:
-            if not isinstance(load, (Varying, Timed)):
-                total += self._of(load)
+            if not isinstance(load, TimeDependentLoad):
+                total += self._forces_of(load)
         return total
 
     @cached_property
-    def _scaled(self) -> list[tuple[Callable[[float], float], Array]]:
-        return [(load.factor, self._of(load.load)) for load in self.model.loads if isinstance(load, Varying)]
-
-    @cached_property
-    def _timed(self) -> list[_TimedForces]:
-        return [_TimedForces(load, self._of) for load in self.model.loads if isinstance(load, Timed)]
+    def _histories(self) -> list[Callable[[float], Array | float]]:
+        loads = [load for load in self.model.loads if isinstance(load, TimeDependentLoad)]
+        return [load.history(self._forces_of) for load in loads]
 
 
-class _TimedForces:
-    """Nodal forces (3a,) of a `Timed` load; those of the last two times are kept."""
+class PrescribedDisplacement:
+    """What supports and constraints prescribe at a time; it is linear in the prescribed motion."""
 
-    def __init__(self, timed: Timed, forces_of: Callable[[Load], Array]) -> None:
-        self.timed, self.forces_of = timed, forces_of
-        self.kept: list[tuple[float, Load | None, Array | float]] = []
-
-    def __call__(self, time: float) -> Array | float:
-        """Return the forces at a time; 0 where nothing acts."""
-        for at, _, forces in self.kept:
-            if at == time:
-                return forces
-        load = self.timed.at(time)
-        same = [forces for _, one, forces in self.kept if one is load]
-        forces = same[0] if same else 0.0 if load is None else self.forces_of(load)
-        self.kept = [*self.kept[-1:], (time, load, forces)]
-        return forces
-
-
-class Prescribed:
-    """What supports and constraints prescribe at a time; it is linear in the displacements that move."""
-
-    def __init__(self, model: Model, system: ConstrainedSystem) -> None:
+    def __init__(self, model: Structure, system: ConstrainedSystem) -> None:
         self.supports, self.system = model.supports, system
 
     def __call__(self, time: float) -> Array:
         """Return the displacements (3a,) in m at a time in s where the free ones are 0."""
-        resting, shares = self._moved
-        return resting + sum(course(time) * share for course, share in shares)
+        resting, shares = self._shares
+        return resting + sum(function(time) * share for function, share in shares)
 
     @cached_property
-    def _moved(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
-        """What is prescribed while all that moves is at 0, and the share (3a,) of each that moves, at 1."""
-        supports = self.supports
-        kept = supports.values.copy()
-        try:
-            for one in supports.movements:
-                supports.values[one.rows, one.axis] = 0.0
-            resting, shares = self._at_values(), []
-            for one in supports.movements:
-                supports.values[one.rows, one.axis] = 1.0
-                shares.append((one.course, self._at_values() - resting))
-                supports.values[one.rows, one.axis] = 0.0
-            return resting, shares
-        finally:
-            supports.values[...] = kept
+    def _shares(self) -> tuple[Array, list[tuple[Callable[[float], float], Array]]]:
+        """What is prescribed while all that moves is at 0, and the share (3a,) of each motion, at 1."""
+        values = self.supports.values.copy()
+        for motion in self.supports.motions:
+            values[motion.rows, motion.axis] = 0.0
+        resting, shares = self._at(values), []
+        for motion in self.supports.motions:
+            values[motion.rows, motion.axis] = 1.0
+            shares.append((motion.function, self._at(values) - resting))
+            values[motion.rows, motion.axis] = 0.0
+        return resting, shares
 
-    def _at_values(self) -> Array:
-        """Return the displacements (3a,) for the present values of the supports, 0 where they are free."""
-        used = np.zeros(self.system.n_nodes, dtype=bool)
-        used[self.system.nodes] = True
-        links = resolve(self.supports, used, agree=False) if self.supports.links else {}
-        found = reduction(self.supports, self.system.nodes, links)
+    def _at(self, values: Array) -> Array:
+        """Return the displacements (3a,) for prescribed values (n, 3), 0 where they are free."""
+        found = self.supports.constraint_map(self.system.nodes, values)
         found.c[found.free] = 0.0
         return found.c

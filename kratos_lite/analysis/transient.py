@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,16 +17,13 @@ from kratos_lite.analysis.outputs import result_of, velocity_of_material
 from kratos_lite.analysis.prescribed_motion import Course, at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.schemes import CentralDifference, Implicit, newmark
-from kratos_lite.analysis.static import same_state
 from kratos_lite.analysis.steps import explicit_step, implicit_step, is_trapezoidal
 from kratos_lite.assembly.finite_strain import highest_frequency
 from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none, number, positive_step, whole_number
-
-if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
 
 _log = logging.getLogger("kratos_lite")
 ABSURD = 1e9
@@ -37,11 +34,9 @@ OFF_BALANCE = 1e-4
 """Share of the largest force by which the accelerations of a moment may miss the balance."""
 
 
-def model_state(model: Model) -> list[Any]:
-    """Return what must stay as it is while a transient of a model marches."""
-    supports = model.supports
-    values = supports.values[supports.fixed].copy()
-    return [*model.state(), values, tuple(map(id, model.loads)), id(model.motion), tuple(supports.movements)]
+def _version(model: Structure) -> list[Any]:
+    """Return what must stay as it is while a transient of a model goes on; equal as long as it does."""
+    return [model.version, model.supports.value_version, model.motion, *model.loads]
 
 
 class Transient:
@@ -75,7 +70,7 @@ class Transient:
 
     def __init__(
         self,
-        model: Model,
+        model: Structure,
         *,
         scheme: Implicit | CentralDifference | None = None,
         displacement: ArrayLike | None = None,
@@ -95,9 +90,9 @@ class Transient:
         )
         if explicit and self.equations.terms is not None:
             raise ModelError("central differences do not take a motion of the material; use newmark()")
-        if explicit and model.supports.links:
+        if explicit and model.supports.constraints:
             raise ModelError("central differences do not take constraints; use newmark()")
-        self._state = model_state(model)
+        self._version = _version(model)
         self._critical, self._of_mesh = self._critical_rate()
         self._watching = self._critical < np.inf
         self._watch_rate(0.0)
@@ -138,7 +133,7 @@ class Transient:
         given, n = finite(values, what), self.equations.system.n_nodes
         if given.shape != (n, 3):
             raise InputError(f"{what} needs shape ({n}, 3); got {given.shape}")
-        return self.equations.system.local(given).copy()
+        return self.equations.system.gather(given).copy()
 
     def _balanced(self, prescribed: Array) -> Array:
         """Return a of M a = f - C v - K u + reactions, with the acceleration of what is prescribed."""
@@ -174,12 +169,12 @@ class Transient:
         """
         function_or_none(until, "until must be a function of a moment")
         h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
-        if not same_state(self._state, model_state(self.equations.model)):
+        if self._version != _version(self.equations.model):
             raise ModelError("the model has changed since this transient was made; make a new one and put()")
         if isinstance(self.scheme, CentralDifference):
             self._check_stable(h)
         self.equations.step = h
-        if self._untouched and self.equations.model.supports.movements:
+        if self._untouched and self.equations.model.supports.motions:
             self._start(*at_start(self.equations, h))
         elif self._imbalance_then is not None:
             self._settle()
@@ -258,9 +253,9 @@ class Transient:
     def moment(self) -> Moment:
         """Return the model as it is now."""
         system = self.equations.system
-        u, v, a = (system.whole(x).copy() for x in (self.u, self.v, self.a))
+        u, v, a = (system.scatter(x).copy() for x in (self.u, self.v, self.a))
         left = self._left()
-        reactions = self.equations.model.supports.carried(system.whole(left))
+        reactions = self.equations.model.supports.supported(system.scatter(left))
         return Moment(self.time, self.step, u, v, a, reactions, self._free_part(left))
 
     def put(self, moment: Moment) -> None:
@@ -317,7 +312,7 @@ class Transient:
         The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative; None for
         schemes that do not take the balance at the end of a step.
         """
-        at, local, left = self.moment() if moment is None else moment, self.equations.system.local, None
+        at, local, left = self.moment() if moment is None else moment, self.equations.system.gather, None
         if is_trapezoidal(self.scheme):
             free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
             left = free / largest if largest else 0.0
@@ -326,7 +321,7 @@ class Transient:
 
     def reactions(self) -> Array:
         """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
-        return self.equations.model.supports.carried(self.equations.system.whole(self._left()))
+        return self.equations.model.supports.supported(self.equations.system.scatter(self._left()))
 
     def energy(self, moment: Moment | None = None) -> float:
         """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.
@@ -339,11 +334,11 @@ class Transient:
     def material_velocity(self, moment: Moment | None = None) -> Array:
         """Return the velocity of the material in space, now or at a moment; see `material_velocity`."""
         e, (u, v, time) = self.equations, self._at(moment)
-        return e.system.whole(velocity_of_material(e, u, v, time))
+        return e.system.scatter(velocity_of_material(e, u, v, time))
 
     def _at(self, moment: Moment | None) -> tuple[Array, Array, float]:
         """Return u, v (3a,) and the time, of now or of a moment."""
         if moment is None:
             return self.u, self.v, self.time
-        local = self.equations.system.local
+        local = self.equations.system.gather
         return local(moment.u), local(moment.v), moment.time

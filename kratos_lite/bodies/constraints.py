@@ -58,12 +58,18 @@ class Constraint(ABC):
     def bind(self, body: FreeBody) -> None:
         """Take hold of a body where it is now.
 
+        Parameters
+        ----------
+        body : a single one.
+
         Raises
         ------
         MeshError
-            If a point lies outside the body.
+            A point lies outside the body.
         ModelError
-            If the body is many bodies, or the constraint holds another one already.
+            The body is many bodies, or the constraint holds another one already.
+        InputError
+            The part has no nodes.
         """
         if body.q.ndim > 1:
             raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
@@ -77,28 +83,69 @@ class Constraint(ABC):
         self._body, self._start = body, body.position(self.points)
 
     def begin(self, body: FreeBody, h: float) -> None:  # noqa: B027 - most have nothing to prepare
-        """Prepare a step of h s from the state of the body."""
+        """Prepare a step from the state of the body.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        h : length of the step in s.
+        """
 
     @abstractmethod
     def directions(self, x: Array) -> Array:
-        """Return the directions (m, r, 3) along which points at x (m, 3) are held, r for each point."""
+        """Return the directions along which points are held.
+
+        Parameters
+        ----------
+        x : (m, 3) where the points are, in m.
+
+        Returns
+        -------
+        (m, r, 3), r for each point.
+        """
 
     @abstractmethod
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
-        """Return by how much positions (m, 3) and velocities (m, 3) at a time miss, (m, r) in m/s.
+        """Return by how much points miss where they should be.
 
         Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
+
+        Parameters
+        ----------
+        x, v : (m, 3) positions in m and velocities in m/s.
+        time, h : end and length of the step in s.
+
+        Returns
+        -------
+        (m, r) in m/s.
         """
 
     def starting_velocities(self, v: Array, time: float, h: float) -> Array:
-        """Return the velocities along the directions with which points start, (m, r) in m/s.
+        """Return the velocities along the directions with which points start.
 
-        `v` (m, r) are those that they have, at a time, before steps of h s.
+        Parameters
+        ----------
+        v : (m, r) those that they have, in m/s.
+        time, h : the start, and the length of the steps, in s.
+
+        Returns
+        -------
+        (m, r) in m/s.
         """
         return np.zeros_like(v)
 
     def jacobian_entries(self, body: FreeBody, q: Array) -> Entries:
-        """Return rows, dofs and values of H (m r, dofs): points move along their directions with H u."""
+        """Return the entries of H (m r, dofs): points move along their directions with H u.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+
+        Returns
+        -------
+        Rows, dofs and values.
+        """
         directions = self.directions(body.position(self.points, q))
         row, dof, value = [], [], []
         for i, X in enumerate(self.points):
@@ -111,7 +158,17 @@ class Constraint(ABC):
         return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
 
     def jacobian(self, body: FreeBody, q: Array) -> Array:
-        """Return H (m r, dofs) as a full matrix; it is kept where it is always the same."""
+        """Return H as a full matrix; it is kept where it is always the same.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+
+        Returns
+        -------
+        (m r, dofs).
+        """
         if self._jacobian is not None:
             return self._jacobian
         row, dof, value = self.jacobian_entries(body, q)
@@ -127,12 +184,30 @@ class Constraint(ABC):
         return len(self.points)
 
     def gaps(self, body: FreeBody, q: Array, u: Array, time: float, h: float) -> Array:
-        """Return the gaps (m r,) at the end of a step in m/s."""
+        """Return the gaps at the end of a step.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q, u : its configuration and velocity.
+        time, h : end and length of the step in s.
+
+        Returns
+        -------
+        (m r,) in m/s; see `gap`.
+        """
         x, v = body.position(self.points, q), body.velocity(self.points, q, u)
         return self.gap(x, v, time, h).ravel()
 
     def set_reactions(self, body: FreeBody, q: Array, multipliers: Array) -> None:
-        """Note the reactions of multipliers (m r,)."""
+        """Note the reactions of a step.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+        multipliers : (m r,) in N.
+        """
         directions = self.directions(body.position(self.points, q))
         self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)
 
@@ -291,7 +366,13 @@ class RigidLink(Constraint):
         self.anchor = one_point(anchor)
 
     def bind(self, body: FreeBody) -> None:
-        """Take hold of a body where it is now; InputError if point and anchor coincide."""
+        """Take hold of a body where it is now.
+
+        Raises
+        ------
+        InputError
+            Point and anchor coincide.
+        """
         super().bind(body)
         self.length = float(np.linalg.norm(self._start[0] - self.anchor))
         if self.length == 0:

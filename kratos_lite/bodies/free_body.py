@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.bodies.linear_algebra import Solve
-from kratos_lite.bodies.validation import Material, elements_of
+from kratos_lite.bodies.validation import Material, elements_of, mass_properties_of
 from kratos_lite.errors import ModelError
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Mesh
@@ -267,8 +267,8 @@ class FreeBody(ABC):
             return elements_of(self.mesh, self.material)
         if self.q.ndim > 1:
             raise ModelError("many bodies on one mesh need a material for a load on it")
-        unit = MassProperties.of(self.mesh.points, elements_of(self.mesh, Isotropic3D(1.0, 0.0, 1.0)))
-        return elements_of(self.mesh, Isotropic3D(1.0, 0.0, float(self.mass / unit.volume)))
+        unit = mass_properties_of(self.mesh, Isotropic3D(1.0, 0.0, 1.0))
+        return elements_of(self.mesh, Isotropic3D(1.0, 0.0, float(self.mass / unit.mass)))
 
     # ---- mass and momenta ------------------------------------------------------------------------
 

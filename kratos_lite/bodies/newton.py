@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite import solvers
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.linear_algebra import Entries
-from kratos_lite.solvers.supports import ConstraintMap
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.typing import Array, Ints
 
 

@@ -17,10 +17,10 @@ from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, transposed
 from kratos_lite.bodies.newton import dense_step
 from kratos_lite.bodies.rotations import axial, hat
 from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
-from kratos_lite.bodies.validation import Material, elements_of, mesh_of
+from kratos_lite.bodies.validation import Material, mass_properties_of
 from kratos_lite.errors import InputError
-from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.checks import checked_material
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array, Ints
 from kratos_lite.voigt import tensor
@@ -71,12 +71,11 @@ class PseudoRigidBody(AffineBody, Deformable):
             if len(material) != 1:
                 raise InputError("a pseudo-rigid body is of one material; FiniteElementBody takes several")
             (material,) = material.values()
-        if not isinstance(material, LinearMaterial):
-            raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
+        material = checked_material(material)
         if mass_properties is None:
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
-            mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
+            mass_properties = mass_properties_of(mesh, material)
         mass_properties.check_deformable()
         self.C = material.C
         super().__init__(mesh, material, mass_properties, scheme, tolerance, damping)

@@ -15,7 +15,7 @@ from kratos_lite.bodies import steps
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.linear_algebra import Solve, apply, transposed
 from kratos_lite.bodies.rotations import axial, check_rotation, hat, polar, rotation_of
-from kratos_lite.bodies.validation import Material, elements_of, mesh_of, points_of
+from kratos_lite.bodies.validation import Material, mass_properties_of, points_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Mesh
@@ -70,7 +70,7 @@ class RigidBody(AffineBody):
         if mass_properties is None:
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its mass_properties")
-            mass_properties = MassProperties.of(mesh_of(mesh).points, elements_of(mesh, material))
+            mass_properties = mass_properties_of(mesh, material)
         super().__init__(mesh, material, mass_properties, scheme, tolerance)
 
     def default_scheme(self) -> str:
@@ -202,9 +202,7 @@ class Obstacle(RigidBody):
     convertible = False
 
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
-        shape = MassProperties.of(
-            mesh_of(mesh).points, elements_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))
-        )
+        shape = mass_properties_of(mesh, material or Isotropic3D(1.0, 0.0, 1.0))
         super().__init__(mesh, material, mass_properties=shape)
 
     @property

@@ -8,11 +8,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.assembly.element_groups import ElementGroup, element_groups_of
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.model import checks
+from kratos_lite.model.checks import check_geometry, checked_material, checked_mesh
+from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
@@ -27,18 +28,19 @@ def elements_of(mesh: Mesh, material: Material) -> list[ElementGroup]:
     MeshError, ModelError, InputError
         If the mesh is broken or inverted, or elements have no material.
     """
-    kinds = [element_class(mesh, block) for block in mesh_of(mesh).blocks]
-    checks.check_blocks(mesh, kinds)
-    checks.check_points(mesh)
-    checks.check_repeated_nodes(mesh)
-    checks.check_jacobians(mesh, kinds)
+    check_geometry(checked_mesh(mesh))
     given = material if isinstance(material, Mapping) else {None: material}
     material_of = np.full(mesh.n_elements, -1)
     for number, (where, one) in enumerate(given.items()):
-        if not isinstance(one, LinearMaterial):
-            raise InputError(f"a material such as Isotropic3D is needed; got {type(one).__name__}")
+        checked_material(one)
         material_of[mesh.elements(where)] = number
     return element_groups_of(mesh, list(given.values()), material_of)
+
+
+def mass_properties_of(mesh: Mesh, material: Material) -> MassProperties:
+    """Return the mass properties of a mesh, checked as by `elements_of`."""
+    groups = elements_of(mesh, material)
+    return MassProperties.of(mesh.points, groups)
 
 
 def points_of(X: ArrayLike) -> Array:
@@ -76,10 +78,3 @@ def fitting(value: Array, lead: tuple[int, ...], tail: int, what: str) -> Array:
         bodies = f"bodies of shape {lead}" if lead else "a single body"
         raise InputError(f"{what} of shape {value.shape} does not fit {bodies}")
     return value
-
-
-def mesh_of(mesh: Mesh) -> Mesh:
-    """Return a mesh; InputError if it is none."""
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
-    return mesh

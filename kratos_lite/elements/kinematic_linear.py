@@ -134,12 +134,30 @@ class KinematicLinear:
 
     @classmethod
     def N(cls, xi: ArrayLike) -> Array:
-        """Return the shape functions at xi (..., 3) as (..., n)."""
+        """Return the shape functions at points.
+
+        Parameters
+        ----------
+        xi : (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., n) float
+        """
         return cls.shape.N(xi)
 
     @classmethod
     def dN(cls, xi: ArrayLike) -> Array:
-        """Return dN_a/dxi_j at xi (..., 3) as (..., n, 3)."""
+        """Return the derivatives dN_a/dxi_j at points.
+
+        Parameters
+        ----------
+        xi : (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., n, 3) float
+        """
         return cls.shape.dN(xi)
 
     def _jacobian(self, dN: Array) -> Array:
@@ -149,24 +167,69 @@ class KinematicLinear:
         return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
 
     def determinants(self, dN: Array) -> Array:
-        """Return det J for tabulated dN (g, n, 3) as (..., g)."""
+        """Return det J for tabulated derivatives.
+
+        Parameters
+        ----------
+        dN : (g, n, 3) float, derivatives of the shape functions at the points of a rule.
+
+        Returns
+        -------
+        (..., g) float, m³
+        """
         return determinant(self._jacobian(dN))
 
     def J(self, xi: ArrayLike) -> Array:
-        """Return the Jacobian dX_i/dxi_j at one point xi (3,) as (..., 3, 3)."""
+        """Return the Jacobian dX_i/dxi_j at one point.
+
+        Parameters
+        ----------
+        xi : (3,) float, one point in reference coordinates.
+
+        Returns
+        -------
+        (..., 3, 3) float, m
+        """
         return self._jacobian(self.dN(xi)[None])[..., 0, :, :]
 
     def detJ(self, xi: ArrayLike) -> Array:
-        """Return det J at one point xi (3,) as (...)."""
+        """Return det J at one point.
+
+        Parameters
+        ----------
+        xi : (3,) float, one point in reference coordinates.
+
+        Returns
+        -------
+        (...) float, m³
+        """
         return determinant(self.J(xi))
 
     def dNdX(self, xi: ArrayLike) -> Array:
-        """Return dN_a/dX_i at one point xi (3,) as (..., n, 3) in 1/m."""
+        """Return the gradients dN_a/dX_i at one point.
+
+        Parameters
+        ----------
+        xi : (3,) float, one point in reference coordinates.
+
+        Returns
+        -------
+        (..., n, 3) float, 1/m
+        """
         J = self.J(xi)
         return self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None])
 
     def B(self, xi: ArrayLike) -> Array:
-        """Return the B-operator at one point xi (3,): strain = B u, as (..., 6, 3n) in 1/m."""
+        """Return the B-operator at one point: strain = B u.
+
+        Parameters
+        ----------
+        xi : (3,) float, one point in reference coordinates.
+
+        Returns
+        -------
+        (..., 6, 3n) float, 1/m
+        """
         D = np.moveaxis(self.dNdX(xi), -1, 0)
         B = np.zeros((*D.shape[1:-1], 6, D.shape[-1], 3))
         for row, (i, j) in enumerate(voigt.PAIRS):
@@ -175,7 +238,16 @@ class KinematicLinear:
         return B.reshape(*D.shape[1:-1], 6, 3 * D.shape[-1])
 
     def position(self, xi: ArrayLike) -> Array:
-        """Return the point X(xi) of one point xi (3,) as (..., 3) in m."""
+        """Return the place X(xi) of one point.
+
+        Parameters
+        ----------
+        xi : (3,) float, one point in reference coordinates.
+
+        Returns
+        -------
+        (..., 3) float, m
+        """
         return self.N(xi) @ self.X
 
     # ---- geometry at the Gauss points, made once per instance --------------------------------
@@ -199,37 +271,80 @@ class KinematicLinear:
         return self._gauss[0]
 
     def volume(self) -> Array:
-        """Return the volume as (...) in m³."""
+        """Return the volume.
+
+        Returns
+        -------
+        (...) float, m³
+        """
         return self.dV.sum(axis=-1)
 
     def gauss_points(self) -> Array:
-        """Return the Gauss points X as (..., g, 3) in m."""
+        """Return the places X of the Gauss points.
+
+        Returns
+        -------
+        (..., g, 3) float, m
+        """
         return tabulate(self.shape, self.rule)[0] @ self.X
 
     # ---- strain, stress, loads, stiffness ----------------------------------------------------
 
     def strain(self, u: ArrayLike) -> Array:
-        """Return the strain at the Gauss points, (..., g, 6), of nodal displacements u (..., n, 3) in m."""
+        """Return the strain at the Gauss points.
+
+        Parameters
+        ----------
+        u : (..., n, 3) float, nodal displacements in m.
+
+        Returns
+        -------
+        (..., g, 6) float
+        """
         _, D = self._gauss
         gradient = D @ np.asarray(u, dtype=float)[..., None, :, :]
         return voigt.symmetric_gradient(np.swapaxes(gradient, -1, -2))
 
     def stress(self, C: ArrayLike, u: ArrayLike) -> Array:
-        """Return σ = C ε at the Gauss points, (..., g, 6) in Pa; C (6, 6) or (..., 6, 6) in Pa."""
+        """Return the stress σ = C ε at the Gauss points.
+
+        Parameters
+        ----------
+        C : (6, 6) or (..., 6, 6) float, Pa.
+        u : (..., n, 3) float, nodal displacements in m.
+
+        Returns
+        -------
+        (..., g, 6) float, Pa
+        """
         C = np.asarray(C, dtype=float)
         return self.strain(u) @ np.swapaxes(C, -1, -2)
 
     def internal_load(self, stress: ArrayLike) -> Array:
-        """Return r_int = Σ B^T σ γ det J as (..., n, 3) in N, of the stress (..., g, 6) in Pa."""
+        """Return the internal load r_int = Σ B^T σ γ det J.
+
+        Parameters
+        ----------
+        stress : (..., g, 6) float, Pa.
+
+        Returns
+        -------
+        (..., n, 3) float, N
+        """
         dV, D = self._gauss
         s = voigt.tensor(stress) * dV[..., None, None]
         return (np.swapaxes(D, -1, -2) @ s).sum(axis=-3)
 
     def body_force(self, b: ArrayLike) -> Array:
-        """Return r_ext = Σ N b γ det J as (..., n, 3) in N.
+        """Return the load r_ext = Σ N b γ det J of a body force.
 
-        `b` is the force per volume in N/m³: (3,) or (..., 3) for a constant one, or
-        (..., n, 3) for one that is interpolated from the nodes.
+        Parameters
+        ----------
+        b : (3,) or (..., 3) constant, or (..., n, 3) at the nodes; N/m³.
+
+        Returns
+        -------
+        (..., n, 3) float, N
         """
         b = np.asarray(b, dtype=float)
         if b.ndim == self.X.ndim and b.shape[-2:] == self.nodes.shape:
@@ -238,17 +353,35 @@ class KinematicLinear:
         return share[..., :, None] * b[..., None, :]
 
     def stiffness(self, C: ArrayLike) -> Array:
-        """Return K = Σ B^T C B γ det J as (..., 3n, 3n) in N/m; C (6, 6) or (..., 6, 6) in Pa."""
+        """Return the stiffness K = Σ B^T C B γ det J.
+
+        Parameters
+        ----------
+        C : (6, 6) or (..., 6, 6) float, Pa.
+
+        Returns
+        -------
+        (..., 3n, 3n) float, N/m
+        """
         K = self.stiffness_by_axis(C)
         n = len(self.nodes)
         order = np.moveaxis(K, (-4, -2), (-3, -1))
         return order.reshape(*K.shape[:-4], 3 * n, 3 * n)
 
     def stiffness_by_axis(self, C: ArrayLike) -> Array:
-        """Return K as (..., 3, n, 3, n): axis and node of the row, axis and node of the column.
+        """Return the stiffness in the order in which assembly takes it: by axis, then node.
 
-        This is the order in which assembly wants it.  An isotropic C takes the short way
+        An isotropic C takes the short way
         K_iajb = λ P_iajb + μ P_jaib + μ δ_ij P_kakb with P_iajb = Σ dN_a/dX_i dN_b/dX_j dV.
+
+        Parameters
+        ----------
+        C : (6, 6) or (..., 6, 6) float, Pa.
+
+        Returns
+        -------
+        (..., 3, n, 3, n) float, N/m
+            Axis and node of the row, axis and node of the column.
         """
         C = np.asarray(C, dtype=float)
         if C.ndim == 2 and self.inherits(*STIFFNESS_STEPS) and self.constant_jacobian:
@@ -315,23 +448,49 @@ class KinematicLinear:
     # ---- mass ----------------------------------------------------------------------------------
 
     def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
-        """Return Σ ρ N N^T γ det J as (..., n, n) in kg: the mass matrix of one axis."""
+        """Return the mass matrix of one axis, Σ ρ N N^T γ det J.
+
+        Parameters
+        ----------
+        density : number, or (...) one for each element; kg/m³.
+
+        Returns
+        -------
+        (..., n, n) float, kg
+        """
         N, dN = tabulate(self.shape, self.mass_rule)
         dV = determinant(self._jacobian(dN)) * self.mass_rule.weights * np.asarray(density)[..., None]
         return (N.T * dV[..., None, :]) @ N
 
     def mass(self, density: ArrayLike) -> Array:
-        """Return the consistent mass matrix as (..., 3n, 3n) in kg; density (...) in kg/m³."""
+        """Return the consistent mass matrix.
+
+        Parameters
+        ----------
+        density : number, or (...) one for each element; kg/m³.
+
+        Returns
+        -------
+        (..., 3n, 3n) float, kg
+        """
         m = self.scalar_mass(density)
         n = len(self.nodes)
         M = m[..., :, None, :, None] * np.eye(3)[:, None, :]
         return M.reshape(*m.shape[:-2], 3 * n, 3 * n)
 
     def lumped_mass(self, density: ArrayLike) -> Array:
-        """Return the mass of each node as (..., n) in kg; always positive, sums to the mass.
+        """Return the mass of each node; it is positive and sums to the mass of the element.
 
-        Row sums where these are all positive, on the reference cell and on the element; otherwise
+        It is the row sum where row sums are positive, on the reference cell and on the element; otherwise
         the scaled diagonal of Hinton, Rock & Zienkiewicz, Earthq. Eng. Struct. Dyn. 4 (1976) 245-249.
+
+        Parameters
+        ----------
+        density : number, or (...) one for each element; kg/m³.
+
+        Returns
+        -------
+        (..., n) float, kg
         """
         m = self.scalar_mass(density)
         sums, diagonal = m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1)

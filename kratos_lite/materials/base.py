@@ -31,6 +31,11 @@ class LinearMaterial:
     density : kg/m³, ≥ 0.
     aliases : further names, such as those of Kratos' constitutive laws.
     variables : field name → name of the variable in `.mdpa` and JSON files.
+
+    Raises
+    ------
+    MaterialError
+        If a constant is not a finite number, the density is negative or C is not positive definite.
     """
 
     density: float
@@ -61,7 +66,13 @@ class LinearMaterial:
         return f"{field} ({variable})" if variable else field
 
     def check(self) -> None:
-        """Raise MaterialError unless C is symmetric and positive definite."""
+        """Check that C is symmetric and positive definite; subclasses check their own bounds here.
+
+        Raises
+        ------
+        MaterialError
+            If it is not.
+        """
         if not np.allclose(self.C, self.C.T, rtol=1e-10, atol=0):
             raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
         scale = np.sqrt(np.abs(np.diag(self.C)))
@@ -70,15 +81,40 @@ class LinearMaterial:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 
     def why_unstable(self) -> str:
-        """Name the bound that the constants violate."""
+        """Name the bound that the constants violate.
+
+        Returns
+        -------
+        str
+        """
         return "the strain energy of some strain is not positive"
 
     def compliance(self) -> Array:
-        """Return S (6, 6) in 1/Pa with strain = S stress."""
+        """Return the compliance S, strain = S stress; subclasses define it.
+
+        Returns
+        -------
+        (6, 6) float, 1/Pa
+
+        Raises
+        ------
+        TypeError
+            If the subclass defines neither this nor `elasticity`.
+        """
         raise TypeError(f"{type(self).__name__} must define compliance() or elasticity()")
 
     def elasticity(self) -> Array:
-        """Return C (6, 6) in Pa; by default the inverse of the compliance."""
+        """Return the elasticity matrix C, by default the inverse of the compliance.
+
+        Returns
+        -------
+        (6, 6) float, Pa
+
+        Raises
+        ------
+        MaterialError
+            If the compliance is singular.
+        """
         try:
             return np.asarray(np.linalg.inv(self.compliance()), dtype=float)
         except np.linalg.LinAlgError:
@@ -92,14 +128,34 @@ class LinearMaterial:
         return C
 
     def stress(self, strain: ArrayLike) -> Array:
-        """Return the stress (..., 6) in Pa of a strain (..., 6)."""
+        """Return the stress of a strain.
+
+        Parameters
+        ----------
+        strain : (..., 6) float.
+
+        Returns
+        -------
+        (..., 6) float, Pa
+        """
         return np.asarray(strain, dtype=float) @ self.C.T
 
     @classmethod
     def from_variables(cls, values: dict[str, Any]) -> LinearMaterial:
         """Make the material from the variables of a file, such as YOUNG_MODULUS.
 
-        A variable that is missing raises MaterialError; the density may be missing (0).
+        Parameters
+        ----------
+        values : variables by name; the density may be missing and is 0 then.
+
+        Returns
+        -------
+        LinearMaterial
+
+        Raises
+        ------
+        MaterialError
+            If a variable is missing or outside its bounds.
         """
         given = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {item.name for item in fields(cls) if item.name != "density"}  # type: ignore[arg-type]

@@ -48,7 +48,13 @@ class Isotropic3D(LinearMaterial):
     variables: ClassVar[dict[str, str]] = {"E": "YOUNG_MODULUS", "nu": "POISSON_RATIO", "density": "DENSITY"}
 
     def check(self) -> None:
-        """Raise MaterialError unless E > 0 and -1 < nu < 0.5."""
+        """Check that E > 0 and -1 < nu < 0.5.
+
+        Raises
+        ------
+        MaterialError
+            If they are not.
+        """
         if not self.E > 0:
             raise MaterialError(
                 f"{self._name('E')} {self.E:g} must be > 0 Pa: a body without stiffness cannot carry load"

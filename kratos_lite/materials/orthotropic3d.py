@@ -66,7 +66,13 @@ class Orthotropic3D(LinearMaterial):
     }
 
     def check(self) -> None:
-        """Raise MaterialError unless all moduli are positive and C is positive definite."""
+        """Check that all moduli are positive and that C is positive definite.
+
+        Raises
+        ------
+        MaterialError
+            If they are not.
+        """
         for name in ("E_x", "E_y", "E_z", "G_xy", "G_yz", "G_xz"):
             if not getattr(self, name) > 0:
                 raise MaterialError(f"{self._name(name)} {getattr(self, name):g} must be > 0 Pa")

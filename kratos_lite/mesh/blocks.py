@@ -40,7 +40,16 @@ class Block:
         return len(self.ids)
 
     def take(self, chosen: Ints | Mask) -> Block:
-        """Return the block of the chosen cells (rows or a mask)."""
+        """Return the block of some of the cells.
+
+        Parameters
+        ----------
+        chosen : rows (k,) int or a mask (m,) bool.
+
+        Returns
+        -------
+        Block
+        """
         lines = None if self.lines is None else self.lines[chosen]
         return Block(
             self.name, self.nodes[chosen], self.ids[chosen], self.properties[chosen], self.shape, lines
@@ -60,9 +69,16 @@ class Cells(Protocol):
 
 @dataclass(eq=False)
 class Part:
-    """A named part (Kratos: SubModelPart): rows of nodes, elements and conditions.
+    """A named part (Kratos: SubModelPart): rows of what belongs to it.
 
-    Element and condition rows count through all blocks in order.
+    Rows of elements and conditions count through all blocks in order.
+
+    Attributes
+    ----------
+    nodes, elements, conditions : (k,) int, rows.
+    geometries, constraints : (k,) int, ids as a file gives them.
+    properties, tables : ids as a file gives them.
+    data : variables of the part by name.
     """
 
     nodes: Ints = field(default_factory=lambda: NO_ROWS)

@@ -134,6 +134,15 @@ def box(
     element : name of the element.
     origin : the corner with the smallest coordinates, m.
 
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    InputError
+        If a length or a number of cells is not positive, or there is no such element.
+
     Examples
     --------
     >>> mesh = box((1, 1, 1), cells=(2, 2, 2), element="KinematicLinear3D20N")
@@ -166,6 +175,15 @@ def annulus(
     width : length along z in m; z runs from 0 to `width`.
     cells : bricks along the radius, around (≥ 3) and along z.
     element : name of the element; mid-edge nodes lie on the circles.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    InputError
+        If the radii, the width or the cells make no hollow cylinder, or there is no such element.
 
     Examples
     --------

@@ -36,6 +36,11 @@ class Mesh:
     conditions : condition blocks.
     parts : named parts; a child of part ``A`` is named ``A.b``.
     source : name of the file it came from, used in messages.
+
+    Raises
+    ------
+    MeshError
+        If points or ids have the wrong shape, an id occurs twice, or a part has rows that do not exist.
     """
 
     def __init__(
@@ -49,7 +54,7 @@ class Mesh:
         source: str = "",
     ) -> None:
         try:
-            self.points: Array = np.ascontiguousarray(points, dtype=float)
+            self.points: Array = np.array(points, dtype=float, order="C")
         except (TypeError, ValueError):
             raise MeshError(f"points must be real numbers of shape (n, 3); got {points!r:.80}") from None
         if self.points.ndim != 2 or self.points.shape[1] != 3:
@@ -110,7 +115,17 @@ class Mesh:
         return np.argsort(self.node_ids, kind="stable")
 
     def node_rows(self, ids: ArrayLike) -> Ints:
-        """Return the rows of `points` that carry these node ids; -1 where there is none."""
+        """Return the rows of nodes by their ids.
+
+        Parameters
+        ----------
+        ids : (...) int.
+
+        Returns
+        -------
+        (...) int
+            Rows of `points`; -1 where there is no such id.
+        """
         ids = np.asarray(ids, dtype=np.int64)
         if self._is_counting:
             return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
@@ -122,7 +137,17 @@ class Mesh:
         return bool((self.node_ids == np.arange(1, self.n_nodes + 1)).all())
 
     def place(self, block: Block, cell: int) -> str:
-        """Return a readable place of a cell for messages: ``cube.mdpa:22: element 1 (…3D8N)``."""
+        """Return a readable place of a cell for messages: ``cube.mdpa:22: element 1 (…3D8N)``.
+
+        Parameters
+        ----------
+        block : an element block.
+        cell : row of the cell in the block.
+
+        Returns
+        -------
+        str
+        """
         line = f":{block.lines[cell]}" if block.lines is not None else ""
         where = f"{self.source}{line}: " if self.source else ""
         return f"{where}element {block.ids[cell]} ({block.name})"
@@ -134,6 +159,19 @@ class Mesh:
 
         ``x- x+ y- y+ z- z+`` mean the nodes on the sides of the bounding box where the mesh
         has no part of that name.
+
+        Parameters
+        ----------
+        name : of the part.
+
+        Returns
+        -------
+        Part
+
+        Raises
+        ------
+        MeshError
+            If there is no such part, or several.
         """
         if not isinstance(name, str):
             raise MeshError(
@@ -153,8 +191,20 @@ class Mesh:
         raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, self.parts)}")
 
     def add_part(self, name: str, where: Where) -> None:
-        """Give nodes a name: those of a part, a predicate on the points, a mask or rows.
+        """Give nodes a name.
 
+        Parameters
+        ----------
+        name : of the new part; a part of that name is replaced.
+        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+
+        Raises
+        ------
+        MeshError
+            If no node is chosen.
+
+        Examples
+        --------
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0]])
         >>> mesh.add_part("tip", lambda X: X[:, 0] > 0.5)
         >>> mesh.nodes("tip")
@@ -174,10 +224,23 @@ class Mesh:
         return np.flatnonzero(np.abs(x - goal) <= 1e-6 * (high - low))
 
     def nodes(self, where: Where) -> Ints:
-        """Return the node rows of a part, of a predicate on the points, or of an array of rows.
+        """Return the rows of nodes, each once and in the order in which they are given.
 
-        Rows keep the order in which they are given; a row that is given twice counts once.
+        Parameters
+        ----------
+        where : part name, predicate on the points (n, 3), mask (n,) or rows.
 
+        Returns
+        -------
+        (k,) int
+
+        Raises
+        ------
+        MeshError
+            If there is no such part, or a row or a mask does not fit the mesh.
+
+        Examples
+        --------
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0]])
         >>> mesh.nodes(lambda X: X[:, 0] > 0.5)
         array([1])
@@ -197,16 +260,34 @@ class Mesh:
         return without_repeats(rows)
 
     def used_nodes(self) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the nodes that belong to an element."""
+        """Return which nodes belong to an element.
+
+        Returns
+        -------
+        (n,) bool
+        """
         used = np.zeros(self.n_nodes, dtype=bool)
         for block in self.blocks:
             used[block.nodes] = True
         return used
 
     def elements(self, where: WhereElements = None) -> Ints:
-        """Return the element rows of a part, of a property id, of an array of rows, or of all.
+        """Return the rows of elements.
 
         A part without elements of its own gives the elements that have all their nodes in it.
+
+        Parameters
+        ----------
+        where : part name, property id, rows, or None for all.
+
+        Returns
+        -------
+        (k,) int
+
+        Raises
+        ------
+        MeshError
+            If there is no such part, property or row.
         """
         if where is None:
             return np.arange(self.n_elements)
@@ -241,11 +322,28 @@ class Mesh:
         )
 
     def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
-        """Return which elements contain points (..., 3) in m, and where in them the points lie.
+        """Return which elements contain points, and where in them the points lie.
 
         A point on a face, edge or node of several elements belongs to the one in the lowest row.
-        Where a point lies outside, ``inside`` is False; with `required` that raises MeshError.
 
+        Parameters
+        ----------
+        points : (..., 3) float, m.
+        required : raise MeshError where a point lies outside; otherwise its ``inside`` is False.
+
+        Returns
+        -------
+        Located
+
+        Raises
+        ------
+        InputError
+            If the points are not finite or have the wrong shape.
+        MeshError
+            If a required point lies outside, or a node has no finite coordinates.
+
+        Examples
+        --------
         >>> from kratos_lite import box
         >>> found = box(cells=(2, 1, 1)).locate([[0.75, 0.5, 0.5], [3.0, 0.0, 0.0]])
         >>> found.rows.tolist(), found.xi[0].tolist()
@@ -265,9 +363,15 @@ class Mesh:
         return self.all_faces().boundary
 
     def all_faces(self, *, anew: bool = False) -> Faces:
-        """Return all faces of the elements and which of them coincide.
+        """Return all faces of the elements and which coincide; they are kept until a block is exchanged.
 
-        They are kept until a block is exchanged; `anew` finds them in any case.
+        Parameters
+        ----------
+        anew : find them in any case.
+
+        Returns
+        -------
+        Faces
         """
         nodes = [block.nodes for block in self.blocks]
         known, faces = self._faces
@@ -278,7 +382,12 @@ class Mesh:
         return faces
 
     def reoriented(self) -> Mesh:
-        """Return the mesh in which inverted elements have the node order of their mirror image."""
+        """Return the mesh in which inverted elements have the node order of their mirror image.
+
+        Returns
+        -------
+        Mesh
+        """
         blocks = []
         for block in self.blocks:
             turn = inverted(block, self.points)
@@ -296,7 +405,17 @@ class Mesh:
         )
 
     def faces(self, where: Where) -> list[Block]:
-        """Return the faces of a part: its conditions, or else the boundary faces among its nodes."""
+        """Return the faces of a part: its conditions, or else the boundary faces among its nodes.
+
+        Parameters
+        ----------
+        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+
+        Returns
+        -------
+        list of Block
+            One block for each shape of faces.
+        """
         if isinstance(where, str) and len(rows := self.part(where).conditions):
             return select(self.conditions, rows)
         inside = np.zeros(self.n_nodes, dtype=bool)

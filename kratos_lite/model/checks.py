@@ -10,22 +10,49 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import tabulate
-from kratos_lite.errors import MAX_PROBLEMS, MeshError, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.model.loads import Gravity, Load
+from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
-from kratos_lite.solvers.supports import Supports
 from kratos_lite.typing import Array
 
 SLOWEST, QUICKEST = 1.0, 2e4
 """Speeds of waves in m/s: jelly is above the one, diamond below the other."""
 FOLD = 0.2
 """Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
+
+
+def checked_mesh(mesh: object) -> Mesh:
+    """Return a mesh; InputError if it is none."""
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
+    return mesh
+
+
+def checked_material(material: object) -> LinearMaterial:
+    """Return a material; InputError if it is none."""
+    if not isinstance(material, LinearMaterial):
+        raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
+    return material
+
+
+def check_geometry(mesh: Mesh) -> list[str]:
+    """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
+
+    Raises MeshError, or InputError for elements of unknown kinds.
+    """
+    kinds = [element_class(mesh, block) for block in mesh.blocks]
+    check_blocks(mesh, kinds)
+    check_points(mesh)
+    check_repeated_nodes(mesh)
+    return check_jacobians(mesh, kinds)
 
 
 def check_points(mesh: Mesh) -> None:
@@ -248,6 +275,20 @@ def check_rounding(
     if noise > 1e-2 * size:
         raise SolveError(text)
     return [text]
+
+
+def check_loads(
+    loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
+) -> list[str]:
+    """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
+    moved = supports.values.any() or any(c.constant for c in supports.constraints)
+    if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
+        return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
+    if not forces.any() and not moved:
+        return ["no load acts and no displacement is prescribed, so nothing moves"]
+    if not forces[~supports.fixed].any() and not moved:
+        return ["all loads act on fixed components, so nothing moves"]
+    return []
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:

@@ -14,7 +14,8 @@ import numpy as np
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
-from kratos_lite.solvers.supports import Supports, rigid_modes
+from kratos_lite.model.supports import Supports
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 MAX_HINGED = 300
@@ -178,7 +179,7 @@ class Equations:
 def _equations(found: Bodies, supports: Supports) -> Equations:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
     part, (node, second) = found.part, found.joints
-    row, dof, weight = supports.rows_of_constraints()
+    row, dof, weight = supports.constraint_rows()
     body = part[dof // 3]
     first = int(row.max(initial=-1)) + 1
     joint = (3 * node[:, None] + np.arange(3)).ravel()

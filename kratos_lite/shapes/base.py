@@ -77,12 +77,40 @@ class Shape:
 
     @staticmethod
     def N(xi: ArrayLike) -> Array:
-        """Return the shape functions at `xi` (..., d) as (..., n)."""
+        """Return the shape functions at points.
+
+        Parameters
+        ----------
+        xi : (..., d) float, reference coordinates.
+
+        Returns
+        -------
+        (..., n) float
+
+        Raises
+        ------
+        TypeError
+            If the subclass does not define it.
+        """
         raise TypeError("a shape must define N(xi); see docs/add-an-element.md")
 
     @staticmethod
     def dN(xi: ArrayLike) -> Array:
-        """Return the derivatives dN_a/dxi_j at `xi` (..., d) as (..., n, d)."""
+        """Return the derivatives dN_a/dxi_j at points.
+
+        Parameters
+        ----------
+        xi : (..., d) float, reference coordinates.
+
+        Returns
+        -------
+        (..., n, d) float
+
+        Raises
+        ------
+        TypeError
+            If the subclass does not define it.
+        """
         raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
 
 

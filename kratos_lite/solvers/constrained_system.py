@@ -1,8 +1,8 @@
-"""ConstrainedSystem: the equations of elements and their supports, made once and solved for many forces."""
+"""ConstrainedSystem: K u = f of elements under constraints, made once and solved for many forces."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -17,13 +17,13 @@ from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
 from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.linear_solver import DENSE_MAX
-from kratos_lite.solvers.supports import Links, Supports, reduction
 from kratos_lite.typing import Array, Ints, Progress
 
 
 class ConstrainedSystem:
-    """K u = f + reactions on the nodes of some elements, with u as the supports prescribe it.
+    """K u = f + reactions on the nodes of some elements, with u = T q + c.
 
     Pattern, matrix and whatever the solver prepares (factors, multigrid) are made when they are first
     needed and kept.  Nodes that no element uses carry no equations.
@@ -32,8 +32,8 @@ class ConstrainedSystem:
     ----------
     points : (n, 3) m.
     groups : the elements, by rows of the points.
-    supports : prescribed displacements and constraints.
-    links : the constraints of `supports` if they are resolved already.
+    constraints : gives the constraint map of the nodes that carry equations, by their rows (a,), such as
+        ``model.supports.constraint_map``.
     solver : ``auto``, ``dense``, ``direct`` or ``amg``.
     tolerance : relative residual at which the iterative solver stops.
     patterns : where sparsity patterns are kept from one system to the next.
@@ -43,7 +43,7 @@ class ConstrainedSystem:
     ----------
     points, groups : the nodes that carry equations, and the elements by rows of these.
     nodes : (a,) int, rows of these nodes among all n.
-    reduced : the supports as a map from free degrees of freedom to all 3a.
+    reduced : the constraint map, from the free degrees of freedom to all 3a.
     method, reason : which solver is used, and why.
     skipped : what assembly left out, in words.
 
@@ -53,7 +53,8 @@ class ConstrainedSystem:
     >>> import kratos_lite as kl
     >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
     >>> model.fix("z-")
-    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports)
+    >>> constraints = model.supports.constraint_map
+    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints)
     >>> f = np.zeros((8, 3))
     >>> f[model.mesh.nodes("z+"), 2] = 1.0
     >>> u, solution = system.solve(f)
@@ -65,8 +66,7 @@ class ConstrainedSystem:
         self,
         points: Array,
         groups: Sequence[ElementGroup],
-        supports: Supports,
-        links: Links | None = None,
+        constraints: Callable[[Ints], ConstraintMap],
         *,
         solver: str = "auto",
         tolerance: float = 1e-10,
@@ -76,8 +76,7 @@ class ConstrainedSystem:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
-        self.supports = supports
-        self.reduced = reduction(supports, self.nodes, links)
+        self.reduced = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
         self.skipped: list[str] = []
         self._patterns = patterns or PatternCache()
@@ -117,44 +116,45 @@ class ConstrainedSystem:
             lambda: linear_level(self.points, self.groups),
         )
 
-    def prescribe(self, links: Links | None = None) -> None:
-        """Take over new values of the prescribed displacements and of the constants of constraints."""
-        self.reduced.c = reduction(self.supports, self.nodes, links).c
-
-    def solve(self, forces: Array) -> tuple[Array, solvers.Solution]:
+    def solve(self, forces: Array, prescribed: Array | None = None) -> tuple[Array, solvers.Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
+
+        Parameters
+        ----------
+        forces : (n, 3) N.
+        prescribed : (3a,) m, in place of c of the constraint map.
 
         Raises
         ------
         SolveError
             If the matrix is singular or the accuracy asked for cannot be reached.
         """
-        solution = self._equations.solve(self.local(forces), self.tolerance, self.progress)
-        return self.whole(solution.x), solution
+        solution = self._equations.solve(self.gather(forces), self.tolerance, self.progress, prescribed)
+        return self.scatter(solution.x), solution
 
     def internal_load(self, u: Array) -> Array:
         """Return ∫ B^T σ dV of displacements (n, 3) as nodal forces (n, 3) in N."""
-        return self.whole(internal_load(self.points, self.groups, u[self.nodes]).ravel())
+        return self.scatter(internal_load(self.points, self.groups, u[self.nodes]).ravel())
 
     def residual(self, u: Array, forces: Array) -> Array:
         """Return K u - f as nodal forces (n, 3) in N: reactions where something is prescribed."""
         out = 0.0 - forces
-        out[self.nodes] = (self.K @ self.local(u) - self.local(forces)).reshape(-1, 3)
+        out[self.nodes] = (self.K @ self.gather(u) - self.gather(forces)).reshape(-1, 3)
         return out
 
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
-        return self.reduced.reduce(self.local(forces))
+        return self.reduced.reduce(self.gather(forces))
 
     def expand(self, q: Array) -> Array:
         """Return the displacements (n, 3) of the free degrees of freedom (q,)."""
-        return self.whole(self.reduced.expand(q))
+        return self.scatter(self.reduced.expand(q))
 
-    def local(self, values: Array) -> Array:
+    def gather(self, values: Array) -> Array:
         """Return nodal values (n, 3) as those of the equations, (3a,)."""
         return values.ravel() if len(self.nodes) == self.n_nodes else values[self.nodes].ravel()
 
-    def whole(self, values: Array) -> Array:
+    def scatter(self, values: Array) -> Array:
         """Return values of the equations (3a,) as nodal values (n, 3), 0 on nodes without equations."""
         if len(self.nodes) == self.n_nodes:
             return values.reshape(-1, 3)

@@ -15,8 +15,8 @@ from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 from kratos_lite.solvers import direct, multigrid
 from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import PATIENCE, ConvergenceForecast
-from kratos_lite.solvers.supports import ConstraintMap
 from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import choice
 
@@ -108,19 +108,24 @@ class LinearSolver:
     linear_level: Callable[[], LinearLevel | None] | None = None
     symmetric: bool = True
 
-    def solve(self, f: Array, tolerance: float, progress: Progress | None = None) -> Solution:
+    def solve(
+        self, f: Array, tolerance: float, progress: Progress | None = None, prescribed: Array | None = None
+    ) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
+
+        `prescribed` displacements (3n,) take the place of c of the constraint map.
 
         Raises
         ------
         SolveError
             If the matrix is singular, or the iteration stalls where no factorization fits.
         """
-        b = self.reduced.reduce(f - self.K @ self.reduced.c)
+        c = self.reduced.c if prescribed is None else prescribed
+        b = self.reduced.reduce(f - self.K @ c)
         solution = self._solve(b, tolerance, progress) if len(b) else Solution(b, self.method, "", 0, 0.0)
         if not solution.reason:
             solution = replace(solution, reason=self.reason)
-        return replace(solution, x=self.reduced.expand(solution.x))
+        return replace(solution, x=self.reduced.expand(solution.x, c))
 
     def _solve(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
         if self.method == "dense":
@@ -151,7 +156,7 @@ class LinearSolver:
     @cached_property
     def _sparse(self) -> Any:
         """The reduced matrix as CSR."""
-        return self.reduced.restrict(self.K.scipy().tocsr())
+        return self.reduced.reduce_matrix(self.K.scipy().tocsr())
 
     @cached_property
     def factors(self) -> direct.Factorization:

@@ -18,8 +18,8 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.native import kernels
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
-from kratos_lite.solvers.supports import rigid_modes
 from kratos_lite.typing import Array, Mask, Progress
 
 GoOn = Callable[[float], bool]

@@ -1,11 +1,13 @@
-"""Check a student's file: run it aside and check every element, shape and material that it defines."""
+"""Files: run a Python file and check every element, shape and material that it defines."""
 
 from __future__ import annotations
 
 import sys
 import traceback
 from contextlib import ExitStack
-from math import nan
+from dataclasses import is_dataclass
+from inspect import get_annotations
+from math import inf, nan
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,16 +18,22 @@ from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.testing.elements import check_element
 from kratos_lite.testing.materials import check_material
-from kratos_lite.testing.mistakes import cure, mistakes, names, replaced
 from kratos_lite.testing.report import Finding
 from kratos_lite.testing.shapes import check_shape
 
 MODULE = "kratos_lite_checked_file"
+REGISTRIES = (ELEMENTS, SHAPES, MATERIALS)
+BASES: dict[tuple[str, ...], type] = {
+    ("compliance",): LinearMaterial,
+    ("elasticity",): LinearMaterial,
+    ("N", "dN"): Shape,
+    ("shape", "rule"): KinematicLinear,
+}
+"""What a class defines that is meant to be a subclass of each of these."""
+FROZEN = "@dataclass(frozen=True)"
 
-Named = tuple[str, list[Finding]]
 
-
-def run_file(path: str | Path) -> list[Named]:
+def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
     """Run a Python file and check what it defines; the file can do whatever a program can.
 
     Parameters
@@ -34,9 +42,9 @@ def run_file(path: str | Path) -> list[Named]:
 
     Returns
     -------
-    list of (name, findings), in the order of the file.  Elements and shapes are checked as
-    classes (a shape that an element of the file uses, with that element); materials as
-    instances that the file makes at its top level.
+    list of (name, findings)
+        In the order of the file.  Elements and shapes are checked as classes (a shape that an element of
+        the file uses, with that element); materials as instances that the file makes at its top level.
 
     Raises
     ------
@@ -44,13 +52,19 @@ def run_file(path: str | Path) -> list[Named]:
         If the file cannot be read or run, or defines nothing to check.
     """
     with ExitStack() as stack:
-        for registry in (ELEMENTS, SHAPES, MATERIALS):
+        for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
-        library = names()
-        defined = list(vars(_execute(Path(path))).items())
-        mine = [v for _, v in defined if isinstance(v, type) and v.__module__ == MODULE]
-        found = _check_all(defined, mine)
-        _add_mistakes(found, mine, library, Path(path))
+        library = _registered()
+        defined = vars(_execute(Path(path)))
+        kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
+        found = _check_all(defined, kinds)
+        for kind in kinds:
+            extra = _forgotten(kind) + _replaced(kind, library, Path(path))
+            same = [f for name, f in found if name == kind.__name__ or name.endswith(f" ({kind.__name__})")]
+            if same:
+                same[0].extend(extra)
+            elif extra:
+                found.append((kind.__name__, extra))
     if not found:
         raise InputError(
             f"{path}: nothing to check; a file defines a subclass of KinematicLinear, Shape or LinearMaterial"
@@ -58,40 +72,20 @@ def run_file(path: str | Path) -> list[Named]:
     return found
 
 
-def _check_all(defined: list[tuple[str, Any]], mine: list[type]) -> list[Named]:
+def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, list[Finding]]]:
     """Check elements, the shapes that none of them uses, and materials by their instances."""
-    found = [(kind.__name__, check_element(kind)) for kind in mine if issubclass(kind, KinematicLinear)]
-    used = {getattr(kind, "shape", None) for kind in mine}
-    shapes = [kind for kind in mine if issubclass(kind, Shape) and kind not in used]
-    found += [(kind.__name__, check_shape(kind)) for kind in shapes]
-    materials = [(n, v) for n, v in defined if isinstance(v, LinearMaterial)]
-    found += [(f"{n} ({type(v).__name__})", check_material(v)) for n, v in materials]
-    made = {type(v) for _, v in materials}
-    laws = [kind for kind in mine if issubclass(kind, LinearMaterial) and kind not in made]
-    return found + [(kind.__name__, [_no_instance(kind)]) for kind in laws]
-
-
-def _add_mistakes(
-    found: list[Named], mine: list[type], library: dict[tuple[str, str], Any], path: Path
-) -> None:
-    """Add what a class lacks or replaces to its findings."""
-    for kind in mine:
-        extra = mistakes(kind) + replaced(kind, library, path)
-        name = kind.__name__
-        same = [findings for own, findings in found if own == name or own.endswith(f" ({name})")]
-        if same:
-            same[0].extend(extra)
-        elif extra:
-            found.append((name, extra))
-
-
-def _no_instance(kind: type[LinearMaterial]) -> Finding:
-    advice = (
-        f"make one at the top level of the file, for example soil = {kind.__name__}(…) with its constants"
-    )
-    return Finding(
-        "instance", False, nan, nan, f"a material is checked as an instance: {advice}", skipped=True
-    )
+    used = {getattr(kind, "shape", None) for kind in kinds}
+    materials = {name: v for name, v in defined.items() if isinstance(v, LinearMaterial)}
+    made = {type(v) for v in materials.values()}
+    found = [(kind.__name__, check_element(kind)) for kind in kinds if issubclass(kind, KinematicLinear)]
+    found += [(k.__name__, check_shape(k)) for k in kinds if issubclass(k, Shape) and k not in used]
+    found += [(f"{name} ({type(v).__name__})", check_material(v)) for name, v in materials.items()]
+    for kind in kinds:
+        if issubclass(kind, LinearMaterial) and kind not in made:
+            text = "a material is checked as an instance: make one at the top level of the file, for example "
+            text += f"soil = {kind.__name__}(…) with its constants"
+            found.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
+    return found
 
 
 def _execute(path: Path) -> ModuleType:
@@ -115,8 +109,63 @@ def _execute(path: Path) -> ModuleType:
     except (Exception, SystemExit) as error:
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        text = f"the file stops with {type(error).__name__}: {error}{cure(error, vars(module))}"
+        text = f"the file stops with {type(error).__name__}: {error}{_cure(error, vars(module))}"
         raise InputError(f"{place}: {text}") from None
     finally:
         del sys.modules[MODULE]
     return module
+
+
+# ---- mistakes that Python lets pass ------------------------------------------------------------------
+
+
+def _registered() -> dict[tuple[str, str], Any]:
+    """Return what stands in the registries: (kind, name or alias) to class."""
+    return {
+        (registry.kind, name): registry[name]
+        for registry in REGISTRIES
+        for own in registry
+        for name in (own, *registry.aliases(own))
+    }
+
+
+def _replaced(kind: type, library: dict[tuple[str, str], Any], path: Path) -> list[Finding]:
+    """Return a finding if a class took names of the library; its own file may define it."""
+    now = _registered()
+    lost = {name: old for (of, name), old in library.items() if now[of, name] is kind is not old}
+    homes = {Path(sys.modules[old.__module__].__file__ or "").resolve() for old in lost.values()}
+    if not lost or homes == {path.resolve()}:
+        return []
+    text = f"the library has {', '.join(lost)} already; importing this file would replace it: "
+    return [Finding("name", False, inf, 0, text + "choose another name")]
+
+
+def _forgotten(kind: type) -> list[Finding]:
+    """Return findings for a class that lacks its base class or its decorator."""
+    signs = [names for names in BASES if all(name in vars(kind) for name in names)]
+    if signs and not issubclass(kind, tuple(BASES.values())):
+        base, what = BASES[signs[0]].__name__, " and ".join(signs[0])
+        text = f"{kind.__name__} has {what} but is no {base}, so nothing uses it: "
+        return [Finding("base class", False, inf, 0, text + f"write class {kind.__name__}({base})")]
+    if _lacks_decorator(kind):
+        text = f"{kind.__name__} lists constants: add {FROZEN} above it"
+        return [Finding("dataclass", False, inf, 0, text)]
+    return []
+
+
+def _lacks_decorator(kind: type) -> bool:
+    """Return whether a material lists constants of its own but is not made a dataclass of them."""
+    own = [a for a in get_annotations(kind).values() if "ClassVar" not in str(a)]
+    is_own = is_dataclass(kind) and "__dataclass_fields__" in vars(kind)
+    return issubclass(kind, LinearMaterial) and bool(own) and not is_own
+
+
+def _cure(error: BaseException, defined: dict[str, Any]) -> str:
+    """Return what to do about an error that a decorator left out has led to, or an empty text."""
+    if not isinstance(error, TypeError):
+        return ""
+    if "non-frozen dataclass" in str(error):
+        return f"; write {FROZEN}"
+    kinds = [v for v in defined.values() if isinstance(v, type) and _lacks_decorator(v)]
+    named = [kind.__name__ for kind in kinds if kind.__name__ in str(error)]
+    return f"; add {FROZEN} above class {named[0]}" if named else ""

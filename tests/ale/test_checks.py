@@ -6,7 +6,6 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.ale.checks import rayleigh_speed
-from kratos_lite.ale.symmetry import leak
 from kratos_lite.analysis import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates_beside
 from kratos_lite.errors import InputError, ModelError
@@ -32,9 +31,9 @@ def test_the_wrong_axis(options, wheels):
 
 def test_a_wheel_that_stands_elsewhere(wheels):
     model = wheels.disk("8N", 2, 48)
-    model.mesh.points[:] = model.mesh.points[:, [2, 0, 1]] + (5.0, -3.0, 8.0)
+    model.mesh.points = model.mesh.points[:, [2, 0, 1]] + (5.0, -3.0, 8.0)
     model.add(Rotation("x", rate=1.0, center=(0.0, -3.0, 8.0)))
-    assert leak(model.motion, model.mesh) < 0.06
+    assert model.motion.leak(model.mesh) < 0.06
 
 
 def test_polygonal_rim(wheels):
@@ -102,14 +101,14 @@ def test_windows_near_their_critical_speed(ends, share, wheels):
     """With free surfaces it lies below c_s, and further below with free ends; in one dimension it is c_p."""
     bedded = kl.Model(kl.box((10, 1, 1), (20, 1, 1), "KinematicLinear3D20N"), wheels.steel)
     bedded.fix("z-")
-    bedded.add(Translation("x", rate=0.95 * share * wheels.c_s, ends=ends))
+    bedded.add(Translation("x", rate=0.95 * share * wheels.c_s, boundaries=ends))
     words = f"is near the critical one, {share * wheels.c_s:.4g}"[:-2]
     for warnings in (bedded.transient().equations.warnings, bedded.solve().report.warnings):
         assert sum(words in text for text in warnings) == 1
     model = wheels.bar("8N", 10)
     model.fix("x-", "x")
     model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1.0, 0, 0)))
-    model.add(Translation("x", rate=0.95 * wheels.c_p, ends="natural"))
+    model.add(Translation("x", rate=0.95 * wheels.c_p, boundaries="natural"))
     assert any("m/s is near the critical one, 192.6 m/s on" in t for t in model.solve().report.warnings)
 
 
@@ -169,18 +168,18 @@ def test_rings_of_another_material_are_one(wheels):
 def test_a_window_must_be_alike_along_its_way(wheels):
     tapered = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
     tapered.fix("z-")
-    tapered.mesh.points[:, 1:] *= 1 + 0.03 * tapered.mesh.points[:, :1]
+    tapered.mesh.points = tapered.mesh.points * (1 + 0.03 * tapered.mesh.points[:, :1] * [0, 1, 1])
     tapered.add(Translation("x", rate=5.0))
-    assert any("through the sides of the window" in text for text in tapered.solve().report.warnings)
+    assert any("through the sides of the body" in text for text in tapered.solve().report.warnings)
     cone = kl.Model(kl.box((10, 1, 1), (10, 1, 1)), wheels.steel)
-    cone.mesh.points[:, 1:] *= 1 + 0.3 * cone.mesh.points[:, :1]
+    cone.mesh.points = cone.mesh.points * (1 + 0.3 * cone.mesh.points[:, :1] * [0, 1, 1])
     with pytest.raises(ModelError, match=r"not straight along the axis \[1\.0, 0\.0, 0\.0\]"):
         cone.add(Translation("x", rate=5.0))
     series = wheels.bar("8N", 10)
     series.fix("x-", "x")
     series.assign(kl.Isotropic3D(21e6, 0.3, 7620.0), np.arange(4))
     series.add(Translation("x", rate=5.0))
-    with pytest.raises(ModelError, match="the stiffness of the body is not spread evenly along the window"):
+    with pytest.raises(ModelError, match="the stiffness of the body is not spread evenly along the"):
         series.solve()
     layered = kl.Model(kl.box((10, 1, 1), (10, 1, 2)), wheels.steel)
     layered.fix("z-")
@@ -188,8 +187,9 @@ def test_a_window_must_be_alike_along_its_way(wheels):
     layered.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
     layered.add(Translation("x", rate=5.0))
     layered.solve()
-    graded = kl.Model(kl.box((10, 1, 1), (8, 1, 2)), wheels.steel)
-    graded.mesh.points[:, 0] = (graded.mesh.points[:, 0] / 10) ** 3 * 10
+    mesh = kl.box((10, 1, 1), (8, 1, 2))
+    mesh.points[:, 0] = (mesh.points[:, 0] / 10) ** 3 * 10
+    graded = kl.Model(mesh, wheels.steel)
     graded.fix("z-")
     low = graded.mesh.points[graded.mesh.blocks[0].nodes].mean(axis=1)[:, 2] < 0.5
     graded.assign(kl.Isotropic3D(21e6, 0.3, 9000.0), np.flatnonzero(low))
@@ -219,7 +219,7 @@ def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels)
         model = wheels.bar("8N", 4)
         if before:
             model.fix(end, "x", 1e-3)
-        model.add(Translation("x", rate=1.0, ends="periodic"))
+        model.add(Translation("x", rate=1.0, boundaries="periodic"))
         if not before:
             model.fix(end, "x", 1e-3)
         model.add(kl.PointLoad(lambda X: np.abs(X[:, 0]) < 1e-9, (1e3, 0.0, 0.0)))
@@ -233,7 +233,7 @@ def test_periodic_ends_take_supports_of_either_end_before_and_after(end, wheels)
 
 def test_joined_ends_move_by_one_function(wheels):
     model = wheels.bar("8N", 4)
-    model.add(Translation("x", rate=1.0, ends="periodic"))
+    model.add(Translation("x", rate=1.0, boundaries="periodic"))
     way = kl.TimeSeries([0.0, 1.0], [0.0, 1e-3])
     model.fix("x-", "x", way)
     *_, one = model.transient().march(1e-2, 5)
@@ -242,25 +242,27 @@ def test_joined_ends_move_by_one_function(wheels):
     np.testing.assert_allclose(both.u, one.u, atol=1e-16)
     for other in (0.0, kl.TimeSeries([0.0, 1.0], [0.0, 2e-3])):
         model.fix("x+", "x", other, override=True)
-        with pytest.raises(ModelError, match="are joined, but moved otherwise"):
+        with pytest.raises(ModelError, match="are tied, but move differently"):
             model.transient()
 
 
 def test_joined_ends_cannot_be_held_in_two_places(wheels):
     model = wheels.bar("8N", 4)
-    model.add(Translation("x", rate=1.0, ends="periodic"))
+    model.add(Translation("x", rate=1.0, boundaries="periodic"))
     model.fix("x-", "x", 0.0)
     model.fix("x+", "x", 1e-3)
-    with pytest.raises(ModelError, match=r"are joined, but prescribed as 0\.001 m and 0 m"):
+    with pytest.raises(ModelError, match=r"are tied, but prescribed as 0\.001 m and 0 m"):
         model.solve()
 
 
 def test_periodic_ends_need_opposite_nodes(wheels):
     model = wheels.bar("8N", 4)
     end = model.mesh.nodes("x+")
-    model.mesh.points[end[0], 1] += 0.2
+    moved = model.mesh.points.copy()
+    moved[end[0], 1] += 0.2
+    model.mesh.points = moved
     with pytest.raises(ModelError, match="nodes that lie opposite one another; there are 4 and 4"):
-        model.add(Translation("x", rate=1.0, ends="periodic"))
+        model.add(Translation("x", rate=1.0, boundaries="periodic"))
 
 
 @pytest.mark.parametrize(
@@ -275,8 +277,11 @@ def test_periodic_ends_need_opposite_nodes(wheels):
         (lambda: Rotation("z", stiffening="no"), "stiffening must be True or False; got 'no'"),
         (lambda: Rotation("z", skew=1), "skew must be True or False; got 1"),
         (lambda: Rotation("z", damping=(1, 2)), "a damping must be one number"),
-        (lambda: Rotation("z", damping=-1.0), "a damping must be one number in 1/s, ≥ 0; got -1.0"),
-        (lambda: Translation("x", ends="open"), "ends must be one of absorbing, periodic, fixed, natural"),
+        (lambda: Rotation("z", damping=-1.0), "a damping must be one number ≥ 0, in 1/s; got -1.0"),
+        (
+            lambda: Translation("x", boundaries="open"),
+            "boundaries must be one of absorbing, periodic,",
+        ),
     ],
 )
 def test_arguments(make, text):

@@ -90,7 +90,7 @@ def test_critical_speed_of_a_bar_is_that_of_its_waves(wheels):
         model = wheels.bar(kind, 6, 3.0, tied="all")
         for end in (-3.0, 3.0):
             model.fix(np.flatnonzero(model.mesh.points[:, 0] == end)[:1], "x")
-        model.add(Translation("x", rate=1.0, ends="natural"))
+        model.add(Translation("x", rate=1.0, boundaries="natural"))
         e = EquationsOfMotion(model)
         K = reduced(e, e.matrix(0.0, 0.0, 0.0, 1.0)).toarray()
         plain = reduced(e, e.K).toarray()
@@ -105,7 +105,7 @@ def test_periodic_window_has_its_discrete_symbol(share, wheels):
     """λ² M + 2 v λ G + K - v² H = 0 of every wave that fits into the window."""
     n, h, c, rho = 12, 0.5, wheels.c_p, wheels.steel.density
     model = wheels.bar("8N", n, n * h / 2, tied="below")
-    model.add(Translation("x", rate=share * c, ends="periodic"))
+    model.add(Translation("x", rate=share * c, boundaries="periodic"))
     expected = []
     for p in range(n):
         angle = 2 * np.pi * p / n
@@ -140,7 +140,7 @@ def test_repeated_frequencies_are_found_at_rest(rate, monkeypatch):
 def test_faster_than_its_waves_a_window_is_unstable(wheels):
     for share, stable in ((0.98, True), (1.02, False)):
         model = wheels.bar("8N", 12, 3.0, tied="below")
-        model.add(Translation("x", rate=share * wheels.c_p, ends="periodic"))
+        model.add(Translation("x", rate=share * wheels.c_p, boundaries="periodic"))
         growth = model.complex_modes(24)[0].real.max()
         assert (growth < 1e-3) if stable else (growth > 50)
 

@@ -210,7 +210,7 @@ def test_objectivity(kind, wheels):
     """Mesh, axis and center turned and shifted far away together: the same matrices, turned loads."""
     R, shift = exp(np.array([0.4, -1.1, 0.7])), np.array([300.0, -200.0, 50.0])
     model, turned = distorted(kind), distorted(kind)
-    turned.mesh.points[:] = model.mesh.points @ R.T + shift
+    turned.mesh.points = model.mesh.points @ R.T + shift
     axis, center = np.array([1.0, 2.0, -0.5]), np.array([0.3, -0.1, 0.2])
     a = wheels.matrices(Rotation(axis, center=center), model)
     b = wheels.matrices(Rotation(R @ axis, center=R @ center + shift), turned)
@@ -243,4 +243,4 @@ def graded(mesh: kl.Mesh) -> None:
     """Move the nodes of a wheel around the axis so that no mirror symmetry is left."""
     r, angle = np.hypot(*mesh.points.T[:2]), np.arctan2(mesh.points[:, 1], mesh.points[:, 0])
     angle = angle + 0.4 * np.sin(angle) + 0.25 * np.sin(2 * angle + 0.7)
-    mesh.points[:, :2] = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
+    mesh.points = np.column_stack([r * np.cos(angle), r * np.sin(angle), mesh.points[:, 2]])

@@ -92,7 +92,7 @@ def test_h_is_there_with_its_sign(wheels):
     model.add(Rotation("z", rate=30.0))
     with_h = model.solve().u
     load = EquationsOfMotion(model)
-    nodal = load.system.whole(load.inertia_load(0.0))
+    nodal = load.system.scatter(load.inertia_load(0.0))
     plain = free_hub(wheels, "20N", 4, 32)
     plain.add(kl.NodalForces(nodal))
     tip = int(np.argmax(model.mesh.points[:, 0]))
@@ -129,7 +129,7 @@ def test_long_cylinder(wheels):
     spinning = wheels.disk("20N", 4, 24)
     spinning.add(Rotation("z", rate=30.0))
     e = EquationsOfMotion(spinning)
-    model.add(kl.NodalForces(e.system.whole(e.inertia_load(0.0))))
+    model.add(kl.NodalForces(e.system.scatter(e.inertia_load(0.0))))
     u = model.solve().u
     rim = int(np.argmax(mesh.points[:, 0]))
     assert u[tops[0], 2] / 0.2 == pytest.approx(-5.339442857143e-03, rel=1e-3)
@@ -278,7 +278,7 @@ def test_a_damped_window_has_its_closed_form(rate, ends, wheels):
         model = wheels.bar("8N", n, length / 2)
         model.fix("x-", "x")
         model.add(kl.BodyForce((f, 0, 0)))
-        model.add(Translation("x", rate=rate, ends=ends, damping=alpha))
+        model.add(Translation("x", rate=rate, boundaries=ends, damping=alpha))
         u, x = model.solve().u[:, 0], model.mesh.points[:, 0] + length / 2
         errors.append(np.abs(u - exact(x)).max() / np.abs(exact(x)).max())
     assert errors[1] < 2e-4

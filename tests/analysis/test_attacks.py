@@ -63,7 +63,7 @@ def spring(force=0.0):
     model = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
     model.fix(lambda X: np.ones(len(X), dtype=bool), "xy")
     model.fix("z-", "z")
-    model.add(kl.Varying(kl.Traction("z+", (0, 0, 1e3)), lambda t: np.sin(20 * t)))
+    model.add(kl.Traction("z+", (0, 0, 1e3)), amplitude=lambda t: np.sin(20 * t))
     model.add(kl.Traction("z+", (0, 0, force)))
     return model
 
@@ -84,7 +84,7 @@ def test_what_is_let_go_begins_with_the_acceleration_of_its_new_load(scheme, tmp
         ends.append(end.u)
     np.testing.assert_array_equal(*ends)
     e = EquationsOfMotion(spring(-2e3))
-    balance = e.load(0.1) - e.times_stiffness(e.system.local(moment.u), 0.0)
+    balance = e.load(0.1) - e.times_stiffness(e.system.gather(moment.u), 0.0)
     put = spring(-2e3).transient(scheme=scheme)
     put.put(moment)
     put.march(1e-3, 1)
@@ -93,7 +93,7 @@ def test_what_is_let_go_begins_with_the_acceleration_of_its_new_load(scheme, tmp
     again = model.transient(scheme=scheme)
     again.put(moment)  # the same load: as it was, so that restarts are bitwise
     again.march(1e-3, 1)
-    np.testing.assert_array_equal(again.a, e.system.local(moment.a))
+    np.testing.assert_array_equal(again.a, e.system.gather(moment.a))
 
 
 def test_supports_that_rest_elsewhere_fit_their_own_moments():

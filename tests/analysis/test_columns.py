@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.model.loads import ScaledLoad
 
 SOIL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 MODULUS = SOIL.C[0, 0]
@@ -100,7 +101,7 @@ def test_a_moving_support_carries_the_column(scheme):
 @each_scheme
 def test_a_restart_goes_on_bit_by_bit(scheme, tmp_path):
     def made():
-        load = kl.Varying(kl.Traction("z+", (0, 0, 1e3)), kl.TimeSeries([0, 1e-3, 2e-3], [0, 1, -1]))
+        load = ScaledLoad(kl.Traction("z+", (0, 0, 1e3)), kl.TimeSeries([0, 1e-3, 2e-3], [0, 1, -1]))
         model = column(3, load)
         return model.transient(scheme=scheme, rayleigh=(3.0, 0.0))
 
@@ -163,7 +164,7 @@ def test_wrong_words_are_told():
         (lambda: list(model.transient().march(0.0, 1)), "a step must be"),
         (lambda: list(model.transient().march(1e-3, 0)), "steps must be"),
         (lambda: list(model.transient(scheme=kl.CentralDifference()).march(1.0, 1)), "critical step is"),
-        (lambda: kl.Varying(3.0, 1.0), "a load such as"),
+        (lambda: ScaledLoad(3.0, 1.0), "multiplies a constant load such as"),
     ):
         with pytest.raises(kl.InputError, match=words):
             make()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.writers.moments import MOMENT_COLUMNS
+from kratos_lite.io.writers.recorded import OF_MODELS as MOMENT_COLUMNS
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
@@ -159,7 +159,7 @@ def test_the_material_of_a_wheel_turns_and_takes_the_displacement_along():
 
 def test_a_wave_that_stands_in_the_window_moves_with_it():
     bar = kl.Model(kl.box((10.0, 1.0, 1.0), cells=(20, 1, 1)), RUBBER)
-    bar.add(kl.ale.Translation("x", rate=3.0, ends="natural"))
+    bar.add(kl.ale.Translation("x", rate=3.0, boundaries="natural"))
     u = np.zeros_like(bar.mesh.points)
     u[:, 0] = 1e-3 * bar.mesh.points[:, 0]
     v = np.zeros_like(u)

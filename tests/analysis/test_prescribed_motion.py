@@ -94,7 +94,7 @@ def test_a_support_moves_by_one_function():
     def way(t):
         return 1e-3 * np.sin(30 * t)
 
-    twice = "prescribed twice: by a function of the time and otherwise"
+    twice = "prescribed twice: by a function of time and otherwise"
     for second in (0.0, lambda t: 0.0, 1e-3):
         model = kl.Model(kl.box(), kl.Isotropic3D(E=E, nu=0.0, density=RHO))
         model.fix("z-", "xyz", way)

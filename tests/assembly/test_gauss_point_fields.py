@@ -124,7 +124,7 @@ def test_results_do_not_depend_on_the_number_of_threads():
 SCRIPT = """
 import json, numpy as np, kratos_lite as kl
 model = kl.Model(kl.box(cells=(3, 3, 3), element="KinematicLinear3D10N"), kl.Isotropic3D(1e9, 0.3, 2000.0))
-model.mesh.points += 0.02 * np.sin(9 * model.mesh.points[:, [1, 2, 0]])
+model.mesh.points = model.mesh.points + 0.02 * np.sin(9 * model.mesh.points[:, [1, 2, 0]])
 model.fix("z-")
 model.add(kl.Gravity((1.0, 2.0, -9.81)))
 result = model.solve()

@@ -355,3 +355,10 @@ def test_a_series_is_constant_outside_and_straight_inside():
             series.integral(a, 2.5) + series.integral(2.5, b) if a < 2.5 else series.integral(a, b)
         )
     assert kl.TimeSeries([0.0], [2.0])(7) == 2.0
+
+
+def test_gravity_on_a_part_of_a_body_without_material_takes_its_mean_density():
+    mesh = kl.box((2.0, 1.0, 1.0), (2, 1, 1))
+    body = kl.RigidBody(mesh, mass_properties=kl.MassProperties(mass=8.0, inertia=np.eye(3)))
+    body.add(kl.Gravity((0.0, 0.0, -10.0), where=[0]))  # one of two equal elements
+    np.testing.assert_allclose(body.external_load()[3:], [0.0, 0.0, -40.0], atol=1e-12)

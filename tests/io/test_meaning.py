@@ -76,7 +76,9 @@ def test_a_component_in_properties_loads_like_the_vector(load, text, force):
 
 
 def test_a_component_that_contradicts_its_vector_is_refused(load):
-    with pytest.raises(kl.InputError, match=r"cube\.mdpa:7: GRAVITY_Z is 1, but GRAVITY has -9\.81 there"):
+    with pytest.raises(
+        kl.InputError, match=r"cube\.mdpa:7: Properties 1: GRAVITY_Z is 1, but GRAVITY has -9\.81 there"
+    ):
         load("GRAVITY [3] (0, 0, -9.81)\nGRAVITY_Z 1")
 
 

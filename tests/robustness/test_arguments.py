@@ -98,7 +98,7 @@ WRONG = {
     ),
     "activate shape": (
         lambda: model().stress_free_at(np.zeros(3)),
-        r"the initial displacement needs shape \(27, 3\)",
+        r"the initial displacement must have shape \(27, 3\)",
     ),
     "prestress word": (lambda: model().add_prestress("a"), "a prestress must be made of real numbers"),
     "prestress five": (lambda: model().add_prestress(np.zeros(5)), "a prestress has six components"),

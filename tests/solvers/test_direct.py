@@ -11,7 +11,6 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers import LinearSolver, direct
-from kratos_lite.solvers.supports import reduction
 
 
 def has_pardiso():
@@ -35,7 +34,7 @@ def block(fixed=True):
     groups = model.element_groups()
     points = model.mesh.points
     K = assemble_stiffness(points, groups, Pattern(len(points), [group.nodes for group in groups]))
-    return LinearSolver(K, reduction(model.supports, np.arange(len(points))), points, "direct", "")
+    return LinearSolver(K, model.supports.constraint_map(np.arange(len(points))), points, "direct", "")
 
 
 def right_side(n, seed=1):

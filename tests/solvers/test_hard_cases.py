@@ -102,7 +102,7 @@ def test_layers_of_flat_elements(element):
 def hierarchy(model):
     """Return the multigrid of a model, and a right side."""
     module = kernels("multigrid")
-    system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports)
+    system = ConstrainedSystem(model.mesh.points, model.element_groups(), model.supports.constraint_map)
     free = np.zeros(3 * len(system.points), dtype=bool)
     free[system.reduced.free] = True
     linear = coarse_level.linear_level(system.points, system.groups)

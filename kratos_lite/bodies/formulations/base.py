@@ -25,8 +25,8 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import LinearSolver
 from kratos_lite.solvers.banded import Factorizer
+from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.solvers.supports import ConstraintMap
 from kratos_lite.typing import Array
 
 FACTORIZED_MAX = 4000

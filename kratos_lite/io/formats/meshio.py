@@ -6,6 +6,7 @@ meshio keeps cells in the node order of VTK, except that its linear wedge is tha
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -65,10 +66,10 @@ def read_meshio(path: str | Path) -> Document:
     check_ending(path)
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is no ordinary file; name a file")  # a pipe might never end
-    with _guarded(path, "read") as (meshio, said):
+    with _guarded(path, "read") as (meshio, output):
         found = meshio.read(path)
     _check(path, found)
-    return _Reading(path, found, said.getvalue()).document()
+    return _Reading(path, found, output.getvalue()).document()
 
 
 def write_meshio(
@@ -106,9 +107,8 @@ def write_meshio(
         # Several writers of meshio leave out what their format cannot hold, and say nothing.
         kept, wanted = _count(meshio.read(temporary)), _count(whole)
         if kept != wanted:
-            raise InputError(
-                f"{path}: this format keeps {_told(kept)} of {_told(wanted)}; .vtu and .vtk keep all cells"
-            )
+            numbers = f"{_listed(kept)} of {_listed(wanted)}"
+            raise InputError(f"{path}: this format keeps {numbers}; .vtu and .vtk keep all cells")
 
 
 def _gmsh_tags(path: Path, cell_data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -117,34 +117,29 @@ def _gmsh_tags(path: Path, cell_data: Mapping[str, NDArray[Any]]) -> dict[str, N
         raise InputError(f"{path}: .msh cannot hold {', '.join(sorted(results))} on elements; write .vtu")
     properties = np.asarray(cell_data.get("PROPERTIES_ID", []))
     if len(properties) and properties.max() > _INT32:
-        raise InputError(
-            f"{path}: .msh holds property ids up to {_INT32}; got {properties.max()}; write .vtu"
-        )
+        text = f".msh holds property ids up to {_INT32}; got {properties.max()}; write .vtu"
+        raise InputError(f"{path}: {text}")
     tags = properties.astype(np.int32)
     return {"gmsh:physical": tags, "gmsh:geometrical": tags} if len(tags) else {}
 
 
-def _count(mesh: Any) -> dict[str, int]:
+def _count(mesh: Any) -> Counter[str]:
     """Return the number of cells of each type."""
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for cells in mesh.cells:
-        counts[cells.type] = counts.get(cells.type, 0) + len(cells.data)
+        counts[cells.type] += len(cells.data)
     return counts
 
 
-def _told(counts: dict[str, int]) -> str:
+def _listed(counts: Counter[str]) -> str:
     return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "no cells"
-
-
-def _endings() -> list[str]:
-    import meshio
-
-    return sorted(set(meshio.extension_to_filetypes) - _OURS)
 
 
 def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
     """Refuse an ending that meshio does not know, in words rather than by leaving the program."""
-    endings = _endings()
+    import meshio
+
+    endings = sorted(set(meshio.extension_to_filetypes) - _OURS)
     if not path.name.lower().endswith(tuple(endings)):
         raise InputError(f"{path}: unknown ending {path.suffix!r}; known are {own} {' '.join(endings)}")
 
@@ -157,10 +152,10 @@ def _guarded(path: Path, done: str) -> Iterator[tuple[Any, io.StringIO]]:
 
     for missing in ("wedge15", "pyramid13"):  # meshio 5.3.5 knows both but fails on their dimension
         _mesh.topological_dimension.setdefault(missing, 3)
-    said, listed = io.StringIO(), io.StringIO()
+    output, listing = io.StringIO(), io.StringIO()
     try:
-        with redirect_stderr(said), redirect_stdout(listed):
-            yield meshio, said
+        with redirect_stderr(output), redirect_stdout(listing):
+            yield meshio, output
     except ImportError as error:
         raise InputError(f"{path}: {error}; this format needs it: pip install {error.name}") from error
     except (InputError, MemoryError):
@@ -170,30 +165,25 @@ def _guarded(path: Path, done: str) -> Iterator[tuple[Any, io.StringIO]]:
             raise  # the disk, not the format
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (Exception, SystemExit) as error:
-        reasons = [said.getvalue(), listed.getvalue(), "" if isinstance(error, SystemExit) else repr(error)]
-        reason = " ".join(" ".join(reasons).split())
+        last = "" if isinstance(error, SystemExit) else repr(error)
+        reason = " ".join(f"{output.getvalue()} {listing.getvalue()} {last}".split())
         cure = "is the file complete?" if done == "read" else ".vtu and .vtk hold every mesh"
         raise InputError(f"{path}: cannot be {done} by meshio: {reason}; {cure}") from error
 
 
 def _check(path: Path, found: Any) -> None:
     """Refuse points that are no points in space, and cells that name points that are not there."""
-    if found.points.ndim != 2 or found.points.shape[1] != 3:
-        raise InputError(
-            f"{path}: the points form {found.points.shape}; expected (n, 3); save a mesh in space"
-        )
-    if len(bad := np.flatnonzero(~np.isfinite(found.points).all(axis=1))):
-        raise InputError(
-            f"{path}: point {bad[0] + 1} has coordinates {found.points[bad[0]]}; expected numbers"
-        )
+    points = found.points
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"{path}: the points form {points.shape}; expected (n, 3); save a mesh in space")
+    if len(bad := np.flatnonzero(~np.isfinite(points).all(axis=1))):
+        raise InputError(f"{path}: point {bad[0] + 1} has coordinates {points[bad[0]]}; expected numbers")
     for cells in found.cells:
         if cells.type in CELLS and len(cells.data):
-            low, high = cells.data.min(), cells.data.max()
-            if low < 0 or high >= len(found.points):
-                raise InputError(
-                    f"{path}: a {cells.type} names point {high + 1 if low >= 0 else low + 1}; "
-                    f"the points are 1 … {len(found.points)}; is the file complete?"
-                )
+            low, high = int(cells.data.min()) + 1, int(cells.data.max()) + 1
+            if low < 1 or high > len(points):
+                text = f"a {cells.type} names point {high if low >= 1 else low}; the points are 1 … "
+                raise InputError(f"{path}: {text}{len(points)}; is the file complete?")
 
 
 def _ids(given: list[Any], count: int) -> Ints | None:
@@ -201,17 +191,16 @@ def _ids(given: list[Any], count: int) -> Ints | None:
     ids = np.concatenate([NO_ROWS, *map(np.ravel, given)])
     if len(ids) != count or not count or not 1 <= ids.min() <= ids.max() < 2**62:
         return None
-    if not np.array_equal(ids, np.round(ids)):
-        return None
-    return ids.astype(np.int64) if len(np.unique(ids)) == count else None
+    fits = np.array_equal(ids, np.round(ids)) and len(np.unique(ids)) == count
+    return ids.astype(np.int64) if fits else None
 
 
 class _Reading:
     """One mesh of meshio on its way to a Document."""
 
-    def __init__(self, path: Path, found: Any, said: str) -> None:
+    def __init__(self, path: Path, found: Any, output: str) -> None:
         self.path, self.found = path, found
-        self.notes = [Note(0, " ".join(said.split()))] if said.strip() else []
+        self.notes = [Note(0, " ".join(output.split()))] if output.strip() else []
         self.used = set(_PROPERTY_KEYS)
         self.sets = self._sets()
         self.kinds: list[type[Shape] | None] = [
@@ -234,14 +223,8 @@ class _Reading:
             self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
         node_ids = self._name(elements)
         self._note_lost()
-        mesh = Mesh(
-            self.found.points,
-            elements,
-            node_ids=node_ids,
-            conditions=conditions,
-            parts=self._parts(),
-            source=self.path.name,
-        )
+        source, parts, points = self.path.name, self._parts(), self.found.points
+        mesh = Mesh(points, elements, node_ids=node_ids, conditions=conditions, parts=parts, source=source)
         return Document(mesh, {i: Properties(i) for i in used}, notes=self.notes)
 
     def _name(self, elements: list[Block]) -> Ints:
@@ -335,9 +318,9 @@ class _Reading:
 
     def _note_lost(self) -> None:
         """Note cells and data that are not used."""
-        lost: dict[str, int] = {}
+        lost: Counter[str] = Counter()
         for cells, rows in zip(self.found.cells, self.rows, strict=True):
-            lost[cells.type] = lost.get(cells.type, 0) + int((rows < 0).sum())
+            lost[cells.type] += int((rows < 0).sum())
         for name, count in lost.items():
             if count:
                 why = "are in no named group" if name in CELLS else "are of no known type"

@@ -90,8 +90,10 @@ def write_vtu(
     # in the header that has the one it looks for, which must not be an array it has moved already.
     ends = accumulate((sum(map(len, pieces)) for pieces in reversed(stored)), initial=0)
     offsets = iter([*ends][-2::-1])
-    said = (_text(a) if mode == "ascii" else f' format="appended" offset="{next(offsets)}"/>' for a in arrays)
-    head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, said)
+    places = (
+        _text(a) if mode == "ascii" else f' format="appended" offset="{next(offsets)}"/>' for a in arrays
+    )
+    head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, places)
     tail = "</VTKFile>\n" if mode == "ascii" else "\n</AppendedData>\n</VTKFile>\n"
 
     def write(file: BinaryIO) -> None:
@@ -198,15 +200,15 @@ def _cells(blocks: list[Block], n_nodes: int) -> Named:
     ]
 
 
-def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, said: Iterator[str]) -> str:
-    """Return the XML up to the binary data; `said` tells of each array in turn where its numbers are."""
+def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, places: Iterator[str]) -> str:
+    """Return the XML up to the binary data; `places` gives for each array in turn where its numbers are."""
     text = _HEAD.format("UnstructuredGrid")
     if mode == "compressed":
         text = text.replace("header_type", 'compressor="vtkZLibDataCompressor" header_type')
     text += f'<UnstructuredGrid>\n<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n'
     for group, members in groups.items():
         text += f"<{group}>\n"
-        for (name, array), place in zip(members, said, strict=False):
+        for (name, array), place in zip(members, places, strict=False):
             text += f"<DataArray {_describe(name, array)}{place}\n"
         text += f"</{group}>\n"
     text += "</Piece>\n</UnstructuredGrid>\n"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
 
 FOREVER = 1e30
@@ -72,28 +72,23 @@ class RunContext:
             return Part(np.arange(mesh.n_nodes), np.arange(mesh.n_elements), np.arange(mesh.n_conditions))
         short = name.removeprefix(self.root + ".")
         if short not in mesh.parts:
-            have = ", ".join([f"{self.root} (all)", *mesh.parts])
-            raise settings.error(
-                key, f"there is no part {name!r}.{nearest(short, mesh.parts)} The parts are {have}"
-            )
+            text = f"there is no part {name!r}.{nearest(short, mesh.parts)} The parts are {self.root} (all), "
+            raise settings.error(key, text + ", ".join(mesh.parts))
         return mesh.parts[short]
 
 
 def times_of(problem: Settings, solver: Settings) -> list[float]:
     """Return the start time and the time of every step, as Kratos' loop makes them."""
     stepping = solver.section("time_stepping", required=True)
-    if "time_step_table" in stepping and "time_step" not in stepping:
-        raise stepping.error("time_step_table", "time_step_table is not supported; give time_step")
+    table = "time_step_table" in stepping and "time_step" not in stepping
+    stepping.expect(not table, "time_step_table", "time_step_table is not supported; give time_step")
     step = stepping.number("time_step")
     time, end = problem.number("start_time"), problem.number("end_time")
-    if not step > 0:
-        raise stepping.error("time_step", f"time_step must be > 0 s; got {step:g}")
-    if not time < end:
-        raise problem.error("end_time", f"no step is solved: end_time {end:g} must be > start_time {time:g}")
-    if (end - time) / step > MAX_STEPS:
-        raise stepping.error(
-            "time_step", f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"
-        )
+    stepping.expect(step > 0, "time_step", f"time_step must be > 0 s; got {step:g}")
+    text = f"no step is solved: end_time {end:g} must be > start_time {time:g}"
+    problem.expect(time < end, "end_time", text)
+    text = f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"
+    stepping.expect((end - time) / step <= MAX_STEPS, "time_step", text)
     times = [time]
     while times[-1] < end:
         times.append(times[-1] + step)

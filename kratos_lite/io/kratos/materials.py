@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.io.document import Document, Properties
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import with_rows
 
@@ -29,10 +29,10 @@ def materials_of(
     ModelError
         If elements are left without material.
     """
-    if not settings.sections("properties"):
-        raise settings.error("properties", "the materials file needs a list of 'properties'")
+    entries = settings.sections("properties")
+    settings.expect(entries, "properties", "the materials file needs a list of 'properties'")
     found: dict[int, LinearMaterial] = {}
-    for entry in settings.sections("properties"):
+    for entry in entries:
         entry.check_keys(("model_part_name", "properties_id", "Material"))
         number = entry.integer("properties_id")
         _assign(entry, context, document, number)
@@ -43,13 +43,9 @@ def materials_of(
 def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
     """Give the elements of the part their properties id."""
     rows = context.part(entry).elements
-    if not len(rows):
-        have = [name for name, part in context.mesh.parts.items() if len(part.elements)]
-        raise entry.error(
-            "model_part_name",
-            f"part {entry.text('model_part_name')!r} has no elements to carry a material; "
-            f"parts with elements are {', '.join([context.root + ' (all)', *have])}",
-        )
+    have = [f"{context.root} (all)", *(name for name, p in context.mesh.parts.items() if len(p.elements))]
+    text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
+    entry.expect(len(rows), "model_part_name", f"{text} are {', '.join(have)}")
     mask = np.zeros(context.mesh.n_elements, dtype=bool)
     mask[rows] = True
     for block, at in with_rows(context.mesh.blocks):
@@ -62,19 +58,16 @@ def _material(entry: Settings, properties: Properties, notes: list[str]) -> Line
     body = entry.section("Material", required=True)
     law = body.section("constitutive_law", required=True)
     name = law.text("name").rsplit(".", 1)[-1]
-    if name not in MATERIALS:
-        raise law.error(
-            "name",
-            f"part {part}: {name!r} is not a linear elastic law that kratos_lite has; "
-            "use LinearElastic3DLaw, or solve this part with Kratos",
-        )
+    text = f"part {part}: {name!r} is not a linear elastic law that kratos_lite has"
+    cure = "use LinearElastic3DLaw, or solve this part with Kratos"
+    law.expect(name in MATERIALS, "name", f"{text}; {cure}")
     variables = body.section("Variables")
     values: dict[str, Any] = {key.rsplit(".", 1)[-1]: _number(variables, key) for key in variables.values}
     if body.section("Tables").values:
         notes.append(f"material of {part}: Tables are not used by {name}")
     for key in body.unknown(("name", "constitutive_law", "Variables", "Tables")):
-        if body.values[key]:
-            raise body.error(key, f"part {part}: {key!r} in a material is not supported; leave it out")
+        text = f"part {part}: {key!r} in a material is not supported; leave it out"
+        body.expect(not body.values[key], key, text)
     properties.values |= values
     try:
         material = material_from({**properties.values, "CONSTITUTIVE_LAW": name})
@@ -90,8 +83,9 @@ def _number(variables: Settings, key: str) -> Any:
     value = variables.values[key]
     if key.rsplit(".", 1)[-1] in ELASTIC | {"DENSITY"}:
         return variables.number(key)
-    if key in USED and not (is_number(value) or (isinstance(value, list) and all(map(is_number, value)))):
-        raise variables.error(key, f"{key} must be a number or a list of numbers; got {shown(value)}")
+    fits = all(map(is_number, value)) if isinstance(value, list) else is_number(value)
+    text = f"{key} must be a number or a list of numbers; got {shown(value)}"
+    variables.expect(fits or key not in USED, key, text)
     return value
 
 

@@ -20,7 +20,7 @@ from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 
@@ -86,8 +86,8 @@ class Action:
     def put(self, values: Variables, places: tuple[Array, Array], time: float) -> None:
         """Set the values that they are at a time in s; places are those of nodes and conditions."""
         value = self.value(places[self.on_conditions][self.rows], time)
-        setter = values.set_conditions if self.on_conditions else values.set_nodes
-        setter(self.component, self.rows, value)
+        fields = values.conditional if self.on_conditions else values.nodal
+        fields.put(self.component, self.rows, value)
 
 
 def _value(settings: Settings, value: Any, key: str) -> Value:
@@ -187,8 +187,9 @@ def refuse_local_axes(settings: Settings) -> None:
 def _variable(settings: Settings, process: Process) -> str:
     kind, known = ("vector", KNOWN_VECTORS) if process.is_vector else ("scalar", KNOWN_SCALARS)
     name = settings.text("variable_name").rsplit(".", 1)[-1]
-    text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
-    settings.expect(name in known, "variable_name", f"{text} Known are {', '.join(known[:5])} …")
+    if name not in known:
+        text = f"{name!r} is not a {kind} variable of static solids.{nearest_variable(name, known)}"
+        raise settings.error("variable_name", f"{text} Known are {', '.join(known[:5])} …")
     return name
 
 

@@ -6,7 +6,6 @@ import re
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
@@ -14,6 +13,7 @@ from kratos_lite.io.document import Properties
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import BodyForce, Gravity
+from kratos_lite.typing import Array
 
 ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}
 """Variables that say what material a Properties block means."""
@@ -30,56 +30,54 @@ USER_LAW = "UserProvidedLinearElastic3DLaw"
 
 def apply_properties(model: Model, properties: Properties, materials: bool, problems: Problems) -> None:
     """Give a model what one Properties block says, its material only if `materials`."""
-    values = properties.values
-    where = properties.id
-    if materials:
+    for apply in (*([_apply_material] if materials else []), _apply_rule, _apply_loads, _apply_prestress):
         try:
-            material = material_from(values)
+            apply(model, properties)
         except KratosLiteError as error:
-            line = _line_of(properties, str(error))
-            unknown = [v for v in values if v not in ELASTIC | {"DENSITY"} and nearest_variable(v, ELASTIC)]
-            hint = "".join(
-                f"; found {v!r} at line {properties.lines.get(v, 0)}:{nearest_variable(v, ELASTIC)}"
-                for v in unknown
-            )
-            problems.add(f"Properties {where}: {error}{hint}", line)
-            return
-        if material is not None:
-            model.assign(material, where)
-    _apply_rule(model, properties, problems)
-    _apply_volume_loads(model, properties, problems)
-    _apply_prestress(model, properties, problems)
+            problems.add(f"Properties {properties.id}: {error}", _line_of(properties, str(error)))
     _note_unused(model, properties)
 
 
-def _apply_rule(model: Model, properties: Properties, problems: Problems) -> None:
+def _apply_material(model: Model, properties: Properties) -> None:
+    try:
+        material = material_from(properties.values)
+    except KratosLiteError as error:
+        hints = {v: nearest_variable(v, ELASTIC) for v in properties.values if v not in (*ELASTIC, "DENSITY")}
+        text = "".join(
+            f"; found {v!r} at line {properties.lines.get(v, 0)}:{hint}" for v, hint in hints.items() if hint
+        )
+        raise InputError(f"{error}{text}") from None
+    if material is not None:
+        model.assign(material, properties.id)
+
+
+def _apply_rule(model: Model, properties: Properties) -> None:
     order = properties.values.get("INTEGRATION_ORDER")
     if order is None:
         return
-    try:
-        if np.ndim(order) or order not in (1, 2, 3, 4, 5):
-            raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")
-        model.use_rule(int(order), properties.id)
-    except InputError as error:
-        problems.add(f"Properties {properties.id}: {error}", properties.lines.get("INTEGRATION_ORDER"))
+    if np.ndim(order) or order not in (1, 2, 3, 4, 5):
+        raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")
+    model.use_rule(int(order), properties.id)
 
 
-def _apply_prestress(model: Model, properties: Properties, problems: Problems) -> None:
-    values, lines = properties.values, properties.lines
-    factor = _array(values.get("PRESTRESS_FACTOR", 1.0))
-    if factor.shape != ():
-        problems.add("PRESTRESS_FACTOR must be one number", lines.get("PRESTRESS_FACTOR"))
-        return
+def _apply_prestress(model: Model, properties: Properties) -> None:
+    factor = _numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number")
     for name in ("INSITU_STRESS", "PRESTRESS"):
-        if name in values:
-            stress = _array(values[name]).ravel()
-            if stress.shape != (6,):
-                problems.add(f"{name} must have six components xx yy zz xy yz xz", lines.get(name))
-            else:
-                model.add_prestress(stress * float(factor), properties.id)
+        if name in properties.values:
+            stress = _numbers(properties, name, 0.0, (6,), "six components xx yy zz xy yz xz")
+            model.add_prestress(stress * float(factor), properties.id)
 
 
-def _array(value: Any) -> NDArray[np.float64]:
+def _numbers(properties: Properties, name: str, default: Any, shape: tuple[int, ...], what: str) -> Array:
+    """Return a value of the properties as an array of this shape."""
+    array = _array(properties.values.get(name, default))
+    array = array.ravel() if shape == (6,) else array
+    if array.shape != shape:
+        raise InputError(f"{name} must be {what}")
+    return array
+
+
+def _array(value: Any) -> Array:
     """Return numbers as an array; what is none becomes one without a number, which fits no place."""
     try:
         return np.asarray(value, dtype=float)
@@ -130,25 +128,17 @@ def material_from(values: dict[str, Any]) -> LinearMaterial | None:
         C = np.asarray(values.get("ELASTICITY_TENSOR"))
         if C.shape != (6, 6) or not np.abs(C - material.C).max() <= 1e-9 * np.abs(material.C).max():
             raise MaterialError(
-                f"ELASTICITY_TENSOR is not the one of the constants beside it for {name}; mend one"
+                f"ELASTICITY_TENSOR is not the one of the constants beside it for {name}; fix one"
             )
     return material
 
 
-def _apply_volume_loads(model: Model, properties: Properties, problems: Problems) -> None:
+def _apply_loads(model: Model, properties: Properties) -> None:
     """Add weight: density × VOLUME_ACCELERATION (or GRAVITY), else BODY_FORCE."""
-    try:
-        a, g, b = (_volume_vector(properties, name) for name in BODY_LOADS)
-    except InputError as error:
-        problems.add(str(error), _line_of(properties, str(error)))
-        return
+    a, g, b = (_volume_vector(properties, name) for name in BODY_LOADS)
     where = properties.id
     if a.any() and g.any() and (a != g).any():
-        problems.add(
-            f"Properties {where} has VOLUME_ACCELERATION {a.tolist()} and GRAVITY {g.tolist()}; keep one",
-            properties.lines.get("GRAVITY"),
-        )
-        return
+        raise InputError(f"GRAVITY is {g.tolist()}, but VOLUME_ACCELERATION {a.tolist()}; keep one")
     acceleration = a if a.any() else g
     if acceleration.any():
         model.add(Gravity(acceleration, where))
@@ -160,19 +150,13 @@ def _apply_volume_loads(model: Model, properties: Properties, problems: Problems
         model.add(BodyForce(b, where))
 
 
-def _volume_vector(properties: Properties, name: str) -> NDArray[np.float64]:
+def _volume_vector(properties: Properties, name: str) -> Array:
     """Return a vector of Properties from its whole and its components."""
-    values = properties.values
-    vector = _array(values.get(name, np.zeros(3)))
-    if vector.shape != (3,):
-        raise InputError(f"{name} must have three components")
-    vector = vector.copy()
+    vector = _numbers(properties, name, np.zeros(3), (3,), "a vector of three components").copy()
     for i, axis in enumerate("XYZ"):
         part = f"{name}_{axis}"
-        value = _array(values.get(part, vector[i]))
-        if value.shape != ():
-            raise InputError(f"{part} must be one number")
-        if name in values and value != vector[i]:
+        value = _numbers(properties, part, vector[i], (), "one number")
+        if name in properties.values and value != vector[i]:
             raise InputError(f"{part} is {value:g}, but {name} has {vector[i]:g} there; keep one of them")
         vector[i] = value
     return vector

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from kratos_lite.errors import Problems, nearest
+from kratos_lite.io.case import Case
 from kratos_lite.io.document import Document
 from kratos_lite.io.documents import read_document
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
@@ -18,9 +19,8 @@ from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
 from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
-from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.settings import Settings, find_file, read_settings
-from kratos_lite.io.scene import Scene
+from kratos_lite.io.readers.motion import add_motion
+from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
@@ -43,7 +43,7 @@ OTHER_PHYSICS = (
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
-def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Scene:
+def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Case:
     """Return what a Kratos run file says.
 
     Parameters
@@ -84,69 +84,56 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
     add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
     if in_time is None:
-        return Scene(model, checks=checks)
+        return Case(model, expected=checks, files=settings.files)
     model.notes = [note for note in model.notes if STATIC_ONLY not in note]
     in_time.finish(model)
-    return Scene(model, checks=checks, march=march_in_kratos(settings, in_time))
+    return Case(model, march_in_kratos(settings, in_time), expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:
     for key in ("modelers", "stages", "orchestrator", "restart_load_file_label"):
-        if settings.values.get(key):
-            raise settings.error(key, f"{key!r} is not supported; name the mesh in model_import_settings")
+        text = f"{key!r} is not supported; name the mesh in model_import_settings"
+        settings.expect(not settings.values.get(key), key, text)
     unknown = settings.unknown(ROOT_KEYS)
     for key in unknown:
-        if key.endswith("_process_list"):
-            raise settings.error(key, f"{key!r} belongs into the object 'processes'; Kratos ignores it here")
+        text = f"{key!r} belongs in the object 'processes'; Kratos ignores it here"
+        settings.expect(not key.endswith("_process_list"), key, text)
     return [f"key {key!r} is not used" for key in unknown if not key.startswith("_")]
 
 
 def _check_solver(solver: Settings) -> list[str]:
     """Refuse what is not a linear solid in three dimensions; note what is treated otherwise."""
-    kind = solver.text("solver_type")
-    if kind not in ("Static", "static", *DYNAMIC):
-        raise solver.error(
-            "solver_type",
-            f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', "
-            "then --modes for frequencies",
-        )
-    if solver.integer("domain_size") != 3:
-        raise solver.error("domain_size", f"domain_size must be 3; got {solver.integer('domain_size')}")
-    analysis = solver.text("analysis_type", "non_linear")
-    if analysis not in ("linear", "non_linear"):
-        raise solver.error(
-            "analysis_type", f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
-        )
+    kind, analysis = solver.text("solver_type"), solver.text("analysis_type", "non_linear")
+    text = (
+        f"solver_type {kind!r}: run files are solved as 'static' or 'dynamic'; take 'static', then --modes "
+    )
+    solver.expect(kind in ("Static", "static", *DYNAMIC), "solver_type", text + "for frequencies")
+    size = solver.integer("domain_size")
+    solver.expect(size == 3, "domain_size", f"domain_size must be 3; got {size}")
+    text = f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+    solver.expect(analysis in ("linear", "non_linear"), "analysis_type", text)
     for key in OTHER_PHYSICS:
-        if solver.values.get(key):
-            raise solver.error(
-                key, f"{key} is not supported; kratos_lite solves for displacements of all elements"
-            )
+        text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
+        solver.expect(not solver.values.get(key), key, text)
     known = (*HARMLESS, *OTHER_PHYSICS, *(DYNAMIC_KEYS if kind in DYNAMIC else ()))
     notes = [f"solver setting {key!r} is not used.{nearest(key, known)}" for key in solver.unknown(known)]
     if analysis == "non_linear":
-        notes.append(
-            "analysis_type is non_linear: the linear solution is computed, loads on the undeformed body"
-        )
+        notes.append("analysis_type is non_linear: the linear solution is computed, on the undeformed body")
     chosen = solver.section("linear_solver_settings").text("solver_type", "")
-    if chosen:
-        notes.append(f"linear solver {chosen}: kratos_lite chooses its own")
-    return notes
+    return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
 
 
 def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) -> Document:
     source = solver.section("model_import_settings", required=True)
     kind = source.text("input_type", "mdpa")
-    if kind != "mdpa":
-        raise source.error("input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
+    source.expect(kind == "mdpa", "input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
     path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
     document = read_document(path)
     check_elements(document)
     notes += [note] if note else []
-    if not solver.flag("multi_point_constraints_used", True) and document.constraints:
-        notes.append(
-            f"multi_point_constraints_used is false: {len(document.constraints)} constraints left out"
-        )
+    unused = len(document.constraints)
+    if unused and not solver.flag("multi_point_constraints_used", True):
+        notes.append(f"multi_point_constraints_used is false: {unused} constraints left out")
         document.constraints = []
     return document
 
@@ -180,15 +167,12 @@ def _read_processes(
                 elif module in COMPARISONS:
                     checks += COMPARISONS[module](entry.section("Parameters", required=True), context)
                 elif module.endswith("_output_process") or module in OUTPUTS:
-                    notes.append(
-                        f"{entry.path}: {module} is not run; ask kratos_lite for files with --output"
-                    )
+                    text = f"{module} is not run; ask kratos_lite for files with --output"
+                    notes.append(f"{entry.path}: {text}")
                 else:
-                    place = entry.values.places.get("python_module") or entry.values.places["name"]
                     known = [*PROCESSES, *COMPARISONS]
-                    problems.add(
-                        f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}",
-                        *place,
-                    )
+                    text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
+                    places = entry.values.places
+                    problems.add(text, *(places.get("python_module") or places["name"]))
     problems.raise_if_any()
     return actions, checks

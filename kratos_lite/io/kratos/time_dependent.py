@@ -17,7 +17,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
-from kratos_lite.model.loads import Load, Timed, Varying
+from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
 from kratos_lite.typing import Array
 
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
@@ -27,7 +27,7 @@ HELD = ("VELOCITY", "ACCELERATION")
 
 
 class ProcessesInTime:
-    """The processes of a run file as supports, loads and start of a march.
+    """The processes of a run file as supports, loads and initial state of a transient.
 
     Parameters
     ----------
@@ -74,12 +74,12 @@ class ProcessesInTime:
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
-            self._later.append(Timed(_LoadInTime(self, mine, base.only(group), load_of)))
+            self._later.append(TimeDependentLoad(_LoadInTime(self, mine, base.only(group), load_of)))
         values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
-        loads: list[Load] = [Varying(load, _begun) for load in model.loads]
+        loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
         for rows, axis, course in self._moving:
             model.fix(rows, axis, course, override=True)
@@ -104,18 +104,18 @@ class ProcessesInTime:
 
     def _check(self, values: Variables) -> None:
         for i, action in enumerate(self.actions):
-            if action.fixed and action.component.startswith(HELD):
-                raise action.settings.error(
-                    "variable_name",
-                    f"{action.component} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
-                    '"constrained": false and "interval": [0.0, 0.0] for an initial value',
+            name, expect = action.component, action.settings.expect
+            if action.fixed:
+                text = (
+                    f"{name} cannot be fixed; prescribe DISPLACEMENT as a function of t, or give "
+                    '"constrained": false and "interval": [0.0, 0.0] for an initial value'
                 )
-            if action.fixed and action.component.startswith("DISPLACEMENT") and not self._acts_always(i):
-                raise action.settings.error(
-                    "interval",
-                    f"{action.component} is held in a part of the run only; hold it from start to end, "
-                    '"interval": [0.0, "End"], or give "constrained": false for an initial value',
+                expect(not name.startswith(HELD), "variable_name", text)
+                text = (
+                    f"{name} is held in a part of the run only; hold it from start to end, "
+                    '"interval": [0.0, "End"], or give "constrained": false for an initial value'
                 )
+                expect(not name.startswith("DISPLACEMENT") or self._acts_always(i), "interval", text)
         for name, fixed in values.fixed.items():
             if name.startswith(HELD) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
@@ -124,47 +124,41 @@ class ProcessesInTime:
         """Find displacement and velocity at the start."""
         start, points = values.copy(), values.mesh.points
         for action, steps in zip(self.actions, self.steps, strict=True):
+            name = action.component
             if steps[0] == 0 and action.factors:
                 value = action.value(points[action.rows], self.context.times[0])
-                start.set_nodes(action.component, action.rows, value)
-                if action.component.startswith("ACCELERATION") and np.any(value):
-                    raise action.settings.error(
-                        "variable_name",
-                        f"{action.component} cannot be given; the acceleration at the start is 0",
-                    )
-            if action.fixed and action.component.startswith("DISPLACEMENT"):
-                start.fix(action.component, action.rows)
-        u, v = start.vector("DISPLACEMENT"), start.vector("VELOCITY")
+                start.nodal.put(name, action.rows, value)
+                is_still = not name.startswith("ACCELERATION") or not np.any(value)
+                text = f"{name} cannot be given; the acceleration at the start is 0"
+                action.settings.expect(is_still, "variable_name", text)
+            if action.fixed and name.startswith("DISPLACEMENT"):
+                start.fix(name, action.rows)
+        u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
         held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
         if v[np.transpose(held)].any():
             self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
     def _move(self, i: int, action: Action, values: Variables) -> None:
-        """Keep the movement of the supports that an action gives; refuse one of a part of the run."""
-        fixed = values.fixed.get(action.component, np.zeros(values.mesh.n_nodes, dtype=bool))
+        """Keep the motion of the supports that an action gives; refuse one of a part of the run."""
+        name, expect = action.component, action.settings.expect
+        fixed = values.fixed.get(name, np.zeros(values.mesh.n_nodes, dtype=bool))
         rows = action.rows[fixed[action.rows]]
         if not len(rows) or self._acts(i) == 0:
             return
-        if not self._acts_always(i):
-            raise action.settings.error(
-                "interval",
-                f"{action.component} of a support changes in a part of the run only; give it as one function "
-                'of t with the interval [0.0, "End"]',
-            )
+        text = (
+            f"{name} of a support changes in a part of the run only; give it as one function of t with the "
+        )
+        expect(self._acts_always(i), "interval", text + 'interval [0.0, "End"]')
         for k, later in enumerate(self.actions[i + 1 :], start=i + 1):
-            if later.component == action.component and later.factors and self._acts_always(k):
+            if later.component == name and later.factors and self._acts_always(k):
                 rows = np.setdiff1d(rows, later.rows)
         if not action.mentions("t") or not len(rows):
             return
-        if action.mentions("xyzXYZ"):
-            raise action.settings.error(
-                "value",
-                f"{action.component}: a support may move with x, y, z or with t, not with both; give each "
-                "part a process of its own",
-            )
+        text = f"{name}: a support may move with x, y, z or with t, not with both; "
+        expect(not action.mentions("xyzXYZ"), "value", text + "give each part a process of its own")
         point = np.zeros((1, 3))
-        self._moving.append((rows, action.component[-1].lower(), lambda t: float(action.value(point, t))))
+        self._moving.append((rows, name[-1].lower(), lambda t: float(action.value(point, t))))
 
     def _acts(self, i: int) -> int:
         """Return the number of steps, without the start, in which an action acts."""

@@ -13,7 +13,7 @@ from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
-from kratos_lite.model.loads import Gravity, Timed, Varying
+from kratos_lite.model.loads import Gravity, TimeDependentLoad
 from kratos_lite.shapes import Point1
 from kratos_lite.typing import Array, Ints
 
@@ -30,8 +30,8 @@ def document_from(model: Model) -> Document:
         "a prestress": model.prestress is not None,
         "an initial displacement": model.initial_displacement is not None,
         "a motion of the material": model.motion is not None,
-        "a support that moves in time": bool(model.supports.movements),
-        "a load that changes in time": any(isinstance(load, (Varying, Timed)) for load in model.loads),
+        "a support that moves in time": bool(model.supports.motions),
+        "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
     }
     for what, given in unwritten.items():
         if given:
@@ -144,5 +144,5 @@ def _links(model: Model) -> list[Constraint]:
 
     return [
         Constraint(i, dof(link.slave), tuple(map(dof, link.masters)), link.weights, link.constant)
-        for i, link in enumerate(model.supports.links, start=1)
+        for i, link in enumerate(model.supports.constraints, start=1)
     ]

@@ -97,7 +97,7 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
         known = rows >= 0
         if data.values.size:
             _note_overridden(values, data, rows, model)
-            values.set_nodes(data.variable, rows[known], data.values[known])
+            values.nodal.put(data.variable, rows[known], data.values[known])
         if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
         elif data.variable.startswith("DISPLACEMENT") and data.values.any():
@@ -109,7 +109,7 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
             rows = rows_of_ids(ids, data.ids)
             known = rows >= 0
             if data.values.size and _fits(data, model, problems, mesh.source):
-                values.set_conditions(data.variable, rows[known], data.values[known])
+                values.conditional.put(data.variable, rows[known], data.values[known])
     for data in document.element_data:
         model.notes.append(f"line {data.line}: ElementalData {data.variable} is not used")
     problems.raise_if_any()

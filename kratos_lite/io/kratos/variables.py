@@ -27,10 +27,9 @@ PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
 VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
 LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
-
-
+NO_CONDITION = ", and none has these nodes"
 SPLIT = (*VECTORS, "VELOCITY")
-"""Vector variables that are kept by component; velocities are those at the start of a march."""
+"""Vector variables that are kept by component; velocities are those at the start of a transient."""
 
 
 def components(variable: str, values: ArrayLike) -> dict[str, Array]:
@@ -45,31 +44,57 @@ def components(variable: str, values: ArrayLike) -> dict[str, Array]:
     return {variable: array}
 
 
+class Fields(dict[str, Array]):
+    """Scalars and components by name, each with one number for every node or condition."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self.count = count
+
+    def put(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
+        """Set a scalar, component or vector variable on rows."""
+        for name, value in components(variable, values).items():
+            self.setdefault(name, np.zeros(self.count))[np.asarray(rows, dtype=np.int64)] = value
+
+    def scalar(self, name: str) -> Array:
+        """Return the values of a scalar or component, 0 where none were set."""
+        return self.get(name, np.zeros(self.count))
+
+    def vector(self, variable: str) -> Array:
+        """Return the values (m, 3) of a vector variable."""
+        return np.stack([self.scalar(f"{variable}_{axis}") for axis in "XYZ"], axis=1)
+
+    def only(self, names: Container[str]) -> Fields:
+        """Return a copy of some scalars and components."""
+        other = Fields(self.count)
+        other.update((name, values.copy()) for name, values in self.items() if name in names)
+        return other
+
+    def loaded(self, variable: str) -> NDArray[np.bool_]:
+        """Return where a variable or a component of it is not 0."""
+        names = [variable, *(f"{variable}_{axis}" for axis in "XYZ")]
+        found = [self[name] != 0 for name in names if name in self]
+        return np.logical_or.reduce(found) if found else np.zeros(self.count, dtype=bool)
+
+
 class Variables:
-    """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
+    """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones.
+
+    Attributes
+    ----------
+    nodal, conditional : the values.
+    fixed : component → which nodes hold it.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self.nodal: dict[str, Array] = {}
+        self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
         self.fixed: dict[str, NDArray[np.bool_]] = {}
-        self.conditional: dict[str, Array] = {}
-
-    def set_nodes(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
-        """Set a scalar, component or vector variable on node rows."""
-        for name, value in components(variable, values).items():
-            field = self.nodal.setdefault(name, np.zeros(self.mesh.n_nodes))
-            field[np.asarray(rows, dtype=np.int64)] = value
 
     def fix(self, component: str, rows: ArrayLike, fixed: ArrayLike = True) -> None:
         """Fix (or free) a component on node rows."""
         mask = self.fixed.setdefault(component, np.zeros(self.mesh.n_nodes, dtype=bool))
         mask[np.asarray(rows, dtype=np.int64)] = fixed
-
-    def set_conditions(self, variable: str, rows: ArrayLike, values: ArrayLike) -> None:
-        """Set a scalar, component or vector variable on condition rows."""
-        for name, value in components(variable, values).items():
-            field = self.conditional.setdefault(name, np.zeros(self.mesh.n_conditions))
-            field[np.asarray(rows, dtype=np.int64)] = value
 
     def copy(self) -> Variables:
         """Return a copy that can be changed without changing this."""
@@ -78,9 +103,8 @@ class Variables:
     def only(self, names: Container[str]) -> Variables:
         """Return a copy of some scalars and components."""
         other = Variables(self.mesh)
-        other.nodal = {k: v.copy() for k, v in self.nodal.items() if k in names}
+        other.nodal, other.conditional = self.nodal.only(names), self.conditional.only(names)
         other.fixed = {k: v.copy() for k, v in self.fixed.items() if k in names}
-        other.conditional = {k: v.copy() for k, v in self.conditional.items() if k in names}
         return other
 
     def drop(self, names: Iterable[str]) -> None:
@@ -89,13 +113,9 @@ class Variables:
             self.nodal.pop(name, None)
             self.conditional.pop(name, None)
 
-    def vector(self, variable: str) -> Array:
-        """Return the values (n, 3) of a vector variable on the nodes."""
-        return self._vector(self.nodal, variable, self.mesh.n_nodes)
-
     def gravity(self) -> Gravity | None:
         """Return the weight that the nodes state, or None."""
-        g = self.vector("VOLUME_ACCELERATION")
+        g = self.nodal.vector("VOLUME_ACCELERATION")
         return Gravity(g) if g.any() else None
 
     def apply(self, model: Model) -> None:
@@ -106,42 +126,36 @@ class Variables:
                 model.add(load)
         self.note_idle(model.notes)
         for name in sorted({*self.nodal, *self.conditional} - LOADING):
-            if any(name in fields and fields[name].any() for fields in (self.nodal, self.conditional)):
+            if self.nodal.scalar(name).any() or self.conditional.scalar(name).any():
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
     def _apply_supports(self, model: Model) -> None:
         for axis in "XYZ":
             name = f"DISPLACEMENT_{axis}"
             rows = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
-            values = self.nodal.get(name, np.zeros(self.mesh.n_nodes))
             if len(rows):
-                model.fix(rows, axis.lower(), values[rows, None], override=True)
+                model.fix(rows, axis.lower(), self.nodal.scalar(name)[rows, None], override=True)
         others = sorted(v for v in self.fixed if not v.startswith("DISPLACEMENT_") and self.fixed[v].any())
         if others:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
 
-    @staticmethod
-    def _vector(fields: dict[str, Array], variable: str, count: int) -> Array:
-        zero = np.zeros(count)
-        return np.stack([fields.get(f"{variable}_{axis}", zero) for axis in "XYZ"], axis=1)
-
     def condition_loads(self) -> ConditionLoads | None:
         """Return the loads that conditions carry, or None."""
-        mesh = self.mesh
-        force = np.zeros((mesh.n_conditions, 3))
-        nodal_force = {cell: self._vector(self.nodal, name, mesh.n_nodes) for cell, name in LOADS.items()}
-        carried: set[str] = set()
-        for block, rows in with_rows(mesh.conditions):
-            if block.shape is not None and len(block):
-                variable = LOADS[block.shape.cell]
-                carried.add(variable)
-                force[rows] = self._vector(self.conditional, variable, mesh.n_conditions)[rows]
-        zero, nodal_zero = np.zeros(mesh.n_conditions), np.zeros(mesh.n_nodes)
+        force = np.zeros((self.mesh.n_conditions, 3))
+        nodal_force = {cell: self.nodal.vector(name) for cell, name in LOADS.items()}
+        carriers = [
+            (block.shape.cell, rows)
+            for block, rows in with_rows(self.mesh.conditions)
+            if block.shape is not None and len(block)
+        ]
+        for cell, rows in carriers:
+            force[rows] = self.conditional.vector(LOADS[cell])[rows]
         positive, negative = PRESSURES
-        pressure = self.conditional.get(positive, zero) - self.conditional.get(negative, zero)
-        nodal_pressure = self.nodal.get(positive, nodal_zero) - self.nodal.get(negative, nodal_zero)
+        pressure, nodal_pressure = (
+            fields.scalar(positive) - fields.scalar(negative) for fields in (self.conditional, self.nodal)
+        )
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
-        if not carried or not any(value.any() for value in values):
+        if not carriers or not any(value.any() for value in values):
             return None
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
 
@@ -172,15 +186,13 @@ class Variables:
             cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
             on_conditions, on_nodes = self._carriers(cells)
             kinds = "faces" if cells[0] in SURFACES else f"{cells[0]} conditions"
-            idle = _loaded(self.conditional, variable, on_conditions)
-            if idle.any():
-                where = f"{idle.sum()} conditions (first {ids[idle][0]})"
-                notes.append(f"{variable} on {where} has no effect: only {kinds} carry it")
-            idle = _loaded(self.nodal, variable, on_nodes)
-            if idle.any():
-                where = f"{idle.sum()} nodes (first {self.mesh.node_ids[idle][0]})"
-                text = f"only {kinds} carry it, and none has these nodes"
-                notes.append(f"{variable} on {where} has no effect: {text}")
+            for word, idle, rows, more in (
+                ("conditions", self.conditional.loaded(variable) & ~on_conditions, ids, ""),
+                ("nodes", self.nodal.loaded(variable) & ~on_nodes, self.mesh.node_ids, NO_CONDITION),
+            ):
+                if idle.any():
+                    where = f"{idle.sum()} {word} (first {rows[idle][0]})"
+                    notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
 
     def _carriers(self, cells: Iterable[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which conditions are of these cells, and which nodes they have."""
@@ -191,12 +203,3 @@ class Variables:
             if carries:
                 nodes[block.nodes] = True
         return np.concatenate(masks), nodes
-
-
-def _loaded(fields: dict[str, Array], variable: str, carried: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return where a variable or a component of it is not 0 although nothing carries it."""
-    loaded = np.zeros(len(carried), dtype=bool)
-    for name in (variable, *(f"{variable}_{axis}" for axis in "XYZ")):
-        if name in fields:
-            loaded |= fields[name] != 0
-    return loaded & ~carried

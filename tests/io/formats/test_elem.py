@@ -6,22 +6,25 @@ import random
 
 import numpy as np
 import pytest
+from scenes import case, present
 
 from kratos_lite.errors import MAX_PROBLEMS, InputError
 from kratos_lite.io.document import Constraint, Data, Document, Properties
 from kratos_lite.io.formats.elem import read_elem, write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
-from kratos_lite.shapes import Quadrilateral4, Tetrahedron4, Triangle3
+from kratos_lite.shapes import Hexahedron27, Quadrilateral4, Tetrahedron4, Triangle3
 
 NODE = "NODES = NodesList([[1, 0, 0, 0], [2, 1, 0, 0], [3, 0, 1, 0], [4, 0, 0, 1], [5, 1, 1, 1]])\n"
 ELEM = "ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n"
 PROP = "PROPERTIES[1][DENSITY] = 1.5;\n"
 SETS = {
+    "elem_column_27N": "column",
     "elem_activation_8N": "activation_test",
     "elem_balken_27N": "balken",
     "elem_beam3d_KL4N": "beam_3d",
 }
+SETS = {folder: SETS[folder] for folder in present(*SETS)}
 
 
 @pytest.fixture
@@ -79,8 +82,8 @@ def same(first, second):
 
 
 @pytest.mark.parametrize(("folder", "name"), SETS.items())
-def test_real_set_has_the_counts_of_the_reference(shared, folder, name):
-    path = shared / "cases" / folder
+def test_real_set_has_the_counts_of_the_reference(folder, name):
+    path = case(folder)
     document = read_elem(path / f"{name}.elem")
     reference = json.loads((path / "reference.json").read_text())
     assert document.mesh.n_nodes == reference["n_nodes"]
@@ -89,8 +92,8 @@ def test_real_set_has_the_counts_of_the_reference(shared, folder, name):
 
 
 @pytest.mark.parametrize(("folder", "name"), SETS.items())
-def test_real_set_equals_its_converted_mdpa(shared, folder, name):
-    path = shared / "cases" / folder
+def test_real_set_equals_its_converted_mdpa(folder, name):
+    path = case(folder)
     ours, other = read_elem(path / name), read_mdpa(path / f"{name}.mdpa")
     assert np.array_equal(ours.mesh.points, other.mesh.points)
     assert np.array_equal(ours.mesh.node_ids, other.mesh.node_ids)
@@ -109,10 +112,35 @@ def test_real_set_equals_its_converted_mdpa(shared, folder, name):
 
 
 @pytest.mark.parametrize(("folder", "name"), SETS.items())
-def test_real_set_survives_a_round_trip(shared, tmp_path, folder, name):
-    document = read_elem(shared / "cases" / folder / name)
+def test_real_set_survives_a_round_trip(tmp_path, folder, name):
+    document = read_elem(case(folder) / name)
     assert write_elem(tmp_path / name, document) == []
     assert same(document, read_elem(tmp_path / name))
+
+
+def test_column_is_read_in_full():
+    document = read_elem(case("elem_column_27N") / "column.node")
+    (block,) = document.mesh.blocks
+    assert (block.name, block.shape, len(block)) == ("TotalLagrangian3D27N", Hexahedron27, 2)
+    assert document.mesh.node_ids[block.nodes[1]][:5].tolist() == [5, 6, 7, 8, 28]
+    assert block.lines.tolist() == [4, 5]
+    assert [(d.variable, len(d.ids), d.fixed.all()) for d in document.nodal_data] == [
+        ("DISPLACEMENT_X", 30, True),
+        ("DISPLACEMENT_Y", 30, True),
+        ("DISPLACEMENT_Z", 9, True),
+    ]
+    assert document.properties[2].values["BODY_FORCE"].tolist() == [0, 0, -20000]
+    assert document.properties[2].lines["YOUNG_MODULUS"] == 9
+    assert (document.notes[0].line, "'])' closes no list" in document.notes[0].text) == (74, True)
+    assert [(b.name, b.shape, b.nodes.shape) for b in document.mesh.conditions] == [
+        ("MasterContactFace3D9", None, (1, 9)),
+        ("SlaveContactFace3D9", None, (1, 9)),
+    ]
+    kept = [note.text for note in document.notes if "kept without use" in note.text]
+    assert [text.split()[:3] for text in kept] == [
+        ["1", "conditions", "MasterContactFace3D9"],
+        ["1", "conditions", "SlaveContactFace3D9"],
+    ]
 
 
 def test_beam_is_read_in_full(shared):

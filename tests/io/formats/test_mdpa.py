@@ -6,12 +6,16 @@ import re
 
 import numpy as np
 import pytest
+from scenes import case, present
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.names import condition_shape, element_shape
 
-COUNTED = [
+COUNTED = present(
+    "bar_8N",
+    "elem_column_27N",
+    "parse_all_blocks",
     "eigen_cube_8N",
     "elem_activation_8N",
     "elem_balken_27N",
@@ -23,8 +27,8 @@ COUNTED = [
     "rve_4N_pressure",
     "symmetrical_cube_4N",
     "tensile_hexahedra",
-]
-REFUSED_BY_KRATOS = ["parse_freezing1D_KinematicLinear20N", "parse_test_serializer"]
+)
+REFUSED_BY_KRATOS = present("parse_freezing1D_KinematicLinear20N", "parse_test_serializer")
 KINDS = ("nodes", "elements", "conditions", "geometries", "properties", "tables")
 NODES = """Begin Nodes
 1 0 0 0
@@ -68,11 +72,10 @@ def tree(mesh):
 
 
 @pytest.mark.parametrize("folder", COUNTED)
-def test_real_file_has_the_counts_and_parts_that_kratos_finds(shared, folder):
-    case = shared / "cases" / folder
-    (path,) = case.glob("*.mdpa")
+def test_real_file_has_the_counts_and_parts_that_kratos_finds(folder):
+    (path,) = case(folder).glob("*.mdpa")
     document = read_mdpa(path)
-    reference = json.loads((case / "reference.json").read_text())
+    reference = json.loads((case(folder) / "reference.json").read_text())
     assert {
         "n_nodes": document.mesh.n_nodes,
         "n_elements": document.mesh.n_elements,
@@ -102,6 +105,33 @@ def test_real_file_that_kratos_refuses_has_the_counts_of_its_text(shared, folder
     assert len(document.mesh.parts) == len(starts)
     expected = {"parse_test_serializer": (355, 627, 81), "parse_freezing1D_KinematicLinear20N": (404, 100, 1)}
     assert (document.mesh.n_nodes, document.mesh.n_elements, document.mesh.n_conditions) == expected[folder]
+
+
+def test_two_elements_on_one_line_are_noted():
+    document = read_mdpa(case("parse_all_blocks") / "all_blocks.mdpa")
+    (block,) = document.mesh.blocks
+    assert block.lines.tolist() == [42, 42]
+    assert (42, "several rows on one line: elements") in [(n.line, n.text) for n in document.notes]
+
+
+def test_values_of_every_kind_of_block():
+    document = read_mdpa(case("parse_all_blocks") / "all_blocks.mdpa")
+    values = document.properties[4].values
+    assert values["IS_RESTARTED"] is True
+    assert values["COMPUTE_LUMPED_MASS_MATRIX"] is False
+    assert values["DENSITY"] == 2500.0
+    assert values["VOLUME_ACCELERATION"].tolist() == [0, 0, -9.8]
+    assert values["LOCAL_INERTIA_TENSOR"].tolist() == [[2, 0.5, 0], [0.5, 3, 0], [0, 0, 4.25]]
+    assert values["Table TEMPERATURE VISCOSITY"].rows.tolist() == [[270, 4e-3], [300, 2e-3]]
+    assert document.properties[4].lines["DENSITY"] == 16
+    assert document.tables[3].rows.tolist() == [[0, 1e5], [2, 3e5]]
+    assert document.model_data["DISPLACEMENT"].tolist() == [0.5, -1.5, 2.5]
+    assert document.mesh.parts["Solid"].data["COMPUTE_DYNAMIC_TANGENT"] is False
+    data = {d.variable: d for d in document.nodal_data}
+    assert data["BOUNDARY"].ids.tolist() == [10, 21]
+    assert data["BOUNDARY"].values.size == 0
+    assert data["VELOCITY"].values.tolist() == [[1.5, 2.5, 3.5]]
+    assert data["DISPLACEMENT_X"].fixed.tolist() == [True, True]
 
 
 def test_hundred_elements_on_one_line_of_a_real_file_are_noted(shared):

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from scenes import case, present
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.document import Constraint, Data, Document, Properties
@@ -17,7 +18,10 @@ from kratos_lite.io.formats.mdpa.writer import write_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.shapes import Hexahedron8, Quadrilateral4
 
-CASES = [
+CASES = present(
+    "bar_8N",
+    "elem_column_27N",
+    "parse_all_blocks",
     "eigen_cube_8N",
     "elem_balken_27N",
     "parse_freezing1D_KinematicLinear20N",
@@ -26,7 +30,7 @@ CASES = [
     "patch_3D_shear_hexa",
     "rve_4N_pressure",
     "tensile_hexahedra",
-]
+)
 KRATOS = """
 import json, sys
 import KratosMultiphysics as K
@@ -148,8 +152,8 @@ def test_everything_survives_bit_by_bit(tmp_path):
 
 
 @pytest.mark.parametrize("folder", CASES)
-def test_real_file_survives(shared, tmp_path, folder):
-    (path,) = (shared / "cases" / folder).glob("*.mdpa")
+def test_real_file_survives(tmp_path, folder):
+    (path,) = case(folder).glob("*.mdpa")
     document = read_mdpa(path)
     write_mdpa(tmp_path / "copy.mdpa", document)
     assert_same(

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.io.document import Data, Properties
 from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
 from kratos_lite.io.formats.elem.grammar import Form, Run, Source
-from kratos_lite.mesh import Mesh, without_repeats
+from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Ints
 
 VECTORS = frozenset((b"DISPLACEMENT", b"VELOCITY", b"ACCELERATION", b"ROTATION", b"REACTION"))
-MAX_NAMES = 100
-"""More variables than this are taken statement by statement, in linear time."""
 Values: TypeAlias = "dict[int, tuple[float, int]]"
 """Value and line by node id."""
 
@@ -78,8 +74,7 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
         for i in np.flatnonzero(mesh.node_rows(ids) < 0) if files.nodes_known else ():
             source.problem(files.no_node(ids[i]), run.starts[i])
         values = _initial(source, run) if run.form is INIT else np.zeros(len(ids))
-        if not _add_all(found, run.columns[1], ids, values, source.lines(run.starts)):
-            _add_singly(found, source, run, ids, values)
+        _add(found, source, run, ids, values)
         for name in sorted(set(run.columns[1]) & VECTORS):
             start = run.starts[run.columns[1].index(name)]
             text = name.decode("ascii")
@@ -87,35 +82,16 @@ def _by_variable(files: ElemFiles, ending: str, mesh: Mesh) -> dict[str, Values]
     return found
 
 
-def _add_all(
-    found: dict[str, Values], names: Sequence[bytes], ids: Ints, values: Array, lines: NDArray[np.int32]
-) -> bool:
-    """Add all statements at once if each names a degree of freedom of its own; return whether they do."""
-    place = {name: i for i, name in enumerate(dict.fromkeys(names))}
-    if len(place) > MAX_NAMES or any(name.decode("ascii") in found for name in place):
-        return False
-    codes = np.fromiter(map(place.__getitem__, names), np.int64, len(names))
-    rows = [np.flatnonzero(codes == i) for i in range(len(place))]
-    if any(len(without_repeats(ids[mine])) < len(mine) for mine in rows):
-        return False
-    for name, mine in zip(place, rows, strict=True):
-        pairs = zip(values[mine].tolist(), lines[mine].tolist(), strict=True)
-        found[name.decode("ascii")] = dict(zip(ids[mine].tolist(), pairs, strict=True))
-    return True
-
-
-def _add_singly(found: dict[str, Values], source: Source, run: Run, ids: Ints, values: Array) -> None:
-    """Add statements one by one; note which repeat an earlier one, and which contradict it."""
-    lines, repeated = source.lines(run.starts).tolist(), []
+def _add(found: dict[str, Values], source: Source, run: Run, ids: Ints, values: Array) -> None:
+    """Add statements; note which repeat an earlier one, and which contradict it."""
+    names, lines, repeated = [name.decode("ascii") for name in run.columns[1]], source.lines(run.starts), []
     for node, name, value, line, start in zip(
-        ids.tolist(), run.columns[1], values.tolist(), lines, run.starts, strict=True
+        ids.tolist(), names, values.tolist(), lines.tolist(), run.starts, strict=True
     ):
-        nodes = found.setdefault(name.decode("ascii"), {})
+        nodes = found.setdefault(name, {})
         earlier, at = nodes.setdefault(node, (value, line))
         if earlier != value:
-            source.problem(
-                already(f"{name.decode('ascii')} of node {node}", at, " with another value"), start
-            )
+            source.problem(already(f"{name} of node {node}", at, " with another value"), start)
         elif at != line:
             repeated.append(start)
     if repeated:

@@ -89,14 +89,14 @@ def write_elem(path: str | Path, document: Document) -> list[Note]:
     if str(path).lower().endswith(".gz"):
         # A plain file of the same name beside it would be read in its place.
         raise InputError(f"{path}: five-file sets are not written gzipped; leave out the ending .gz")
-    problems, notes = Problems(), _left_out(document)
+    mesh, problems, notes = document.mesh, Problems(), _left_out(document)
     _check(document, problems)
     dofs = _dofs(document)
     fixed = [f"NODES[{n}].Fix({name});" for (n, name), (_, is_fixed) in dofs.items() if is_fixed]
     lines = {
-        ".node": _node_lines(document.mesh),
-        ".elem": _cell_lines(document.mesh, document.mesh.blocks, "ELEMENTS"),
-        ".cond": [*fixed, *_cell_lines(document.mesh, document.mesh.conditions, "CONDITIONS")],
+        ".node": _node_lines(mesh),
+        ".elem": _cell_lines(mesh, mesh.blocks, "ELEMENTS"),
+        ".cond": [*fixed, *_cell_lines(mesh, mesh.conditions, "CONDITIONS")],
         ".prop": list(_property_lines(document, problems, notes)),
         ".init": [f"NODES[{n}]({name}, 0) = {value!r};" for (n, name), (value, _) in dofs.items()],
     }
@@ -167,8 +167,7 @@ def _property_lines(document: Document, problems: Problems, notes: list[Note]) -
     written = set()
     for number, properties in document.properties.items():
         for name, value in properties.values.items():
-            text = _number_text(value)
-            if text:
+            if text := _number_text(value):
                 written.add(number)
                 yield f"PROPERTIES[{number}][{name}] = {text};"
             else:
@@ -185,9 +184,8 @@ def _number_text(value: Any) -> str:
         array = np.asarray(value)
     except ValueError:
         return ""
-    if array.dtype.kind not in "iuf" or array.ndim > 2 or not array.size or not np.isfinite(array).all():
-        return ""
-    return repr(array.astype(float).tolist())
+    fits = array.dtype.kind in "iuf" and array.ndim <= 2 and array.size and np.isfinite(array).all()
+    return repr(array.astype(float).tolist()) if fits else ""
 
 
 def _dofs(document: Document) -> dict[tuple[int, str], tuple[float, bool]]:

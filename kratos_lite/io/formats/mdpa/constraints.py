@@ -6,7 +6,7 @@ import re
 
 from kratos_lite.io.document import Constraint
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
-from kratos_lite.io.text import integer, real, shown
+from kratos_lite.io.text import integer, real
 from kratos_lite.typing import Ints
 
 CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
@@ -20,27 +20,22 @@ def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constrai
     if len(frame.arguments) < 2:
         source.problem("expected 'Begin Constraints NAME SLAVE_VARIABLE [MASTER_VARIABLE …]'", frame.offset)
         return []
-    at, end = frame.spans[0]
-    found: list[Constraint] = []
     known = set(nodes.tolist())
-    while word := WORD.search(source.data, at, end):
-        here = word.start()
-        try:
-            constraint, at = _constraint(source, frame, (here, end))
-            missing = [n for n, _ in (constraint.slave, *constraint.masters) if n not in known]
-            if missing:
-                raise ValueError(f"there is no node {missing[0]}")
-            found.append(constraint)
-        except ValueError as error:
-            source.problem(f"constraint {shown(word.group())}: {error}", here)
-            at = source.data.find(b"\n", here, end)
-            if at < 0:
-                break
+
+    def read(at: int, end: int) -> tuple[Constraint, int]:
+        constraint, after = _constraint(source, frame, (at, end))
+        missing = [node for node, _ in (constraint.slave, *constraint.masters) if node not in known]
+        if missing:
+            raise ValueError(f"there is no node {missing[0]}")
+        return constraint, after
+
+    found = list(source.each(frame.spans[0], "constraint", read))
     if len({len(c.masters) for c in found}) > 1:
-        text = "Kratos misreads a block of Constraints with different numbers of masters; "
-        source.note(
-            text + "kratos_lite reads it as written; give each number a block of its own", frame.offset
+        text = (
+            "Kratos misreads a block of Constraints with different numbers of masters; "
+            "kratos_lite reads it as written; give each number a block of its own"
         )
+        source.note(text, frame.offset)
     return found
 
 

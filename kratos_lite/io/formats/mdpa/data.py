@@ -11,7 +11,7 @@ from kratos_lite.io.document import Data
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at
-from kratos_lite.io.text import integer, shown
+from kratos_lite.io.text import integer
 from kratos_lite.mesh import rows_of_ids, without_repeats
 from kratos_lite.typing import Ints
 
@@ -53,32 +53,26 @@ def _data(source: Source, frame: Frame, rows: Rows, values: NDArray[np.float64])
 
 def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None) -> Data:
     """Return rows of an id, for nodes a 0, and a vector or matrix."""
-    at, end = frame.spans[0]
-    ids: list[int] = []
-    values: list[NDArray[np.float64]] = []
-    while word := WORD.search(source.data, at, end):
-        here = word.start()
-        try:
-            number = integer(word.group())
-            at = word.end()
-            if is_nodal:
-                at = _free(source, at, end)
-            start = WORD.search(source.data, at, end)
-            value, at = value_at(source, start.start() if start else end, end, kind)
-            if not isinstance(value, np.ndarray):
-                raise ValueError(f"{value!r} is not a vector like the first row; write [3] (x, y, z)")
-            if values and value.shape != values[0].shape:
-                raise ValueError(f"has size {list(value.shape)}, but the first row {list(values[0].shape)}")
-            ids.append(number)
-            values.append(value)
-        except ValueError as error:
-            source.problem(f"{frame.arguments[0]} {shown(word.group())}: {error}", here)
-            at = source.data.find(b"\n", here, end)
-            if at < 0:
-                break
-    array = np.array(values) if values else np.zeros(0)
+    shapes: list[tuple[int, ...]] = []
+
+    def read(at: int, end: int) -> tuple[tuple[int, NDArray[np.float64]], int]:
+        word = next(source.words((at, end)))
+        number = integer(word.group())
+        at = _free(source, word.end(), end) if is_nodal else word.end()
+        start = WORD.search(source.data, at, end)
+        value, at = value_at(source, start.start() if start else end, end, kind)
+        if not isinstance(value, np.ndarray):
+            raise ValueError(f"{value!r} is not a vector like the first row; write [3] (x, y, z)")
+        shapes[:] = shapes or [value.shape]
+        if value.shape != shapes[0]:
+            raise ValueError(f"has size {list(value.shape)}, but the first row {list(shapes[0])}")
+        return (number, value), at
+
+    rows = list(source.each(frame.spans[0], frame.arguments[0], read))
+    ids = np.array([number for number, _ in rows], dtype=np.int64)
+    values = np.array([value for _, value in rows]) if rows else np.zeros(0)
     free = np.zeros(len(ids), dtype=bool)
-    return Data(frame.arguments[0], np.array(ids, dtype=np.int64), free, array, source.line(frame.offset))
+    return Data(frame.arguments[0], ids, free, values, source.line(frame.offset))
 
 
 def _free(source: Source, at: int, end: int) -> int:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.text import Source as TextSource
@@ -12,6 +13,7 @@ from kratos_lite.io.text import shown
 from kratos_lite.native import kernels
 
 Span = tuple[int, int]
+T = TypeVar("T")
 SMALL = 2_000
 """Bytes below which the compiled kernels are not worth loading."""
 MAX_DEPTH = 64
@@ -68,6 +70,26 @@ class Source(TextSource):
         except InputError as error:
             return error
         raise AssertionError
+
+    def line_end(self, at: int, end: int) -> int:
+        """Return the end of the line at an offset, or of the piece of text that ends before it."""
+        found = self.data.find(b"\n", at, end)
+        return found if found >= 0 else end
+
+    def each(self, span: Span, what: str, read: Callable[[int, int], tuple[T, int]]) -> Iterator[T]:
+        """Yield what `read` makes of a piece of text, row by row; after a mistake go on with the next line.
+
+        `read` takes where to begin and the end of the piece; it returns a value and where that ends.
+        """
+        at, end = span
+        while word := WORD.search(self.data, at, end):
+            try:
+                value, at = read(word.start(), end)
+            except ValueError as error:
+                self.problem(f"{what} {shown(word.group())}: {error}", word.start())
+                at = self.line_end(word.start(), end)
+            else:
+                yield value
 
     def words(self, span: Span) -> Iterator[re.Match[bytes]]:
         """Return the words in a piece of the text."""

@@ -103,11 +103,9 @@ def _items(source: Source, span: Span) -> Iterator[tuple[str, Any, int]]:
         name = word.group().decode("ascii", "backslashreplace")
         is_first = not source.strict or last == span[0] or b"\n" in source.data[last : word.start()]
         if not NAME.fullmatch(word.group()) or not (is_first or kind_of(name)):
-            source.problem(
-                f"{shown(word.group())} is not a variable; write one variable and its value a line",
-                word.start(),
-            )
-            at = last = _line_end(source, word.start(), end)
+            text = f"{shown(word.group())} is not a variable; write one variable and its value on a line"
+            source.problem(text, word.start())
+            at = last = source.line_end(word.start(), end)
             continue
         begin = end
         try:
@@ -116,13 +114,8 @@ def _items(source: Source, span: Span) -> Iterator[tuple[str, Any, int]]:
             yield name, value, word.start()
         except ValueError as error:
             source.problem(f"{name}: {error}", begin if begin < end else word.start())
-            at = _line_end(source, min(begin, end - 1), end)
+            at = source.line_end(min(begin, end - 1), end)
         last = at
-
-
-def _line_end(source: Source, at: int, end: int) -> int:
-    found = source.data.find(b"\n", at, end)
-    return found if found >= 0 else end
 
 
 def _value_start(source: Source, at: int, end: int) -> int:

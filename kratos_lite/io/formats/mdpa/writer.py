@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -19,7 +20,7 @@ from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
 from kratos_lite.io.names import kratos_name
-from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part
+from kratos_lite.mesh import NO_ROWS, Block, Mesh
 from kratos_lite.typing import Ints
 
 Lines = Iterator[str]
@@ -67,15 +68,14 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
 def _unknown_to_kratos(mesh: Mesh) -> list[Note]:
     """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for block in (*mesh.blocks, *mesh.conditions):
         name = kratos_name(block.name)
         own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith("KinematicLinear3D")
-        if len(block) and (own or "ContactFace" in name or re.search(r"3D\d+$", name)):
-            counts[name] = counts.get(name, 0) + len(block)
-    return [
-        Note(0, f"{n} {name} are written, but Kratos 10 does not know them") for name, n in counts.items()
-    ]
+        if own or "ContactFace" in name or re.search(r"3D\d+$", name):
+            counts[name] += len(block)
+    text = "{} {} are written, but Kratos 10 does not know them"
+    return [Note(0, text.format(n, name)) for name, n in counts.items() if n]
 
 
 def _lines(document: Document) -> Lines:
@@ -165,16 +165,8 @@ def _array(name: str, array: NDArray[Any]) -> str:
     """Return a number, a vector or a matrix as Kratos reads it."""
     if not np.isfinite(array).all():
         raise InputError(f"{name}: a number is not finite (nan or inf); give a finite one")
-    if array.ndim == 0:
-        return repr(float(array))
-    if array.ndim == 1:
-        return f"[{len(array)}] {_listed(array)}"
-    rows, columns = array.shape
-    return f"[{rows},{columns}] ({','.join(_listed(row) for row in array)})"
-
-
-def _listed(values: NDArray[Any]) -> str:
-    return f"({','.join(repr(float(v)) for v in values)})"
+    text = repr(array.astype(float).tolist()).replace(" ", "").replace("[", "(").replace("]", ")")
+    return f"[{','.join(map(str, array.shape))}] {text}" if array.ndim else text
 
 
 def _table(header: str, table: Any) -> Lines:
@@ -198,10 +190,9 @@ def _constraints(constraints: list[Constraint]) -> Lines:
     for (_, *words), group in groupby(constraints, key=_header):
         rows = []
         for c in group:
-            weights = ",".join(_array(f"constraint {c.id}", np.asarray(w)) for w in c.weights)
-            constant = _array(f"constraint {c.id}", np.asarray(c.constant))
+            constant, *weights = (_array(f"constraint {c.id}", np.array(x)) for x in (c.constant, *c.weights))
             nodes = " ".join(str(node) for node, _ in (c.slave, *c.masters))
-            rows.append(f"{c.id} {constant} [{weights}] {nodes}")
+            rows.append(f"{c.id} {constant} [{','.join(weights)}] {nodes}")
         yield from _block(" ".join(["Constraints", *map(_name, map(str, words))]), rows)
 
 
@@ -211,11 +202,8 @@ def _header(constraint: Constraint) -> tuple[int | str, ...]:
     Kratos misreads a header with more than the slave's variable where one is enough.
     """
     variables = [constraint.slave[1], *(variable for _, variable in constraint.masters)]
-    return (
-        len(constraint.masters),
-        constraint.name,
-        *(variables[:1] if len(set(variables)) == 1 else variables),
-    )
+    shown = variables[:1] if len(set(variables)) == 1 else variables
+    return (len(constraint.masters), constraint.name, *shown)
 
 
 def _data(data: Data, is_nodal: bool) -> Lines:
@@ -234,7 +222,7 @@ def _data(data: Data, is_nodal: bool) -> Lines:
 
 
 def _parts(document: Document) -> Lines:
-    mesh = document.mesh
+    mesh, parts = document.mesh, document.mesh.parts
     ids = {
         "nodes": mesh.node_ids,
         "elements": mesh.element_ids,
@@ -242,42 +230,33 @@ def _parts(document: Document) -> Lines:
         "geometries": _ids(document.geometries),
         "constraints": np.array([c.id for c in document.constraints], dtype=np.int64),
     }
-    for name in mesh.parts:
+    children: dict[str, list[str]] = {}
+    for name in parts:
         if not PART_NAME.fullmatch(name):
             raise InputError(f"part {name!r} has no name for a .mdpa file; use letters, digits, '_' and '-'")
-    for name in _children(mesh.parts, ""):
-        yield from _part(mesh.parts, name, "", ids)
+        parent = name
+        while parent := parent.rpartition(".")[0]:
+            if parent in parts:
+                break
+        children.setdefault(parent, []).append(name)
+
+    def lines(name: str, parent: str) -> Lines:
+        part = parts[name]
+        body: list[str] = []
+        if part.data:
+            body += _block("SubModelPartData", _values(part.data))
+        members = {"tables": part.tables, "properties": part.properties}
+        members |= {kind: known[getattr(part, kind)].tolist() for kind, known in ids.items()}
+        for kind, numbers in members.items():
+            if numbers:
+                body += _block(f"SubModelPart{kind.capitalize()}", map(str, numbers))
+        for child in children.get(name, ()):
+            body += lines(child, name)
+        yield from _block(f"SubModelPart {name.removeprefix(parent + '.')}", body)
+
+    for name in children.get("", ()):
+        yield from lines(name, "")
 
 
 def _ids(blocks: Sequence[Block]) -> Ints:
     return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])
-
-
-def _children(parts: dict[str, Part], parent: str) -> list[str]:
-    """Return the parts whose nearest ancestor that exists is `parent`."""
-
-    def nearest_ancestor(name: str) -> str:
-        while "." in name:
-            name = name.rsplit(".", 1)[0]
-            if name in parts:
-                return name
-        return ""
-
-    return [name for name in parts if name != parent and nearest_ancestor(name) == parent]
-
-
-def _part(parts: dict[str, Part], name: str, parent: str, ids: dict[str, Ints]) -> Lines:
-    part = parts[name]
-    body: list[str] = []
-    if part.data:
-        body += _block("SubModelPartData", _values(part.data))
-    for kind in ("tables", "properties"):
-        if members := getattr(part, kind):
-            body += _block(f"SubModelPart{kind.capitalize()}", map(str, members))
-    for kind, known in ids.items():
-        rows = getattr(part, kind)
-        if len(rows):
-            body += _block(f"SubModelPart{kind.capitalize()}", map(str, known[rows].tolist()))
-    for child in _children(parts, name):
-        body += _part(parts, child, name, ids)
-    yield from _block(f"SubModelPart {name.removeprefix(parent + '.')}", body)

@@ -1,0 +1,211 @@
+"""Settings: a JSON object that is asked for keys by type and answers mistakes with their place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from kratos_lite.errors import InputError, KratosLiteError, nearest
+from kratos_lite.io.json_file import Object, read_json
+
+T = TypeVar("T")
+REQUIRED: Any = object()
+"""Default of a key that must be given."""
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a JSON value is a number; true and false are none."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+class Settings:
+    """A JSON object with the file and the keys that lead to it.
+
+    Parameters
+    ----------
+    values : the object.
+    source : name of the file, for messages.
+    path : keys that lead here, for messages, such as ``solver_settings``.
+    place : line and column of the key that leads here, for messages about an empty object.
+    files : files that the whole tree has named so far and that are there; `find_file` adds to them.
+
+    Examples
+    --------
+    >>> from kratos_lite.io.json_file import parse_json
+    >>> Settings(parse_json('{"type": "amg"}'), "run.json").text("type")
+    'amg'
+    """
+
+    def __init__(
+        self,
+        values: Object,
+        source: str,
+        path: str = "",
+        place: tuple[int, int] = (1, 1),
+        files: list[Path] | None = None,
+    ) -> None:
+        self.values, self.source, self.path, self.place = values, source, path, place
+        self.files = [] if files is None else files
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def name(self, key: str) -> str:
+        """Return a key with the keys that lead to it."""
+        return f"{self.path}.{key}" if self.path else key
+
+    def expect(self, fits: object, key: str, message: str) -> None:
+        """Raise the error of a key unless its value fits."""
+        if not fits:
+            raise self.error(key, message)
+
+    def error(self, key: str, message: str) -> InputError:
+        """Return an error at the place of a key, or of the object where it is missing."""
+        line, column = self.values.places.get(key) or next(iter(self.values.places.values()), self.place)
+        return InputError(f"{self.source}:{line}:{column}: {message}")
+
+    def placed(self, key: str, action: Callable[..., T], *arguments: Any, **named: Any) -> T:
+        """Return what an action returns; an error of the library gets the place of a key."""
+        try:
+            return action(*arguments, **named)
+        except KratosLiteError as error:
+            name = self.name(key) if key else self.path
+            raise self.error(key, f"{name}: {error}") from None
+
+    def get(self, key: str, default: Any = REQUIRED) -> Any:
+        """Return a value of any type."""
+        if key in self.values:
+            return self.values[key]
+        if default is REQUIRED:
+            raise self.error(key, f"key {self.name(key)!r} is missing")
+        return default
+
+    def _typed(self, key: str, default: Any, fits: bool, kind: str) -> Any:
+        if key in self.values and not fits:
+            raise self.error(key, f"{self.name(key)} must be {kind}; got {shown(self.values[key])}")
+        return self.get(key, default)
+
+    def text(self, key: str, default: Any = REQUIRED) -> str:
+        """Return a string."""
+        value = self._typed(key, default, isinstance(self.values.get(key), str), "a string")
+        return str(value)
+
+    def number(self, key: str, default: Any = REQUIRED) -> float:
+        """Return a number."""
+        return float(self._typed(key, default, is_number(self.values.get(key)), "a number"))
+
+    def integer(self, key: str, default: Any = REQUIRED) -> int:
+        """Return an integer."""
+        value = self.values.get(key)
+        return int(self._typed(key, default, is_number(value) and isinstance(value, int), "an integer"))
+
+    def flag(self, key: str, default: Any = REQUIRED) -> bool:
+        """Return true or false."""
+        return bool(self._typed(key, default, isinstance(self.values.get(key), bool), "true or false"))
+
+    def vector(self, key: str) -> list[float]:
+        """Return three numbers."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
+        return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of three numbers")]
+
+    def numbers(self, key: str) -> list[float]:
+        """Return a list of numbers."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(map(is_number, value))
+        return [float(v) for v in self._typed(key, REQUIRED, fits, "a list of numbers")]
+
+    def texts(self, key: str) -> list[str]:
+        """Return a list of strings; an empty one where the key is missing."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(isinstance(v, str) for v in value)
+        return list(self._typed(key, [], fits, "a list of strings"))
+
+    def section(self, key: str, required: bool = False) -> Settings:
+        """Return an inner object; an empty one where the key is missing, unless it is required."""
+        default = REQUIRED if required else Object()
+        value = self._typed(key, default, isinstance(self.values.get(key), Object), "an object {…}")
+        return Settings(
+            value, self.source, self.name(key), self.values.places.get(key, self.place), self.files
+        )
+
+    def sections(self, key: str) -> list[Settings]:
+        """Return a list of inner objects."""
+        value = self.values.get(key)
+        fits = isinstance(value, list) and all(isinstance(v, Object) for v in value)
+        entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
+        place = self.values.places.get(key, self.place)
+        return [
+            Settings(entry, self.source, f"{self.name(key)}[{i}]", place, self.files)
+            for i, entry in enumerate(entries)
+        ]
+
+    def unknown(self, known: Iterable[str]) -> list[str]:
+        """Return the keys that are not among the known ones."""
+        return [key for key in self.values if key not in set(known)]
+
+    def check_keys(self, known: Iterable[str]) -> None:
+        """Raise InputError at the first key that is not among the known ones."""
+        known = list(known)
+        for key in self.unknown(known):
+            raise self.error(key, self.unknown_key(key, known))
+
+    def unknown_key(self, key: str, known: Iterable[str]) -> str:
+        """Return the message about an unknown key."""
+        known = list(known)
+        return f"unknown key {self.name(key)!r}.{nearest(key, known)} The keys are {', '.join(known)}"
+
+
+def shown(value: Any) -> str:
+    """Return a JSON value for a message, shortened."""
+    text = "null" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def read_settings(path: str | Path) -> Settings:
+    """Return the object that a JSON file holds; see `read_json` for the errors."""
+    value = read_json(path)
+    if not isinstance(value, Object):
+        raise InputError(f"{path}:1:1: an object {{…}} is expected; got {type(value).__name__}")
+    return Settings(value, str(path), files=[Path(path)])
+
+
+def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
+    """Return the path of a file named in a run file; raise ValueError if it leaves the folder.
+
+    >>> inside(Path("case"), "mesh/beam.mdpa").as_posix()
+    'case/mesh/beam.mdpa'
+    """
+    relative = Path(name.replace("\\", "/"))
+    leaves = relative.is_absolute() or ".." in relative.parts or (len(name) > 1 and name[1] == ":")
+    if leaves and not allow_outside:
+        raise ValueError(
+            f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
+        )
+    return folder / relative
+
+
+def find_file(
+    settings: Settings, key: str, folder: Path, *, outside: bool = False, ending: str = ""
+) -> tuple[Path, str]:
+    """Return the path of the file that a key names, and a note if it stands somewhere else.
+
+    The path counts from the folder of the run file; older files of Kratos count from another
+    folder, so the last word of the path is looked for beside the run file too.
+    """
+    name = settings.text(key) + ending
+    if Path(name).is_dir() or (folder / name).is_dir():
+        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
+    try:
+        path = inside(folder, name, outside)
+    except ValueError as error:
+        raise settings.error(key, f"{settings.name(key)}: {error}") from None
+    beside = folder / path.name
+    if path.is_file():
+        settings.files.append(path)
+        return path, ""
+    if beside.is_file():
+        settings.files.append(beside)
+        return beside, f"{name} is not there; {path.name} beside the run file is read"
+    raise settings.error(key, f"{settings.name(key)}: there is no file {folder / name}; correct the name")

@@ -1,0 +1,133 @@
+"""Load: what pushes a structure, as nodal forces; alone, with an amplitude, or as a function of time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.time_series import Factor, function_of
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+
+class Load(ABC):
+    """Something that pushes a structure.  A load of your own needs `forces` alone."""
+
+    @abstractmethod
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N.
+
+        Parameters
+        ----------
+        mesh : points (n, 3), elements, conditions and named parts.
+        groups : the elements with their materials.
+
+        Raises
+        ------
+        InputError, ModelError
+            The load does not fit the mesh.
+        """
+
+
+class TimeDependentLoad(Load):
+    """A load that a function of time gives, such as one that moves.
+
+    Statics take it at the time 0.  A load that only grows and shrinks is better added with an amplitude:
+    ``model.add(load, amplitude=...)``.
+
+    Parameters
+    ----------
+    function : takes the time in s, returns a load, or None where nothing acts.  As long as it returns the
+        same object, the nodal forces of that are kept.
+
+    Raises
+    ------
+    InputError
+        It is no function.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> def wheel_load(t):
+    ...     return kl.PointLoad(lambda X: abs(X[:, 0] - 3.0 * t) < 0.01, (0.0, 0.0, -1e3))
+    >>> wheel = TimeDependentLoad(wheel_load)
+    >>> wheel.at(0.5).force
+    array([    0.,     0., -1000.])
+    """
+
+    def __init__(self, function: Callable[[float], Load | None]) -> None:
+        if not callable(function) or isinstance(function, Load):
+            raise InputError(f"a function of time that returns a load is needed; got {function!r}")
+        self.function = function
+
+    def at(self, time: float) -> Load | None:
+        """Return the load at a time in s, or None.
+
+        Raises
+        ------
+        InputError
+            The function returns anything else.
+        """
+        found = self.function(time)
+        if found is not None and (not isinstance(found, Load) or isinstance(found, TimeDependentLoad)):
+            raise InputError(
+                f"the load at t = {time:g} s must be a PointLoad or another, or None; got {found!r}"
+            )
+        return found
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N at the time 0."""
+        return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
+
+    def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
+        """Return the nodal forces in N as a function of time, by those of a constant load."""
+        kept: list[tuple[float, Load | None, Array | float]] = []
+
+        def forces(time: float) -> Array | float:
+            for at, _, known in kept:
+                if at == time:
+                    return known
+            load = self.at(time)
+            same = [known for _, one, known in kept if one is load]
+            found = same[0] if same else 0.0 if load is None else forces_of(load)
+            kept[:] = [*kept[-1:], (time, load, found)]
+            return found
+
+        return forces
+
+
+class ScaledLoad(TimeDependentLoad):
+    """A load times an amplitude, as ``model.add(load, amplitude=...)`` makes it.
+
+    Parameters
+    ----------
+    load : any constant load.
+    amplitude : number, `TimeSeries`, or function of time.
+    """
+
+    def __init__(self, load: Load, amplitude: Factor) -> None:
+        if not isinstance(load, Load) or isinstance(load, TimeDependentLoad):
+            name = type(load).__name__
+            raise InputError(
+                f"an amplitude multiplies a constant load such as Gravity or Traction; got {name}"
+            )
+        self.load, self.amplitude = load, function_of(amplitude, "the amplitude of a load")
+
+    def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
+        """Return the nodal forces (n, 3) in N as a function of time."""
+        forces = forces_of(self.load)
+        return lambda time: self.amplitude(time) * forces
+
+
+def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:
+    """Return vectors of the right shape."""
+    array = finite(values, what)
+    if array.ndim not in dimensions or array.shape[-1] != 3:
+        raise InputError(f"{what} must be {shapes}; got shape {array.shape}")
+    return array

@@ -1,0 +1,55 @@
+"""Nodal loads: forces on nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh, Where
+from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.typing import Array
+
+
+class PointLoad(Load):
+    """The same force on each node of a part.
+
+    Parameters
+    ----------
+    where : nodes.
+    force : (3,) float, N, on each node.
+    """
+
+    def __init__(self, where: Where, force: ArrayLike) -> None:
+        self.where = where
+        self.force = vectors(force, "a point load", "(3,) in N")
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        rows = mesh.nodes(self.where)
+        if not len(rows):
+            raise ModelError(f"a point load finds no node in {self.where!r}")
+        total[rows] += self.force
+        return total
+
+
+class NodalForces(Load):
+    """Given nodal forces.
+
+    Parameters
+    ----------
+    values : (n, 3) float, N.
+    """
+
+    def __init__(self, values: ArrayLike) -> None:
+        self.values = vectors(values, "nodal forces", "(n, 3) in N", (2,))
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return a copy of the values."""
+        if self.values.shape != mesh.points.shape:
+            raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
+        return self.values.copy()

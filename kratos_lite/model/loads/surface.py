@@ -1,0 +1,130 @@
+"""Surface loads: traction and pressure on faces, force per length on lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
+from kratos_lite.elements import surface_load, surface_pressure
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Block, Mesh, Where, outward_signs
+from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite, number
+
+SURFACES = ("triangle", "quadrilateral")
+OfPlace: TypeAlias = Callable[[Array], ArrayLike]
+"""A function of places (m, 3) in m."""
+
+
+class Traction(Load):
+    """Force per area on the faces of a part.
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    traction : (3,) float, Pa; or a function of places (m, 3) that returns (m, 3), interpolated from nodes.
+    """
+
+    cells: ClassVar[tuple[str, ...]] = SURFACES
+
+    def __init__(self, where: Where, traction: ArrayLike | OfPlace) -> None:
+        self.where, self.traction = where, traction
+        if not callable(traction):
+            self.traction = vectors(traction, "a traction", "(3,) in Pa")
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return ∫ N t dA as nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        what = "a traction" if self.cells == SURFACES else "a line load"
+        for block in _faces(mesh, self.where, what, self.cells):
+            assert block.shape is not None
+            X, t = mesh.points[block.nodes], self.traction
+            at = _at_nodes(t, X, what, (3,)) if callable(t) else t
+            add_nodal(total, block.nodes, surface_load(block.shape, X, at))
+        return total
+
+
+class LineLoad(Traction):
+    """Force per length on the line conditions of a part.
+
+    Parameters
+    ----------
+    where : part with line conditions.
+    traction : (3,) float, N/m.
+    """
+
+    cells: ClassVar[tuple[str, ...]] = ("line",)
+
+
+class Pressure(Load):
+    """Pressure on the faces of a part; a positive one pushes into the body.
+
+    Parameters
+    ----------
+    where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
+    pressure : float, Pa; or a function of places (m, 3) that returns (m,), interpolated from nodes.
+    normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
+        the nodes of each condition run counter-clockwise, as Kratos does.
+    """
+
+    def __init__(self, where: Where, pressure: float | OfPlace, normal: str = "outward") -> None:
+        if normal not in ("outward", "nodes"):
+            raise InputError(f"normal must be 'outward' or 'nodes'; got {normal!r}")
+        if not callable(pressure):
+            pressure = number(pressure, "a pressure")
+        self.where, self.pressure, self.normal = where, pressure, normal
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return -∫ N p n dA as nodal forces (n, 3) in N."""
+        total = np.zeros_like(mesh.points)
+        for block in _faces(mesh, self.where, "a pressure"):
+            assert block.shape is not None
+            X, p = mesh.points[block.nodes], self.pressure
+            at = _at_nodes(p, X, "a pressure", ()) if callable(p) else np.full(block.nodes.shape, p)
+            if self.normal == "outward":
+                at = at * outward(mesh, block)[:, None]
+            add_nodal(total, block.nodes, surface_pressure(block.shape, X, at))
+        return total
+
+
+def outward(mesh: Mesh, block: Block) -> Array:
+    """Return +1 for faces whose nodes run counter-clockwise from outside the body, else -1."""
+    signs = outward_signs(mesh.boundary, block)
+    if (signs == 0).any():
+        lost = block.ids[int(np.argmax(signs == 0))]
+        raise ModelError(
+            f"face {lost} ({block.name}) is not on the boundary of the body, so it has no outward normal"
+        )
+    return signs
+
+
+def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
+    faces = mesh.faces(where)
+    wanted = "faces" if cells == SURFACES else "lines"
+    for block in faces:
+        if block.shape is None or block.shape.cell not in cells:
+            kind = "conditions of the unknown kind" if block.shape is None else "other conditions,"
+            raise ModelError(
+                f"{what} acts on {wanted}; it meets {kind} {block.name} (the first is {block.ids[0]})"
+            )
+    if not faces:
+        name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
+        raise ModelError(
+            f"{what} finds no {wanted[:-1]} on {name}: it has no conditions and no element face "
+            "on the boundary has all its nodes in it"
+        )
+    return faces
+
+
+def _at_nodes(function: OfPlace, X: Array, what: str, width: tuple[int, ...]) -> Array:
+    """Return what a function gives at the nodes (m, k, 3) of faces, (m, k, *width)."""
+    given = finite(function(X.reshape(-1, 3).copy()), what)
+    wanted = (X.shape[0] * X.shape[1], *width)
+    if given.shape not in (wanted, width):
+        raise InputError(f"{what} at places (m, 3) must have shape {('m', *width)}; got {given.shape}")
+    return np.broadcast_to(given, wanted).reshape(*X.shape[:2], *width)

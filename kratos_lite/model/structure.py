@@ -1,0 +1,419 @@
+"""Structure: mesh, materials, supports, loads and motion of what is analyzed; it knows no analysis."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.assembly.element_groups import ElementGroup, element_groups_of
+from kratos_lite.assembly.sparsity_pattern import PatternCache
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh import Mesh, Where, WhereElements
+from kratos_lite.model import checks
+from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
+from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.model.supports import AXES, Supports
+from kratos_lite.quadrature import Rule
+from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
+from kratos_lite.time_series import Factor
+from kratos_lite.typing import Array
+from kratos_lite.validation import finite
+
+
+class Attachment(ABC):
+    """What `Structure.add` takes besides loads, such as the motions of `kratos_lite.ale`."""
+
+    @abstractmethod
+    def attach(self, structure: Structure) -> None:
+        """Become part of a structure: check it, and set what it needs.
+
+        Parameters
+        ----------
+        structure : that it is added to.
+
+        Raises
+        ------
+        ModelError
+            It does not fit the structure.
+        """
+
+
+class Structure:
+    """What is analyzed: mesh, materials, supports, loads and motion.
+
+    Points and elements of the mesh become read-only, as all that is checked and computed depends on them.
+
+    Parameters
+    ----------
+    mesh : points, elements and named parts.
+    material : one material for all elements, or materials by part name or property id.
+
+    Attributes
+    ----------
+    supports : what is prescribed; see `fix` and `constrain`.
+    loads : those added; the list may be changed.
+    motion : of the material through the mesh, a `kratos_lite.ale.Motion`, or None.
+    notes : what readers of files found, for the report.
+
+    Raises
+    ------
+    InputError
+        `mesh` is no Mesh, or `material` no material.
+    MeshError
+        A part or property of `material` does not exist.
+    """
+
+    def __init__(
+        self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
+    ) -> None:
+        self.mesh = checks.checked_mesh(mesh)
+        self.supports = Supports(mesh)
+        self.loads: list[Load] = []
+        self.motion: Any = None
+        self.notes: list[str] = []
+        self.patterns = PatternCache()
+        self._initial_displacement: Array | None = None
+        self._prestress: Array | None = None
+        self._materials: list[LinearMaterial] = []
+        self._material_of = np.full(mesh.n_elements, -1)
+        self._rules: dict[int, Rule | int] = {}
+        self._rule_of = np.full(mesh.n_elements, -1)
+        self._changes = 0
+        self._arrays: list[NDArray[Any]] = []
+        self._freeze()
+        if isinstance(material, Mapping):
+            for where, one in material.items():
+                self.assign(one, where)
+        elif material is not None:
+            self.assign(material)
+
+    @property
+    def version(self) -> tuple[int, int]:
+        """Counts of the changes of all that matters to the equations, but prescribed values and loads."""
+        self._freeze()
+        return self._changes, self.supports.version
+
+    def _freeze(self) -> None:
+        """Make the arrays of the mesh read-only, and count a change if there are others."""
+        arrays: list[NDArray[Any]] = [self.mesh.points, *(block.nodes for block in self.mesh.blocks)]
+        if list(map(id, arrays)) != list(map(id, self._arrays)):
+            for array in arrays:
+                array.flags.writeable = False
+            self._arrays = arrays
+            self._changes += 1
+
+    # ---- elements -----------------------------------------------------------------------------
+
+    def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
+        """Give elements a material.
+
+        Parameters
+        ----------
+        material : such as `Isotropic3D`.
+        where : elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            It is no material.
+        MeshError
+            There is no such part, property or element.
+        """
+        checks.checked_material(material)
+        rows = self.mesh.elements(where)
+        self._materials.append(material)
+        self._material_of[rows] = len(self._materials) - 1
+        self._changes += 1
+
+    def use_rule(self, rule: Rule | int, where: WhereElements = None) -> None:
+        """Replace the quadrature rule of elements.
+
+        Parameters
+        ----------
+        rule : a Rule, or an INTEGRATION_ORDER 1 … 5 of Kratos.
+        where : elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            It is neither.
+        MeshError
+            There is no such part, property or element.
+        """
+        if isinstance(rule, bool) or not isinstance(rule, (int, Rule)):
+            raise InputError(f"a Rule or an INTEGRATION_ORDER 1 … 5 is needed; got {rule!r}")
+        number = len(self._rules)
+        self._rules[number] = rule
+        self._rule_of[self.mesh.elements(where)] = number
+        self._changes += 1
+
+    def element_groups(self) -> list[ElementGroup]:
+        """Return the elements grouped by kind, rule and material.
+
+        Raises
+        ------
+        ModelError
+            An element has no material, or there are no elements.
+        InputError
+            An element has an unknown kind, or a rule does not fit it.
+        """
+        return element_groups_of(
+            self.mesh, self._materials, self._material_of, self._rules, self._rule_of, self.prestress
+        )
+
+    # ---- initial stress -----------------------------------------------------------------------
+
+    @property
+    def initial_displacement(self) -> Array | None:
+        """Displacement (n, 3) in m without stress, read-only, or None; see `stress_free_at`."""
+        return self._initial_displacement
+
+    @property
+    def prestress(self) -> Array | None:
+        """Stress (m, 6) in Pa of unstrained elements, read-only, or None; see `add_prestress`."""
+        return self._prestress
+
+    def stress_free_at(self, displacement: ArrayLike) -> None:
+        """Make the body stress-free at a displacement u0: strain comes from u - u0.
+
+        Parameters
+        ----------
+        displacement : (n, 3) m.
+
+        Raises
+        ------
+        InputError
+            It has another shape, or is not finite.
+        """
+        u0 = finite(displacement, "the initial displacement", self.mesh.points.shape)
+        u0.flags.writeable = False
+        self._initial_displacement = u0
+        self._changes += 1
+
+    def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
+        """Add a stress that elements carry before they are strained.
+
+        Parameters
+        ----------
+        stress : (6,) or (m, 6) Pa, in the order xx yy zz xy yz zx.
+        where : m elements by part name, property id or rows; all if not given.
+
+        Raises
+        ------
+        InputError
+            It has another shape, or is not finite.
+        MeshError
+            There is no such part, property or element.
+        """
+        s, rows = finite(stress, "a prestress"), self.mesh.elements(where)
+        if s.shape not in ((6,), (len(rows), 6)):
+            raise InputError(
+                f"a prestress has six components xx yy zz xy yz zx, or shape ({len(rows)}, 6); "
+                f"got shape {s.shape}"
+            )
+        total = np.zeros((self.mesh.n_elements, 6)) if self._prestress is None else self._prestress.copy()
+        total[rows] += s
+        total.flags.writeable = False
+        self._prestress = total
+        self._changes += 1
+
+    # ---- supports and loads -------------------------------------------------------------------
+
+    def fix(
+        self,
+        where: Where,
+        axes: str = "xyz",
+        value: ArrayLike | Callable[[float], float] = 0.0,
+        *,
+        override: bool = False,
+    ) -> None:
+        """Prescribe the displacement of nodes.
+
+        Parameters
+        ----------
+        where : part name, predicate on the points (n, 3), mask or node rows.
+        axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
+        value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
+            which statics take at the time 0.
+        override : let this value win over an earlier one for the same degree of freedom.
+
+        Raises
+        ------
+        ModelError
+            If no node is chosen, or a degree of freedom gets two different values.
+        InputError
+            The axes or the value make no sense.
+        MeshError
+            There is no such part or node.
+        """
+        rows = self.mesh.nodes(where)
+        if not len(rows):
+            what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
+            raise ModelError(f"cannot fix {axes}: {what}")
+        if callable(value):
+            self.supports.prescribe_motion(rows, axes, value, override)
+        else:
+            self.supports.fix(rows, axes, value, override)
+
+    def constrain(
+        self,
+        slave: tuple[int, str],
+        masters: Mapping[tuple[int, str], float],
+        constant: float = 0.0,
+    ) -> None:
+        """Tie a degree of freedom to others: u[slave] = Σ weight · u[master] + constant.
+
+        Parameters
+        ----------
+        slave : (node row, axis letter).
+        masters : weights by (node row, axis letter).
+        constant : m.
+
+        Raises
+        ------
+        InputError
+            A degree of freedom, weight or constant is none.
+        """
+        if not isinstance(masters, Mapping):
+            raise InputError(f"masters must map (node row, axis letter) to a weight; got {masters!r}")
+        weights = finite(list(masters.values()), "weights of a constraint").tolist()
+        offset = float(finite(constant, "the constant of a constraint"))
+        constraint = MultiPointConstraint(
+            self._dof(slave), tuple(map(self._dof, masters)), tuple(weights), offset
+        )
+        self.supports.constraints = (*self.supports.constraints, constraint)
+
+    def _dof(self, where: tuple[int, str]) -> int:
+        """Return the number of a degree of freedom (node row, axis letter)."""
+        node, axis = where if isinstance(where, tuple) and len(where) == 2 else (None, None)
+        known = isinstance(node, (int, np.integer)) and 0 <= node < self.mesh.n_nodes
+        if not known or axis not in tuple(AXES):
+            raise InputError(f"a degree of freedom is (node row, axis letter); got {where!r}")
+        return 3 * int(where[0]) + AXES.index(where[1])
+
+    def add(self, load: Load | Attachment, *, amplitude: Factor | None = None) -> None:
+        """Add a load (loads add up), or the motion of the material through the mesh (there is one).
+
+        Parameters
+        ----------
+        load : such as `Gravity` or `Traction`; or a motion such as `kratos_lite.ale.Rotation`.
+        amplitude : number, `TimeSeries` or function of time in s that multiplies the load; statics take it
+            at the time 0.
+
+        Raises
+        ------
+        InputError
+            It is neither, or the amplitude is none.
+        ModelError
+            The motion does not fit the model, or there is one already.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+        >>> model.add(kl.Gravity((0, 0, -9.81)), amplitude=kl.TimeSeries([0.0, 1.0], [0.0, 2.0]))
+        >>> model.loads[0].amplitude(0.5)
+        1.0
+        """
+        if isinstance(load, Attachment):
+            if amplitude is not None:
+                raise InputError("a motion takes no amplitude; its rate may be a function of time")
+            load.attach(self)
+            return
+        if not isinstance(load, Load):
+            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+        self.loads.append(load if amplitude is None else ScaledLoad(load, amplitude))
+
+    def rigid_modes(self) -> Array:
+        """Return the six rigid-body modes (3n, 6) of all nodes: translations x y z, rotations about x y z."""
+        return rigid_modes(self.mesh.points)
+
+    # ---- checks -------------------------------------------------------------------------------
+
+    def check_geometry(self) -> list[str]:
+        """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
+
+        Raises
+        ------
+        MeshError, InputError
+            With every element that is wrong.
+        """
+        return checks.check_geometry(self.mesh)
+
+    def check(self) -> list[str]:
+        """Check the model as a static solution does, without solving; return the warnings.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            With every element or part that is wrong.
+        """
+        return self.checked()[2]
+
+    def checked(self, *, free: bool = False) -> tuple[list[ElementGroup], NDArray[np.int64], list[str]]:
+        """Return element groups, the part of each node and the warnings of a model that passes all checks.
+
+        Parts are numbered from 0; they share neither nodes nor constraints.  Nodes without elements have -1.
+
+        Parameters
+        ----------
+        free : let rigid-body modes be free, as inertia holds what supports do not; then there is one part.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            With every element or part that is wrong.
+        """
+        mesh = self.mesh
+        warnings = self.check_geometry()
+        groups = self.element_groups()
+        used, faces = mesh.used_nodes(), mesh.all_faces(anew=True)
+        warnings += checks.check_rules(mesh, groups)
+        warnings += rigid_body_mode_check.check_joints(mesh, faces)
+        warnings += checks.check_coincident(mesh, used)
+        warnings += checks.check_scales(mesh, groups)
+        if not used.all():
+            lost = mesh.node_ids[~used]
+            shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
+            warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
+        part: NDArray[np.int64] = np.where(used, 0, -1)
+        if not free:
+            bodies = rigid_body_mode_check.bodies(mesh, faces)
+            part = rigid_body_mode_check.check_supports(mesh, self.supports, bodies)
+        self.supports.check_used(used)
+        return groups, part, warnings
+
+    # ---- summary ------------------------------------------------------------------------------
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of a summary: label and value."""
+        mesh = self.mesh
+        used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
+        without = int((self._material_of < 0).sum())
+        rows = [("nodes", str(mesh.n_nodes))]
+        rows += [("elements", f"{len(block)} {block.name}") for block in mesh.blocks if len(block)]
+        rows += [("material", str(material)) for material in used]
+        rows += [("material", f"none for {without} elements")] if without else []
+        rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))
+        if self.supports.constraints:
+            rows.append(("constraints", str(len(self.supports.constraints))))
+        rows += [("load", type(load).__name__) for load in self.loads]
+        rows += [] if self.motion is None else [("motion", str(self.motion))]
+        for name, part in mesh.parts.items():
+            sizes = (
+                f"{len(part.nodes)} nodes, {len(part.elements)} elements, {len(part.conditions)} conditions"
+            )
+            rows.append(("part", f"{name}: {sizes}"))
+        return rows + [("note", note) for note in self.notes]
+
+    def __str__(self) -> str:
+        return "\n".join(f"{label:<12}{value}" for label, value in self.table())
+
+    def __repr__(self) -> str:
+        name = type(self).__name__
+        return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"

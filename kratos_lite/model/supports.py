@@ -1,0 +1,279 @@
+"""Supports: prescribed displacements, prescribed motion in time, and multi-point constraints of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Mesh
+from kratos_lite.solvers.constraint_map import (
+    ConstraintMap,
+    MultiPointConstraint,
+    Slaves,
+    constraint_map,
+    eliminate,
+)
+from kratos_lite.time_series import function_of
+from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import finite
+
+AXES = "xyz"
+UNUSED = "a constraint uses {}, which belongs to no element; remove it"
+PRESCRIBED_TWICE = "by a function of time and otherwise; fix it once, or with override=True"
+
+
+def axis_numbers(axes: str) -> list[int]:
+    """Return the axis numbers of a word such as ``"xz"``.
+
+    >>> axis_numbers("xz")
+    [0, 2]
+    """
+    known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
+    if not known or len(set(axes)) != len(axes):
+        raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
+    return [AXES.index(a) for a in axes]
+
+
+@dataclass(frozen=True, eq=False)
+class PrescribedMotion:
+    """The displacement of nodes along an axis as a function of time.
+
+    Attributes
+    ----------
+    rows : the nodes.
+    axis : 0, 1 or 2.
+    function : takes the time in s, returns m; its values are checked.
+    given : the function as the caller gave it.
+    """
+
+    rows: Ints
+    axis: int
+    function: Callable[[float], float]
+    given: object
+
+
+class Supports:
+    """What holds a structure: prescribed displacements, prescribed motion and multi-point constraints.
+
+    Attributes
+    ----------
+    fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
+    values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
+    motions : the prescribed motion.
+    version : counts the changes of what is prescribed, but for values and functions of time.
+    value_version : counts all changes.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._fixed: Mask = np.zeros(mesh.points.shape, dtype=bool)
+        self._values: Array = np.zeros(mesh.points.shape)
+        self.fixed, self.values = self._fixed.view(), self._values.view()
+        self.fixed.flags.writeable = self.values.flags.writeable = False
+        self._constraints: tuple[MultiPointConstraint, ...] = ()
+        self.motions: tuple[PrescribedMotion, ...] = ()
+        self.version = self.value_version = 0
+        self._slaves: tuple[int, Slaves] = (-1, {})
+
+    def name(self, dof: int) -> str:
+        """Return the readable name of a degree of freedom, 3·node + axis."""
+        return f"node {self.mesh.node_ids[dof // 3]} along {AXES[dof % 3]}"
+
+    # ---- prescribed displacements ------------------------------------------------------------------------
+
+    def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
+        """Prescribe the displacement of nodes along axes.
+
+        Parameters
+        ----------
+        rows : the nodes.
+        axes : such as ``"xz"``.
+        value : m; one number, one per axis, or (rows, axes).
+        override : let this value win over an earlier one.
+
+        Raises
+        ------
+        InputError
+            The value has another shape, or is not finite.
+        ModelError
+            A degree of freedom has another value already.
+        """
+        numbers = axis_numbers(axes)
+        new = finite(value, "a prescribed displacement")
+        try:
+            new = np.broadcast_to(new, (len(rows), len(numbers)))
+        except ValueError:
+            raise InputError(
+                f"value must be one number, {len(numbers)} numbers (one per axis of {axes!r}) "
+                f"or have shape ({len(rows)}, {len(numbers)}); got shape {new.shape}"
+            ) from None
+        at = np.ix_(rows, np.array(numbers))
+        clash = self.fixed[at] & (self.values[at] != new)
+        if clash.any() and not override:
+            i, j = np.argwhere(clash)[0]
+            dof = int(3 * rows[i] + numbers[j])
+            raise ModelError(
+                f"{self.name(dof)} is prescribed twice: {self.values.flat[dof]:g} m and {new[i, j]:g} m; "
+                "fix it once, or with override=True"
+            )
+        self._end_motion(rows, numbers, None, override)
+        self._prescribe(at, new)
+
+    def prescribe_motion(
+        self, rows: Ints, axes: str, function: Callable[[float], float], override: bool = False
+    ) -> None:
+        """Prescribe the displacement of nodes along axes as a function of time; see `fix`."""
+        numbers, checked = axis_numbers(axes), function_of(function, "a prescribed displacement")
+        start = checked(0.0)
+        resting = self.fixed.copy()
+        for motion in self.motions:
+            resting[motion.rows, motion.axis] = False
+        at = np.ix_(rows, np.array(numbers))
+        i, j = np.nonzero(resting[at])
+        if len(i) and not override:
+            dof = 3 * int(rows[i[0]]) + numbers[j[0]]
+            raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
+        self._end_motion(rows, numbers, function, override)
+        self._prescribe(at, start)
+        self.motions += tuple(PrescribedMotion(rows, axis, checked, function) for axis in numbers)
+
+    def _prescribe(self, at: tuple[Ints, ...], value: ArrayLike) -> None:
+        """Set values, and count the change."""
+        self.version += not self.fixed[at].all()
+        self.value_version += 1
+        self._fixed[at] = True
+        self._values[at] = value
+
+    def _end_motion(self, rows: Ints, axes: list[int], given: object, override: bool) -> None:
+        """Take nodes out of the motion that they have along axes, unless the same function is given again."""
+        kept = []
+        for old in self.motions:
+            again = np.isin(old.rows, rows) & (old.axis in axes)
+            if again.any() and not override and old.given is not given:
+                dof = 3 * int(old.rows[again][0]) + old.axis
+                raise ModelError(f"{self.name(dof)} is prescribed twice: {PRESCRIBED_TWICE}")
+            kept.append(replace(old, rows=old.rows[~again]))
+        self.motions = tuple(old for old in kept if len(old.rows))
+
+    def _function(self, dof: int) -> object:
+        """Return the function of time of a degree of freedom, as the caller gave it, or None."""
+        node, axis = divmod(dof, 3)
+        mine = (m.given for m in self.motions if m.axis == axis and (m.rows == node).any())
+        return next(mine, None)
+
+    # ---- multi-point constraints ------------------------------------------------------------------------
+
+    @property
+    def constraints(self) -> tuple[MultiPointConstraint, ...]:
+        """The multi-point constraints."""
+        return self._constraints
+
+    @constraints.setter
+    def constraints(self, constraints: Iterable[MultiPointConstraint]) -> None:
+        self._constraints = tuple(constraints)
+        self.version += 1
+        self.value_version += 1
+
+    def slaves(self) -> Slaves:
+        """Return the slaves of all constraints by free degrees of freedom.
+
+        Raises
+        ------
+        ModelError
+            Constraints contradict one another or what is prescribed.
+        """
+        if self._slaves[0] != self.value_version:
+            self._slaves = self.value_version, self._eliminated(self.values, agree=True)
+        return self._slaves[1]
+
+    def _eliminated(self, values: Array, agree: bool) -> Slaves:
+        """Return the slaves for some prescribed values; those of symmetric ties must agree if asked for."""
+        turned = [self._turned(c, agree) if c.symmetric else c for c in self.constraints]
+        return eliminate([c for c in turned if c], self.fixed, values, self.name)
+
+    def _turned(self, tie: MultiPointConstraint, agree: bool) -> MultiPointConstraint | None:
+        """Return a symmetric tie with the node that supports hold as master; None if they hold both alike."""
+        slave, (master,) = tie.slave, tie.masters
+        if not self.fixed.flat[slave]:
+            return tie
+        if not self.fixed.flat[master]:
+            return MultiPointConstraint(master, (slave,), (1.0,))
+        one, other = self.values.flat[slave], self.values.flat[master]
+        both = f"{self.name(slave)} and {self.name(master)} are tied, but"
+        if agree and self._function(slave) is not self._function(master):
+            raise ModelError(f"{both} move differently: give both the same function, or fix only one of them")
+        if agree and one != other:
+            raise ModelError(
+                f"{both} prescribed as {one:g} m and {other:g} m: give both the same value, or fix one only"
+            )
+        return None
+
+    def check_used(self, used: Mask) -> None:
+        """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
+        for slave, (terms, _) in self.slaves().items():
+            for dof in (slave, *terms):
+                if not used[dof // 3]:
+                    raise ModelError(UNUSED.format(self.name(dof)))
+
+    # ---- for the equations ------------------------------------------------------------------------------
+
+    def constraint_map(self, nodes: Ints, values: Array | None = None) -> ConstraintMap:
+        """Return the constraint map of the degrees of freedom of some nodes, renumbered in order.
+
+        Parameters
+        ----------
+        nodes : (a,) ascending rows.  Constraints of slaves on other nodes are left out.
+        values : (n, 3) m, in place of the prescribed displacements.
+
+        Raises
+        ------
+        ModelError
+            Constraints contradict one another, or use other nodes.
+        """
+        fixed, u = self.fixed, self.values if values is None else values
+        slaves = None
+        if self.constraints:
+            found = self.slaves() if values is None else self._eliminated(values, agree=False)
+            slaves = self._renumbered(found, nodes)
+        if len(nodes) < len(fixed):
+            fixed, u = fixed[nodes], u[nodes]
+        return constraint_map(fixed, u, slaves)
+
+    def _renumbered(self, slaves: Slaves, nodes: Ints) -> Slaves:
+        """Return the slaves on some nodes by the degrees of freedom of these."""
+        row = np.full(self.mesh.n_nodes, -1)
+        row[nodes] = np.arange(len(nodes))
+
+        def dof(old: int) -> int:
+            new = int(row[old // 3])
+            if new < 0:
+                raise ModelError(
+                    f"a constraint uses {self.name(old)}, which belongs to no element; remove it"
+                )
+            return 3 * new + old % 3
+
+        return {
+            dof(slave): ({dof(master): weight for master, weight in terms.items()}, constant)
+            for slave, (terms, constant) in slaves.items()
+            if row[slave // 3] >= 0
+        }
+
+    def supported(self, residual: Array) -> Array:
+        """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""
+        acts = self.fixed.copy()
+        acts.flat[[dof for c in self.constraints for dof in (c.slave, *c.masters)]] = True
+        return np.where(acts, residual, 0.0)
+
+    def constraint_rows(self) -> tuple[Ints, Ints, Array]:
+        """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight)."""
+        fixed = np.flatnonzero(self.fixed.ravel())
+        row, dof, weight = [np.arange(len(fixed))], [fixed], [np.ones(len(fixed))]
+        for r, constraint in enumerate(self.constraints, start=len(fixed)):
+            row.append(np.full(1 + len(constraint.masters), r))
+            dof.append(np.array([constraint.slave, *constraint.masters], dtype=np.int64))
+            weight.append(np.array([1.0, *(-w for w in constraint.weights)]))
+        return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)

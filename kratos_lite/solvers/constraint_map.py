@@ -1,0 +1,197 @@
+"""Constraint map: prescribed displacements and multi-point constraints as u = T q + c, by elimination.
+
+q are the free degrees of freedom.  T^T K T q = T^T (f - K c) stays symmetric and holds the constraints
+exactly, without a penalty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.errors import ModelError
+from kratos_lite.typing import Array, Ints, Mask
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Slaves: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
+"""For each slave the weights of free degrees of freedom, and a constant."""
+
+
+@dataclass(frozen=True)
+class MultiPointConstraint:
+    """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant.
+
+    Parameters
+    ----------
+    slave, masters : degrees of freedom, 3·node + axis.
+    weights : one for each master.
+    constant : m.
+    symmetric : of a tie u[slave] = u[master]: where supports hold the slave, the master follows.
+    """
+
+    slave: int
+    masters: tuple[int, ...]
+    weights: tuple[float, ...]
+    constant: float = 0.0
+    symmetric: bool = False
+
+
+@dataclass(eq=False)
+class ConstraintMap:
+    """The map u = T q + c from the free degrees of freedom q to all.
+
+    Attributes
+    ----------
+    free : (q,) int, the free degrees of freedom.
+    c : (N,) float, the displacement at q = 0 in m.
+    T : (N, q) sparse; None without slaves, where q is added to the free components of c.
+    """
+
+    free: Ints
+    c: Array
+    T: csr_array[Any, Any] | None = None
+
+    def transform(self, q: NDArray[Any]) -> NDArray[Any]:
+        """Return T q, (N, ...), of the free degrees of freedom (q, ...): without what is prescribed."""
+        if self.T is not None:
+            return np.asarray(self.T @ q)
+        u = np.zeros((len(self.c), *q.shape[1:]), dtype=q.dtype)
+        u[self.free] = q
+        return u
+
+    def expand(self, q: Array, c: Array | None = None) -> Array:
+        """Return all displacements T q + c, (N,); `c` replaces that of the map."""
+        u = self.transform(q)
+        u += self.c if c is None else c
+        return u
+
+    def reduce(self, r: Array) -> Array:
+        """Return T^T r of forces (N,)."""
+        return np.asarray(self.T.T @ r) if self.T is not None else r[self.free]
+
+    def reduce_matrix(self, A: Any) -> Any:
+        """Return T^T A T of a sparse matrix (N, N) as CSR."""
+        if self.T is not None:
+            return (self.T.T @ A @ self.T).tocsr()
+        return A if len(self.free) == A.shape[0] else A[self.free][:, self.free]
+
+
+def constraint_map(fixed: Mask, values: Array, slaves: Slaves | None = None) -> ConstraintMap:
+    """Return the map of nodes with prescribed displacements and slaves.
+
+    Where all supports displace the nodes alike along an axis, c carries the free ones along: what is left to
+    solve for is the strain alone, and its error does not grow with the displacement.
+
+    Parameters
+    ----------
+    fixed, values : (a, 3) which degrees of freedom are prescribed, and their displacements in m.
+    slaves : as of `eliminate`, by the rows of these nodes; None where the structure has no constraints.
+    """
+    held, c = fixed.ravel(), values.ravel() * fixed.ravel()
+    if slaves is None:
+        for axis in range(3):
+            at_axis, along = held[axis::3], c[axis::3]
+            if at_axis.any() and np.ptp(along[at_axis]) == 0 and along[at_axis][0] != 0:
+                along[:] = along[at_axis][0]
+        return ConstraintMap(np.flatnonzero(~held), c)
+    is_free = ~held
+    is_free[list(slaves)] = False
+    free = np.flatnonzero(is_free)
+    column = np.full(len(held), -1)
+    column[free] = np.arange(len(free))
+    rows, columns, weights = [free], [column[free]], [np.ones(len(free))]
+    for slave, (terms, constant) in sorted(slaves.items()):
+        c[slave] = constant
+        rows.append(np.full(len(terms), slave))
+        columns.append(column[list(terms)])
+        weights.append(np.array(list(terms.values()), dtype=float))
+    from scipy.sparse import csr_array
+
+    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
+    return ConstraintMap(free, c, csr_array(entries, shape=(len(held), len(free))))
+
+
+def eliminate(
+    constraints: Iterable[MultiPointConstraint], fixed: Mask, values: Array, name: Callable[[int], str]
+) -> Slaves:
+    """Express every slave by free degrees of freedom alone.
+
+    Parameters
+    ----------
+    constraints : multi-point constraints; symmetric ties already turned so that their slaves are free.
+    fixed, values : (n, 3) which degrees of freedom are prescribed, and their displacements in m.
+    name : gives the name of a degree of freedom for messages.
+
+    Raises
+    ------
+    ModelError
+        If a slave is fixed or has two constraints, or constraints form a cycle.
+    """
+    by_slave: dict[int, MultiPointConstraint] = {}
+    for constraint in constraints:
+        slave = constraint.slave
+        if slave in by_slave:
+            raise ModelError(f"{name(slave)} is the slave of two constraints; remove one of them")
+        if fixed.flat[slave]:
+            raise ModelError(f"{name(slave)} is both fixed and the slave of a constraint; do one of the two")
+        by_slave[slave] = constraint
+    done: Slaves = {}
+    for start in by_slave:
+        stack, open_ = [start], set()  # no recursion: chains of constraints may be long
+        while stack:
+            slave = stack[-1]
+            waiting = [m for m in by_slave[slave].masters if m in by_slave and m not in done]
+            if slave in done or not waiting:
+                stack.pop()
+                open_.discard(slave)
+                done.setdefault(slave, _substitute(by_slave[slave], done, fixed, values))
+            elif slave in open_:
+                raise ModelError(f"the constraints of {name(slave)} form a cycle; remove one of them")
+            else:
+                open_.add(slave)
+                stack += waiting
+    return done
+
+
+def _substitute(
+    constraint: MultiPointConstraint, done: Slaves, fixed: Mask, values: Array
+) -> tuple[dict[int, float], float]:
+    """Return the weights of free masters and the constant of a constraint."""
+    terms: dict[int, float] = {}
+    constant = constraint.constant
+    for master, weight in zip(constraint.masters, constraint.weights, strict=True):
+        if fixed.flat[master]:
+            constant += weight * values.flat[master]
+            continue
+        inner, offset = done.get(master, ({master: 1.0}, 0.0))
+        constant += weight * offset
+        for dof, factor in inner.items():
+            terms[dof] = terms.get(dof, 0.0) + weight * factor
+    return terms, constant
+
+
+def rigid_modes(points: Array, center: ArrayLike | None = None) -> Array:
+    """Return the six rigid-body modes (3n, 6) of points (n, 3).
+
+    They are translations along x y z and rotations about x y z through `center`, the mean of the points if
+    not given.
+
+    Examples
+    --------
+    >>> rigid_modes(np.eye(3)).shape
+    (9, 6)
+    """
+    X = points - (points.mean(axis=0) if center is None else np.asarray(center))
+    R = np.zeros((len(points), 3, 6))
+    R[:, range(3), range(3)] = 1
+    x, y, z = X.T
+    R[:, 1, 3], R[:, 2, 3] = -z, y
+    R[:, 0, 4], R[:, 2, 4] = z, -x
+    R[:, 0, 5], R[:, 1, 5] = -y, x
+    return R.reshape(-1, 6)

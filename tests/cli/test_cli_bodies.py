@@ -1,0 +1,284 @@
+"""Bodies on the command line: summary, files, restart, interruption, and what goes wrong."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+SCENE = {
+    "mesh": {"box": {"size": [0.4, 0.6, 1.0], "cells": [1, 2, 2]}},
+    "material": {"E": 1e6, "nu": 0.3, "density": 1000.0},
+    "body": "pseudo-rigid",
+    "start": {"velocity": [1, 2, 3], "angular_velocity": [0.05, 10, 0.05]},
+    "loads": [{"type": "gravity", "acceleration": [0, 0, -9.81]}],
+    "time": {"step": 0.005, "steps": 20, "every": 5},
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write()
+    return tmp_path
+
+
+def write(name="box.json", **changes):
+    with open(name, "w") as file:
+        json.dump({**SCENE, **changes}, file)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_summary_with_the_numbers(run, folder):
+    done = run("solve", "box.json")
+    assert (done.code, done.err) == (0, "")
+    rows = done.rows
+    assert rows["body"] == "pseudo-rigid, 12 velocities, ENERGY_MOMENTUM"
+    assert rows["mass"] == "240 kg"
+    assert rows["time"] == "0 … 0.1 s, 20 steps"
+    assert rows["linear momentum"] == f"(240, 480, {240 * (3 - 0.981):.6g}) kg m/s"
+    assert rows["angular momentum"].startswith("(1.36, 232, 0.52) kg m²/s")
+    assert rows["mass center"] == f"(0.3, 0.5, {0.5 + 0.3 - 9.81 / 200:.6g}) m"
+    # ½ m v² + 1160.047 J of the spin + m g z
+    assert rows["sum of energies"] == f"{120 * 14 + 1160.047 + 240 * 9.81 * 0.5:.7g} J"
+    assert abs(float(rows["energy drift"].split()[0])) < 1e-13
+    fallen = 3 * 0.1 - 9.81 / 200
+    assert rows["external work"].startswith(f"{-240 * 9.81 * fallen:.7g} J, of all loads")
+    assert "dissipated" not in rows
+    assert re.match(r"\S+ s, \S+ s in all", rows["time per step"])
+    assert names(folder) == ["box.json"]
+
+
+def test_with_damping_the_loss_is_no_drift(run, folder):
+    write(body={"kind": "pseudo-rigid", "damping": 1e-3}, loads=[])
+    scene, rows = run("info", "box.json").rows, run("solve", "box.json").rows
+    lost = float(scene["energy"].split()[0]) - float(rows["sum of energies"].split()[0])
+    assert lost > 1
+    assert float(rows["dissipated"].split()[0]) == pytest.approx(lost, rel=1e-3)
+    assert "energy drift" not in rows
+
+
+def test_missing_folders_are_made_by_a_march_alone(run, folder):
+    words = ("box.json", "-o", "a/b/o.csv", "--state", "c/end.npz", "-q")
+    write(output={"csv": "x/o.csv"})
+    assert run("check", "box.json").code == 0
+    assert names(folder) == ["box.json"]
+    assert run("solve", *words).code == 0
+    assert names(folder) == ["a", "box.json", "c"]
+    assert (folder / "a" / "b" / "o.csv").is_file()
+
+
+def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
+    pytest.importorskip("matplotlib")
+    keys = {"pvd": "o.pvd", "csv": "o.csv", "npz": "o.npz", "picture": "o.png", "state": "end.npz"}
+    (folder / "inner").mkdir()
+    write("inner/box.json", output=keys)
+    done = run("solve", "inner/box.json")
+    assert done.code == 0
+    frames = [f"o_0000{i}.vtu" for i in range(5)]  # the start, and four states
+    assert names(folder / "inner") == sorted(["box.json", *keys.values(), *frames])
+    assert done.out.count("written") == 5
+    assert (folder / "inner" / "o.png").read_bytes()[:4] == b"\x89PNG"
+    assert np.load(folder / "inner" / "o.npz")["step"].tolist() == [0, 5, 10, 15, 20]
+    assert kl.State.load(folder / "inner" / "end.npz").step == 20
+
+
+def test_options_win_over_the_scene(run, folder):
+    write(output={"csv": "a.csv"})
+    assert run("solve", "box.json", "-o", "b.csv", "--steps", "3", "-q").out == ""
+    assert names(folder) == ["b.csv", "box.json"]
+    assert [line.split(",")[0] for line in (folder / "b.csv").read_text().splitlines()[1:]] == [
+        "0.0",
+        "0.015",
+    ]
+
+
+def test_a_restart_comes_to_the_same_end(run, folder):
+    run("solve", "box.json", "-q", "--state", "whole.npz")
+    run("solve", "box.json", "-q", "--steps", "10", "--state", "half.npz")
+    done = run("solve", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
+    assert done.rows["time"] == "0.05 … 0.1 s, 10 steps"
+    whole, end = kl.State.load("whole.npz"), kl.State.load("end.npz")
+    assert (whole.time, whole.step) == (end.time, end.step)
+    np.testing.assert_array_equal(whole.q, end.q)
+    write(restart="half.npz")
+    assert run("solve", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
+    np.testing.assert_array_equal(kl.State.load("again.npz").u, end.u)
+
+
+def test_a_restart_of_another_kind_is_refused(run, folder):
+    run("solve", "box.json", "-q", "--state", "half.npz")
+    write(body="rigid")
+    assert run("solve", "box.json", "--restart", "half.npz").refuses("state of a pseudo-rigid body")
+    assert run("solve", "box.json", "--restart", "none.npz").refuses("none.npz: there is no such file")
+
+
+def test_an_explicit_step_that_is_too_long_is_refused_before_any_output(run, folder):
+    stiff = {"kind": "pseudo-rigid", "integrator": "DEF_EXP"}
+    write(body=stiff, time={"step": 0.1, "steps": 5})
+    for command in ("solve", "check"):
+        assert run(command, "box.json").refuses("DEF_EXP is not stable", "the critical step is 0.00584 s")
+    write(body=stiff, time={"step": 0.1, "steps": 5, "substeps": "auto"})
+    assert run("solve", "box.json", "-q").code == 0
+
+
+def test_what_exists_is_kept_when_a_march_fails(run, folder):
+    with open("fails.py", "w") as file:
+        file.write(
+            "import numpy as np\nimport kratos_lite as kl\n"
+            "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1.0))\n"
+            "body.add(kl.Callback(lambda q, u, t: np.full(6, np.nan if t > 0.2 else 0.0)))\n"
+            "dt, steps = 0.1, 10\n"
+        )
+    done = run("solve", "fails.py", "-o", "a.csv", "--state", "s.npz")
+    assert done.code == 2
+    assert "error: what a callback returns at t = 0.25 s must be finite" in done.err
+    assert len((folder / "a.csv").read_text().splitlines()) == 4
+    assert kl.State.load("s.npz").step == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
+def test_ctrl_c_keeps_what_is_there(folder):
+    write(body="finite-element", time={"step": 0.001, "steps": 1_000_000})
+    words = [sys.executable, "-m", "kratos_lite", "solve", "box.json", "-o", "o.pvd", "--state", "end.npz"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not (folder / "o_00003.vtu").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "interrupted" in err
+    index = re.findall(r'file="(\S+)"', (folder / "o.pvd").read_text())
+    assert len(index) >= 4
+    assert all((folder / name).exists() for name in index)
+    step = kl.State.load("end.npz").step
+    again = subprocess.run(
+        [*words[:5], "--restart", "end.npz", "--steps", "1"], capture_output=True, text=True, check=True
+    )
+    assert f"{step / 1000:.6g} …" in again.stdout
+
+
+def test_progress_is_shown_where_asked_for(run, folder):
+    write(time={"step": 1e-4, "steps": 3000})
+    done = run("solve", "box.json", "-q", "--progress")
+    assert done.out == ""
+    assert re.search(r"\rmarch +\d+%", done.err)
+
+
+def test_check_and_info(run, folder):
+    done = run("check", "box.json")
+    assert (done.code, done.err) == (0, "")
+    assert done.out == "box.json: pseudo-rigid body, 20 steps of 0.005 s, no errors\n"
+    done = run("info", "box.json")
+    assert done.rows["file"] == "box.json"
+    assert done.rows["inertia xx, yy, zz"] == "27.2, 23.2, 10.4 kg m²"
+    assert done.rows["critical step"].startswith("0.00584 s")
+    assert done.rows["time"] == "from 0 s, 20 steps of 0.005 s"
+    write(bdoy="rigid", loads=[{"type": "gravty"}])
+    for command in ("check", "info", "solve"):
+        assert run(command, "box.json").refuses("unknown key 'bdoy'. Did you mean body", "'gravty'")
+
+
+def test_a_script_is_a_scene(run, folder):
+    with open("spin.py", "w") as file:
+        file.write(
+            "import kratos_lite as kl\n"
+            "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1000.0))\n"
+            "body.set_velocity(angular=(0, 0, 1))\n"
+            "dt, steps, every = 0.1, 10, 5\n"
+        )
+    done = run("solve", "spin.py", "-o", "spin.csv")
+    assert done.rows["body"] == "rigid, 6 velocities, RIG_NEG"
+    assert len((folder / "spin.csv").read_text().splitlines()) == 4
+    assert run("check", "spin.py").out == "spin.py: rigid body, 10 steps of 0.1 s, no errors\n"
+    assert "1000 kg" in run("info", "spin.py").out
+
+
+def test_a_script_sees_no_options_of_the_command(run, folder, monkeypatch):
+    with open("spin.py", "w") as file:
+        file.write(
+            "import sys\nimport kratos_lite as kl\n"
+            "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1000.0))\n"
+            "assert sys.argv == ['spin.py'], sys.argv\n"
+            "dt, steps = 0.1, 2\n"
+        )
+    words = ["kratos-lite", "solve", "spin.py"]
+    monkeypatch.setattr(sys, "argv", words)
+    assert run("solve", "spin.py").err == ""
+    assert sys.argv is words
+
+
+def test_many_bodies_of_a_script(run, folder):
+    with open("many.py", "w") as file:
+        file.write(
+            "import kratos_lite as kl\n"
+            "body = kl.RigidBody(mass_properties=kl.MassProperties.box([(1, 1, 1)] * 5, density=2.0))\n"
+            "body.set_velocity((1, 0, 0))\n"
+            "dt, steps = 0.1, 10\n"
+        )
+    done = run("solve", "many.py", "-o", "many.npz")
+    assert done.rows["body"] == "5 × rigid, 6 velocities, RIG_NEG"
+    assert done.rows["kinetic energy"] == "5 J"
+    assert np.load("many.npz")["q"].shape == (11, 5, 12)
+    assert run("solve", "many.py", "-o", "a.csv").refuses("a.csv: only a single body")
+
+
+def test_bad_targets_are_refused_before_the_march(run, folder):
+    write(time={"step": 1e-9, "steps": 10**9})
+    assert run("solve", "box.json", "-o", "box.json/o.pvd").refuses("the folder box.json does not exist")
+    assert run("solve", "box.json", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")
+    assert run("solve", "box.json", "-o", "o.vtu").refuses("o.vtu: states in time are written")
+    assert run("solve", "box.json", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
+    assert run("solve", "box.json", "-o", "o.npz", "--state", "o.npz").refuses("another output")
+    assert run("solve", "box.json", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
+    assert names(folder) == ["box.json"]
+
+
+def test_what_bodies_do_not_take_is_refused(run, folder):
+    assert run("convert", "box.json", "a.mdpa").refuses("describes a body; only meshes and models")
+    assert run("solve", "none.json").refuses("none.json")
+    for words in (["--fix", "z-:xyz"], ["--modes", "3"], ["--rotation", "z:1"], ["--integrator", "hht"]):
+        assert run("solve", "box.json", *words).refuses(
+            f"{words[0]} is for models; box.json describes a body"
+        )
+    assert run("solve", "box.json", "--json", "a.json").refuses("a body has no summary in .json")
+    with pytest.raises(kl.InputError, match=r"box\.json: describes a body; read it with kl\.read_case"):
+        kl.read("box.json")
+
+
+def test_time_of_a_body_is_that_of_the_option(run, folder):
+    done = run("solve", "box.json", "--time", "0.01:4:2", "-o", "a.npz")
+    assert done.rows["time"] == "0 … 0.04 s, 4 steps"
+    assert np.load("a.npz")["step"].tolist() == [0, 2, 4]
+
+
+def test_debug_shows_the_traceback(run, folder):
+    write(body="rigit")
+    with pytest.raises(kl.InputError, match="rigit"):
+        run("solve", "box.json", "--debug")
+
+
+def test_help_names_every_output(run):
+    done = run("solve", "--help")
+    assert done.code == 0
+    for word in ("-o", "-o", "-o", "--picture", "--state", "--restart", "examples:"):
+        assert word in done.out
+    assert "give them new names" in " ".join(done.out.split())
+
+
+@pytest.mark.parametrize("command", ["info", "check"])
+def test_help_of_other_commands_names_scenes(run, command):
+    text = " ".join(run(command, "--help").out.split())
+    assert "a .json file with a body, or a .py script with body, dt and steps" in text
+    assert re.search(rf"kratos-lite {command} examples/bodies/\w+\.json", text)

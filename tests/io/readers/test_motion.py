@@ -1,0 +1,246 @@
+"""Motions of the material from run files and from the command line, and tables of modes."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.cli import main
+from kratos_lite.io.files import read_case
+from kratos_lite.io.readers.motion import add_motion
+from kratos_lite.io.settings import read_settings
+
+RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return a folder, the current one, with the meshes of a wheel and of a bar."""
+    monkeypatch.chdir(tmp_path)
+    meshes = {
+        "wheel": kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)),
+        "bar": kl.box((4.0, 0.5, 0.5), cells=(8, 1, 1)),
+    }
+    for name, mesh in meshes.items():
+        mesh.parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
+        kl.write(f"{name}.mdpa", mesh)
+    return tmp_path
+
+
+def run(*words):
+    return main(["solve", *words])
+
+
+def write(folder, name="run.json", **content):
+    (folder / name).write_text(json.dumps({"material": RUBBER, **content}, indent=1))
+    return folder / name
+
+
+def wheel(**motion):
+    model = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)), kl.Isotropic3D(**RUBBER))
+    model.fix("inner")
+    model.add(kl.Pressure("outer", 1e3))
+    model.add(kl.ale.Rotation(**motion))
+    return model
+
+
+WORDS = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--pressure", "outer:1e3", "-q")
+
+
+def test_a_rotation_in_words_in_a_run_file_and_in_python_are_the_same(folder):
+    motion = {"rate": 6.0, "damping": 2.0, "acceleration": 3.0, "center": [0, 0, 0.5], "stiffening": True}
+    expected = wheel(axis="z", **motion).solve().u
+    turned = ("--rotation", "z:6:3", "--center", "0,0,0.5", "--stiffening", "--damping", "2")
+    assert run("wheel.mdpa", *WORDS, *turned, "--json", "words.json") == 0
+    path = write(
+        folder,
+        model="wheel.mdpa",
+        fix={"inner": "xyz"},
+        pressure={"outer": 1e3},
+        ale={"rotation": {"axis": "z", "skew": True, **motion}},
+        json="file.json",
+    )
+    assert run(str(path), "-q") == 0
+    for name in ("words.json", "file.json"):
+        result = json.loads((folder / name).read_text())
+        found = np.array(list(result["displacement"].values()))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+        assert result["motion"]["rate"] == 6.0
+        assert result["motion"]["acceleration"] == 3.0
+        assert 0 < result["motion"]["margin"] < 1
+
+
+def test_the_summary_tells_rate_critical_rate_and_what_the_hub_carries(folder, capsys):
+    words = [word for word in WORDS if word != "-q"]
+    assert run("wheel.mdpa", *words, "--rotation", "0,0,-1:-8") == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^rotation +-8 rad/s \(0, 0, -1\)$", out, re.M)
+    critical = r"^critical rate +\d\.\d+ rad/s, of waves about 18\.\d+ rad/s, margin -\d+\.\d%$"
+    assert re.search(critical, out, re.M)
+    assert re.search(r"^force of supports +\(.*\) N$", out, re.M)
+    assert re.search(r"^moment of supports +\(.*\) N m$", out, re.M)
+
+
+def test_a_translation_in_words_and_in_a_run_file_are_the_same(folder):
+    common = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "y-:xyz", "--traction", "y+:1e3,0,0")
+    assert (
+        run("bar.mdpa", *common, "--translation", "x:-5", "--boundaries", "fixed", "--json", "a.json", "-q")
+        == 0
+    )
+    path = write(
+        folder,
+        model="bar.mdpa",
+        fix={"y-": "xyz"},
+        traction={"y+": [1e3, 0, 0]},
+        ale={"translation": {"direction": [1, 0, 0], "rate": -5, "boundaries": "fixed"}},
+        json="b.json",
+    )
+    assert run(str(path), "-q") == 0
+    first, second = (json.loads((folder / name).read_text()) for name in ("a.json", "b.json"))
+    assert first["displacement"] == second["displacement"]
+    assert first["motion"]["kind"] == "translation"
+    ends = [first["displacement"][str(i + 1)] for i in kl.read("bar.mdpa").mesh.nodes("x+")]
+    assert np.abs(ends).max() == 0.0
+
+
+def test_the_section_stands_in_run_files_of_kratos_too(folder):
+    materials = {
+        "model_part_name": "Structure",
+        "properties_id": 1,
+        "Material": {
+            "constitutive_law": {"name": "LinearElastic3DLaw"},
+            "Variables": {"DENSITY": 1000.0, "YOUNG_MODULUS": 1e6, "POISSON_RATIO": 0.3},
+        },
+    }
+    (folder / "materials.json").write_text(json.dumps({"properties": [materials]}))
+    clamp = {
+        "python_module": "assign_vector_variable_process",
+        "Parameters": {
+            "model_part_name": "Structure.inner",
+            "variable_name": "DISPLACEMENT",
+            "value": [0.0, 0.0, 0.0],
+        },
+    }
+    content = {
+        "problem_data": {"start_time": 0.0, "end_time": 1.0},
+        "solver_settings": {
+            "solver_type": "static",
+            "model_part_name": "Structure",
+            "domain_size": 3,
+            "model_import_settings": {"input_type": "mdpa", "input_filename": "wheel"},
+            "material_import_settings": {"materials_filename": "materials.json"},
+            "time_stepping": {"time_step": 1.0},
+        },
+        "processes": {"constraints_process_list": [clamp]},
+        "ale": {"rotation": {"axis": "z", "rate": 8.0}},
+    }
+    path = folder / "ProjectParameters.json"
+    path.write_text(json.dumps(content, indent=1))
+    model = read_case(path).model
+    expected = kl.Model(model.mesh, kl.Isotropic3D(**RUBBER))
+    expected.fix("inner")
+    expected.add(kl.ale.Rotation("z", 8.0))
+    u = expected.solve().u
+    np.testing.assert_allclose(model.solve().u, u, rtol=0, atol=1e-12 * np.abs(u).max())
+    assert not any("ale" in note for note in model.notes)
+    content["ale"]["rotation"]["speed"] = 1.0
+    path.write_text(json.dumps(content, indent=1))
+    with pytest.raises(kl.InputError, match=r"json:\d+:\d+: unknown key 'ale.rotation.speed'"):
+        read_case(path)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--rotation", "z"), "expected AXIS:RATE"),
+        (("--rotation", "z:1:2:3"), "expected AXIS:RATE"),
+        (("--rotation", "w:1"), "an axis is 'x', 'y', 'z' or a vector; got 'w'"),
+        (("--rotation", "z:fast"), "--rotation: 'fast' is not a finite number"),
+        (("--rotation", "z:1", "--translation", "x:1"), "a model has one motion"),
+        (("--center", "-1,0,0"), "--center belongs to --rotation"),
+        (("--stiffening", "--translation", "x:1"), "--stiffening belongs to --rotation"),
+        (("--boundaries", "fixed"), "--boundaries belongs to --translation"),
+        (("--rotation", "x:1"), "not one of revolution about the axis"),
+        (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
+        (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number ≥ 0, in 1/s; got -2.0"),
+        (("--damping", "2"), "--damping belongs to --rotation or --translation"),
+        (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
+    ],
+)
+def test_options_that_are_wrong_end_in_one_line(folder, capsys, words, message):
+    assert run("wheel.mdpa", *WORDS, *words) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("ale", "message"),
+    [
+        ({}, "one of 'rotation' and 'translation' is needed"),
+        ({"rotation": {"rate": 1}, "translation": {"rate": 1}}, "one of 'rotation' and 'translation'"),
+        ({"rotation": {"rat": 1}}, "unknown key 'ale.rotation.rat'"),
+        ({"rotation": {"axis": "z"}}, "key 'ale.rotation.rate' is missing"),
+        ({"rotation": {"rate": "1"}}, "ale.rotation.rate must be a number"),
+        ({"rotation": {"rate": 1, "axis": [0, 0]}}, "ale.rotation.axis must be a list of three numbers"),
+        ({"rotation": {"rate": 1, "axis": "q"}}, "ale.rotation: an axis is 'x', 'y', 'z'"),
+        ({"rotation": {"rate": 1, "axis": "x"}}, "ale.rotation: the body is not one of revolution"),
+        ({"rotation": {"rate": 1, "skew": 1}}, "ale.rotation.skew must be true or false"),
+        ({"rotation": {"rate": 1, "damping": -1}}, "ale.rotation: a damping must be"),
+        ({"rotation": {"rate": {"times": [0, 0], "values": [1, 2]}}}, "ale.rotation.rate: times of a series"),
+        (
+            {"translation": {"rate": 1, "boundaries": "open"}},
+            "ale.translation: boundaries must be one of",
+        ),
+    ],
+)
+def test_a_wrong_section_is_refused_with_its_line(folder, ale, message):
+    path = write(folder, model="wheel.mdpa", fix={"inner": "xyz"}, ale=ale)
+    with pytest.raises(kl.KratosLiteError, match=r"run\.json:\d+:\d+") as caught:
+        read_case(path)
+    assert message in str(caught.value)
+
+
+def test_a_rate_may_be_a_table(folder):
+    table = {"times": [0, 2], "values": [0, 10]}
+    path = write(folder, model="wheel.mdpa", ale={"rotation": {"rate": table, "acceleration": 5}})
+    motion = read_case(path).model.motion
+    assert motion.rate(1.0) == 5.0
+    assert motion.acceleration(1.0) == 5.0
+    assert not motion.steady
+
+
+def test_a_rate_table_is_taken_at_the_time_of_the_solution(folder):
+    """Kratos run files are solved at their end; a rate that is still changing then is taken as it is."""
+    table = {"times": [0.0, 1.0], "values": [0.0, 8.0]}
+    settings = {"ale": {"rotation": {"axis": "z", "rate": table}}}
+    path = folder / "frozen.json"
+    path.write_text(json.dumps(settings))
+    motions = []
+    for time in (None, 1.0, 0.5):
+        model = kl.Model(kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)), kl.Isotropic3D(**RUBBER))
+        add_motion(model, read_settings(path), time)
+        motions.append((model.motion.rate(0.0), model.motion.acceleration(0.0)))
+    assert motions == [(0.0, 8.0), (8.0, 0.0), (4.0, 0.0)]
+
+
+def test_modes_are_those_of_python(folder, capsys):
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "inner:xyz", "--modes", "4")
+    assert run("wheel.mdpa", *held) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert rows[0] == ["mode", "frequency", "Hz", "rad/s"]
+    model = kl.Model(kl.read("wheel.mdpa").mesh, kl.Isotropic3D(**RUBBER))
+    model.fix("inner")
+    omega, _ = model.modes(4)
+    found = np.array([[float(word) for word in row[1:]] for row in rows[1:]])
+    np.testing.assert_allclose(found[:, 1], omega, rtol=1e-7)
+    np.testing.assert_allclose(found[:, 0] * 2 * np.pi, omega, rtol=1e-7)
+    assert run("wheel.mdpa", *held, "--rotation", "z:5") == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    model.add(kl.ale.Rotation("z", rate=5.0))
+    values = np.array([value for value in model.complex_modes(8)[0] if value.imag > 0])
+    assert len(values) == 4 == len(rows) - 1
+    found = np.array([[float(word) for word in row[1:]] for row in rows[1:]])
+    assert rows[0][-2:] == ["growth", "1/s"]
+    np.testing.assert_allclose(np.sort(found[:, 1]), np.sort(values.imag), rtol=1e-6)
+    assert np.abs(found[:, 2]).max() < 1e-6 * np.abs(values).max()
