@@ -183,13 +183,15 @@ def _targets(options: Namespace, given: dict[str, str], read: list[Path]) -> dic
 
 def _write(result: Result, targets: dict[str, str], options: Namespace) -> None:
     """Write the files and say so."""
+    from kratos_lite.io.writers.results import write_result
+
     for key, path in targets.items():
         if key == "picture":
             from kratos_lite.io.writers.pictures import draw
 
             draw(path, result)
         else:
-            result.save(path, options.vtu if key == "output" else None)
+            write_result(path, result, options.vtu if key == "output" else None)
         if not options.quiet:
             print(f"{'written':<22}{path}")
 

@@ -144,7 +144,9 @@ def run_march(scene: Scene, targets: dict[str, str], options: Namespace, progres
         _draw(targets["picture"], scene, course.last)
     end = transient.result(course.last)
     if "json" in targets:
-        end.save(targets["json"])
+        from kratos_lite.io.writers.results import write_result
+
+        write_result(targets["json"], end)
     lines = [] if options.quiet else [*course.summary(scene, seconds), *_written(targets)]
     return lines + scene.evaluate(end)
 
