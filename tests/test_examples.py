@@ -134,8 +134,8 @@ def test_a_thrown_box_falls_and_tumbles_the_same_whatever_its_kind(kind, tmp_pat
 
 
 def test_the_scene_of_the_box_is_its_script():
-    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "tumbling_box.json")
-    strain = number(r"internal energy +(\S+) J", run(*march))
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "tumbling_box.json")
+    strain = number(r"internal energy +(\S+) J", run(*solve))
     script = run(sys.executable, BODIES / "tumbling_box.py")
     assert strain == pytest.approx(number(r"strain energy (\S+) J", script), abs=1e-3)
 
@@ -149,8 +149,8 @@ def test_the_top_nutates_as_elliptic_integrals_say():
 
 
 def test_the_pendulum_is_back_after_its_period(tmp_path):
-    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "pendulum.json", "--csv", "p.csv")
-    out = run(*march, cwd=tmp_path)
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "pendulum.json", "-o", "p.csv")
+    out = run(*solve, cwd=tmp_path)
     rows = [list(map(float, row.split(","))) for row in (tmp_path / "p.csv").read_text().splitlines()[1:]]
     assert rows[-1][6:9] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
     assert all(abs(x * x + z * z - 1) < 1e-12 for *_, x, _, z in (row[:9] for row in rows))
@@ -158,8 +158,8 @@ def test_the_pendulum_is_back_after_its_period(tmp_path):
 
 
 def test_a_scene_in_python_is_marched(tmp_path):
-    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "thrown_box.py", "--csv", "out/box.csv")
-    out = run(*march, cwd=tmp_path)
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "thrown_box.py", "-o", "out/box.csv")
+    out = run(*solve, cwd=tmp_path)
     rows = [
         list(map(float, row.split(","))) for row in (tmp_path / "out/box.csv").read_text().splitlines()[1:]
     ]
@@ -199,15 +199,14 @@ def test_the_scene_of_the_guide_is_sound(tmp_path):
     page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
     (scene,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
     (tmp_path / "scene.json").write_text(scene)
-    run(sys.executable, "-m", "kratos_lite", "march", tmp_path / "scene.json", "-q")
+    run(sys.executable, "-m", "kratos_lite", "solve", tmp_path / "scene.json", "-q")
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 12
     assert len(list(tmp_path.glob("out_*.vtu"))) == 11
 
 
 def test_the_guide_names_every_type_and_key():
-    from kratos_lite.io.scenes.actions import CONSTRAINTS, LOADS
-    from kratos_lite.io.scenes.reader import KEYS, MESHES, OPTIONS
-    from kratos_lite.io.scenes.scene import OUTPUTS
+    from kratos_lite.io.readers.body_file import KEYS, MESHES, OPTIONS, OUTPUTS
+    from kratos_lite.io.readers.body_loads import CONSTRAINTS, LOADS
 
     page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
     table = page[page.index("| key | value |") :]
@@ -219,8 +218,8 @@ def test_the_guide_names_every_type_and_key():
 
 
 def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
-    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "soft_box.json", "--npz", "s.npz", "-q")
-    subprocess.run(march, cwd=tmp_path, check=True)
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "soft_box.json", "-o", "s.npz", "-q")
+    subprocess.run(solve, cwd=tmp_path, check=True)
     with np.load(tmp_path / "s.npz") as file:
         F = file["q"][:, :9].reshape(-1, 3, 3)
     stretch = np.linalg.svd(F, compute_uv=False)
@@ -231,8 +230,8 @@ def test_soft_box_is_pulled_wide_by_its_spin(tmp_path):
 
 
 def test_turntable_moves_as_it_is_told(tmp_path):
-    march = (sys.executable, "-m", "kratos_lite", "march", BODIES / "turntable.json", "--npz", "t.npz", "-q")
-    subprocess.run(march, cwd=tmp_path, check=True)
+    solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "turntable.json", "-o", "t.npz", "-q")
+    subprocess.run(solve, cwd=tmp_path, check=True)
     with np.load(tmp_path / "t.npz") as file:
         end = file["q"][-1]
     np.testing.assert_allclose(end[:9], [0, 1, 0, -1, 0, 0, 0, 0, 1], atol=1e-12)

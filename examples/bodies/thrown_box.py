@@ -1,6 +1,6 @@
 # A scene for the command line: a script that defines body, dt, steps and, if wanted, every.
 #
-#     kratos-lite march examples/bodies/thrown_box.py --picture out/thrown_box.png
+#     kratos-lite solve examples/bodies/thrown_box.py --picture out/thrown_box.png
 #
 # Python can do what JSON cannot: this box is slowed by drag in a wind.
 

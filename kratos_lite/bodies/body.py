@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from kratos_lite.bodies.constraints import Constraint
+from kratos_lite.bodies.constraints.base import Constraint
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad, apply_load
 from kratos_lite.bodies.validation import Material

@@ -1,4 +1,4 @@
-"""The command line: ``kratos-lite solve | march | info | check | convert | bench``."""
+"""The command line: ``kratos-lite solve | info | check | convert | bench``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import atexit
 import gc
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
 from kratos_lite import __version__
 
@@ -18,18 +20,33 @@ EXIT_CODES = """exit codes:
   0    done
   1    a defect of kratos-lite
   2    bad input, or an output that cannot be written
-  3    solved, but a check of the run file failed
+  3    solved, but an expected value of the run file is missed
   130  interrupted with Ctrl-C"""
-
-
-def _help(prog: str) -> argparse.HelpFormatter:
-    """Return a formatter as wide as the terminal; argparse would import shutil to find the width."""
-    width = os.environ.get("COLUMNS", "")
-    try:
-        columns = int(width) if width.isdigit() else os.get_terminal_size().columns
-    except (OSError, ValueError):
-        columns = 0
-    return argparse.RawDescriptionHelpFormatter(prog, width=(columns or 80) - 2)
+MODEL = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
+BODY = "a .json file with a body, or a .py script with body, dt and steps"
+EXAMPLES = {
+    "solve": """kratos-lite solve cube.mdpa -o cube.vtu
+  kratos-lite solve ProjectParameters.json --json result.json
+  kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
+  kratos-lite solve bridge.mdpa --modes 10
+  kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
+  kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
+  kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
+  kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
+      --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
+    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
+    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+    "  kratos-lite check my_element.py",
+    "convert": "kratos-lite convert beam.elem beam.mdpa\n  kratos-lite convert beam.mdpa beam.vtu",
+}
+INTEGRATORS = (
+    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or "
+    "central_difference (newmark, the trapezoidal rule)"
+)
+RESTART = (
+    "go on from a state that --state wrote; series and picture then hold the rest of the run only, and "
+    "replace those of the same name, so give them new names"
+)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -38,32 +55,19 @@ def build_parser() -> argparse.ArgumentParser:
         prog="kratos-lite",
         description="Finite elements for solids: from an input file to displacements and stresses.",
         epilog=EXIT_CODES,
-        formatter_class=_help,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_solve(commands)
-    _add_march(commands)
-    _add(
-        commands,
-        "info",
-        "describe a file without solving it, or a scene of a body without marching it",
-        "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
-    ).add_argument("input", help=f"{INPUT}; or {SCENE}")
-    _add(
-        commands,
-        "check",
-        "report every problem of a file or scene, or of the elements and materials in a Python file",
-        "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
-        "  kratos-lite check my_element.py",
-    ).add_argument("input", help=f"an input file; {SCENE}; or a .py file that defines elements or materials")
-    convert = _add(
-        commands,
-        "convert",
-        "convert a model file to another format",
-        "kratos-lite convert beam.elem beam.mdpa\n  kratos-lite convert beam.mdpa beam.vtu",
+    info = _add(commands, "info", "describe a file without solving it")
+    info.add_argument("input", help=f"{MODEL}; or {BODY}")
+    check = _add(
+        commands, "check", "report every problem of a file, or of the elements and materials in a Python file"
     )
-    convert.add_argument("input", help=INPUT)
+    check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
+    convert = _add(commands, "convert", "convert a model file to another format")
+    convert.add_argument("input", help=MODEL)
     convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, by its ending")
     # All its words, also --help, are for the program that it runs.
     bench = commands.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
@@ -71,40 +75,16 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-INPUT = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
-SCENE = "a scene: a .json file with a body, or a .py script with body, dt and steps"
-SOLVE_EXAMPLES = """kratos-lite solve cube.mdpa -o cube.vtu
-  kratos-lite solve ProjectParameters.json --json result.json
-  kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
-  kratos-lite solve bridge.mdpa --modes 10
-  kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --march 1e-3:500:10 -o swing.pvd
-  kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
-      --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png"""
-
-
-SCHEMES = (
-    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or "
-    "central_difference (newmark, the trapezoidal rule)"
-)
-RESTART = (
-    "go on from a state that --state wrote; series and picture then hold the rest of the march only, and "
-    "replace those of the same name, so give them new names"
-)
-MARCH_EXAMPLES = """kratos-lite march examples/bodies/tumbling_box.json
-  kratos-lite march box.json --pvd out/box.pvd --csv out/box.csv --picture out/box.png
-  kratos-lite march box.json --steps 500 --csv first.csv --state half.npz
-  kratos-lite march box.json --steps 500 --csv second.csv --restart half.npz"""
-
-
-def _add(commands: object, name: str, text: str, example: str) -> argparse.ArgumentParser:
-    add = commands.add_parser  # type: ignore[attr-defined]
-    command: argparse.ArgumentParser = add(
+def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
+    command: argparse.ArgumentParser = commands.add_parser(
         name,
         help=text,
         description=text[0].upper() + text[1:] + ".",
-        epilog=f"examples:\n  {example}",
-        formatter_class=_help,
+        epilog=f"examples:\n  {EXAMPLES[name]}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    # "-1,0,0" and "-z:30" are values, not options
+    command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
     command.add_argument(
         "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
     )
@@ -112,36 +92,40 @@ def _add(commands: object, name: str, text: str, example: str) -> argparse.Argum
     return command
 
 
-def _add_solve(commands: object) -> None:
-    solve = _add(
-        commands, "solve", "solve a linear model, at rest or in time, and print a summary", SOLVE_EXAMPLES
-    )
-    solve.add_argument("input", help=INPUT)
-    out = solve.add_argument_group("output")
+def _add_solve(commands: Any) -> None:
+    solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
+    solve.add_argument("input", help=f"{MODEL}; or {BODY}")
+    out = solve.add_argument_group("output (instead of the files that the input names)")
     out.add_argument(
         "-o",
         "--output",
-        metavar="OUT.vtu",
-        help="results for ParaView (or .vtk, .json); of a march .pvd, .csv or .npz",
+        metavar="OUT",
+        action="append",
+        default=[],
+        help="at rest .vtu for ParaView, .vtk or .json; in time .pvd for ParaView, .csv or .npz; may be "
+        "given several times",
     )
-    out.add_argument("--json", metavar="OUT.json", help="summary, displacements and reactions by node id")
+    _add_options(
+        out,
+        ("--json", "OUT.json", "summary, displacements and reactions by node id"),
+        ("--picture", "OUT.png", "picture of the deformed model, or of a body along its path"),
+        ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
+    )
     out.add_argument(
         "--vtu",
         choices=("binary", "compressed", "ascii"),
-        help="how a .vtu output stores its numbers: quickest, smallest, or to be read by eye (binary)",
+        help="how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)",
     )
-    out.add_argument("--picture", metavar="OUT.png", help="picture of the deformed body")
     given = solve.add_argument_group(
         "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
     )
-    repeat = {"action": "append", "default": []}
-    given.add_argument(
-        "--material",
-        metavar="[PART:][LAW:]E=…,nu=…",
-        help="constants in SI units; replaces the materials of the file",
-        **repeat,  # type: ignore[arg-type]
-    )
-    for option, meta, text in (
+    _add_options(
+        given,
+        (
+            "--material",
+            "[PART:][LAW:]E=…,nu=…",
+            "constants in SI units; replaces the materials of the file",
+        ),
         (
             "--fix",
             "PART:xyz[=VALUE]",
@@ -151,8 +135,9 @@ def _add_solve(commands: object) -> None:
         ("--traction", "PART:X,Y,Z", "force per area in Pa"),
         ("--pressure", "PART:P", "pressure in Pa, positive into the body"),
         ("--point-load", "PART:X,Y,Z", "force in N on each node of the part"),
-    ):
-        given.add_argument(option, metavar=meta, help=text, **repeat)  # type: ignore[arg-type]
+        action="append",
+        default=[],
+    )
     _add_motion(solve)
     _add_time(solve)
     how = solve.add_argument_group("solver")
@@ -160,72 +145,56 @@ def _add_solve(commands: object) -> None:
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
+    how.add_argument(
+        "--progress", action="store_true", help="show the share done, also where not on a terminal"
+    )
+    how.add_argument("-v", "--verbose", action="store_true", help="say also what the solution did without")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:
+    for option, meta, text in options:
+        group.add_argument(option, metavar=meta, help=text, **settings)
 
 
 def _add_motion(solve: argparse.ArgumentParser) -> None:
     ale = solve.add_argument_group("motion of the material through the mesh (one at most; docs/ale.md)")
-    ale.add_argument(
-        "--rotation", metavar="AXIS:RATE[:ACCELERATION]", help="about x, y, z or X,Y,Z, in rad/s and rad/s²"
+    _add_options(
+        ale,
+        ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
+        ("--center", "X,Y,Z", "a point of the axis in m (0,0,0)"),
+        ("--translation", "AXIS:RATE[:ACCELERATION]", "of the moving frame, in m/s and m/s²"),
+        ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
     )
-    ale.add_argument("--center", "--center", metavar="X,Y,Z", help="a point of the axis in m (0,0,0)")
     ale.add_argument(
         "--stiffening", action="store_true", help="add the stiffness that the centrifugal stress gives"
     )
     ale.add_argument(
-        "--translation", metavar="AXIS:RATE[:ACCELERATION]", help="of the window, in m/s and m/s²"
-    )
-    ale.add_argument(
         "--boundaries",
         choices=("absorbing", "periodic", "fixed", "natural"),
-        help="what the cut faces of the window do (absorbing)",
+        help="what the cut faces of the moving frame do (absorbing)",
     )
-    ale.add_argument("--damping", metavar="ALPHA", help="by mass, relative to the motion, in 1/s (0)")
 
 
 def _add_time(solve: argparse.ArgumentParser) -> None:
-    time = solve.add_argument_group("motion in time, instead of rest (docs/dynamics.md)")
-    time.add_argument(
-        "--march", metavar="STEP:STEPS[:EVERY]", help="step in s, their number, and every how many is kept"
+    time = solve.add_argument_group("time integration (docs/dynamics.md, docs/bodies.md)")
+    _add_options(
+        time,
+        ("--time", "STEP:STEPS[:EVERY]", "step in s, their number, and every how many is kept"),
+        ("--restart", "STATE.npz", RESTART),
+        ("--integrator", "NAME[:NUMBERS]", f"of models: {INTEGRATORS}"),
+        ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K of models, in 1/s and s"),
     )
-    for option, meta, text in (
-        ("--scheme", "NAME[:NUMBERS]", SCHEMES),
-        ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K, in 1/s and s"),
-        ("--restart", "MOMENT.npz", "go on from a moment that --state wrote"),
-        ("--state", "OUT.npz", "the last moment, for --restart; written after Ctrl-C too"),
-    ):
-        time.add_argument(option, metavar=meta, help=text)
-    time.add_argument("--lumped", action="store_true", help="mass in the nodes")
-
-
-def _add_march(commands: object) -> None:
-    march = _add(commands, "march", "let a body move through time and print a summary", MARCH_EXAMPLES)
-    march.add_argument("input", metavar="SCENE", help=SCENE)
-    out = march.add_argument_group("output (instead of the files that the scene names)")
-    for key, text in (
-        ("pvd", "states for ParaView: an index, and OUT_00000.vtu … beside it"),
-        ("csv", "a table of energies, momenta and the mass center"),
-        ("npz", "configurations and velocities of all states as arrays"),
-        ("picture", "the body along its path, and its energies"),
-        ("state", "the last state, for --restart; written after Ctrl-C too"),
-    ):
-        ending = {"picture": "png", "state": "npz"}.get(key, key)
-        out.add_argument(f"--{key}", metavar=f"OUT.{ending}", help=text)
-    how = march.add_argument_group("march")
-    how.add_argument("--steps", type=int, metavar="N", help="number of steps, instead of that of the scene")
-    how.add_argument("--restart", metavar="STATE.npz", help=RESTART)
-    how.add_argument(
-        "--progress", action="store_true", help="show the share done, also where not on a terminal"
-    )
-    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
-    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+    time.add_argument("--steps", type=int, metavar="N", help="number of steps, instead of that of the file")
+    time.add_argument("--lumped", action="store_true", help="mass of models in the nodes")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code, one of `EXIT_CODES`."""
     atexit.register(gc.freeze)  # at its end Python would look through all objects for garbage, for 15 ms
     _escape_unknown_characters()
-    words = _join_negative(sys.argv[1:] if arguments is None else arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    debug = "--debug" in words
     try:
         return _run(words)
     except KeyboardInterrupt:
@@ -234,20 +203,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _discard_output()
         return 0
-    except OSError as error:
-        if "--debug" in words:
-            raise
-        _discard_output()
-        print(f"error: {error.filename or 'the output'}: {error.strerror or error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
-    except MemoryError:
-        if "--debug" in words:
-            raise
-        print("error: not enough memory; use a coarser mesh or --solver amg", file=sys.stderr)
-        return EXIT_BAD_INPUT
     except Exception as error:
-        if "--debug" in words:
+        if debug:
             raise
+        if isinstance(error, OSError):
+            _discard_output()
+            print(f"error: {error.filename or 'the output'}: {error.strerror or error}", file=sys.stderr)
+            return EXIT_BAD_INPUT
+        if isinstance(error, MemoryError):
+            print("error: not enough memory; use a coarser mesh or --solver amg", file=sys.stderr)
+            return EXIT_BAD_INPUT
         print(
             f"internal error: {type(error).__name__}: {error}\n"
             "This is a defect of kratos-lite; please report it with the output of --debug.",
@@ -291,15 +256,3 @@ def _discard_output() -> None:
     """Send what is still to be printed nowhere, so that Python does not fail on it at its end."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _join_negative(arguments: Sequence[str]) -> list[str]:
-    """Join ``--gravity -9.81,0,0`` and the like to one word, which argparse would take for another option."""
-    numeric = ("--gravity", "--center", "--center", "--rotation", "--translation", "--rayleigh", "--march")
-    joined: list[str] = []
-    for word in arguments:
-        if joined and joined[-1] in numeric and word[:1] == "-":
-            joined[-1] += "=" + word
-        else:
-            joined.append(word)
-    return joined

@@ -1,25 +1,130 @@
-"""Options of the command line that describe a model: materials, supports and loads in words."""
+"""Options of the command line: what they add to the case of an input."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from math import isfinite
+from typing import Any
 
-from kratos_lite.errors import InputError
+from kratos_lite.ale import Motion, Rotation, Translation
+from kratos_lite.analysis.model import Model
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.case import Case, Outputs, TimeIntegration
+from kratos_lite.io.files import read_case
+from kratos_lite.io.readers.time import integrator_of
+from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
+from kratos_lite.validation import whole_number
 
-if TYPE_CHECKING:
-    from kratos_lite.ale import Motion
-    from kratos_lite.analysis.model import Model
-    from kratos_lite.materials import LinearMaterial
+OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
+"""Options that need a time integration."""
+OF_MODELS = (
+    *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
+    *("rotation", "translation", "damping", "integrator", "rayleigh", "lumped"),
+)
+"""Options that bodies do not have."""
 
-MARCHING = ("scheme", "rayleigh", "lumped", "restart", "state")
-"""Options that say how a model marches."""
+
+def case_of(options: Namespace) -> Case:
+    """Return the case of an input and the options of the command line, which win where there is one value."""
+    materials = [material(text) for text in options.material]
+    everywhere = any(part is None for part, _ in materials)
+    case = read_case(options.input, materials=not everywhere, strict=not options.lenient)
+    if case.is_of_model:
+        apply(case.model, options, materials)
+        if options.solver:
+            case.solver = options.solver
+        if options.tolerance is not None:
+            case.tolerance = options.tolerance
+    else:
+        _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
+    case.time = _time(options, case.time)
+    _set_outputs(case.outputs, options)
+    if options.modes is not None:
+        _take_modes(case, options)
+    return case
+
+
+def _refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
+    """Raise InputError for the first of some options that is given."""
+    for name in names:
+        if getattr(options, name) not in (None, False, []):
+            raise InputError(f"--{name.replace('_', '-')} {why}")
+
+
+def _take_modes(case: Case, options: Namespace) -> None:
+    """Ask a case for natural frequencies, whatever its file says of time and outputs."""
+    if options.time is not None:
+        raise InputError("--modes and --time: give one of them")
+    if options.output or options.json or options.picture or options.state:
+        raise InputError("--modes prints a table; it writes no files")
+    case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
+
+
+def _set_outputs(outputs: Outputs, options: Namespace) -> None:
+    """Let the files of the options take the place of those of the input."""
+    for name in ("json", "picture", "state"):
+        if (path := getattr(options, name)) is not None:
+            setattr(outputs, name, path)
+    outputs.results, outputs.mode = options.output or outputs.results, options.vtu
+
+
+def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
+    """Return the time integration that the options and a file ask for."""
+    time = given
+    if options.time is not None:
+        step, steps, every = _steps(options.time)
+        time = (
+            replace(given, step=step, steps=steps, every=every, place="")
+            if given
+            else TimeIntegration(step, steps, every)
+        )
+    if time is None:
+        _refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
+        return None
+    _refuse(options, ("solver", "tolerance"), "is for statics; time integration chooses its own solver")
+    changes: dict[str, Any] = {}
+    if options.steps is not None:
+        changes["steps"] = whole_number(options.steps, "--steps")
+    if options.integrator:
+        name, _, words = options.integrator.partition(":")
+        changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
+    if options.rayleigh:
+        changes["rayleigh"] = _rayleigh(options.rayleigh)
+    if options.lumped:
+        changes["lumped"] = True
+    if options.restart:
+        changes["restart"] = options.restart
+    return replace(time, **changes)
+
+
+def _steps(text: str) -> tuple[float, int, int]:
+    """Return step, number of steps and every how many a state is kept of ``STEP:STEPS[:EVERY]``.
+
+    >>> _steps("1e-3:200:10")
+    (0.001, 200, 10)
+    """
+    step, *counts = text.split(":")
+    if len(counts) not in (1, 2) or not all(count.isdecimal() for count in counts):
+        raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
+    steps, every = (int(count) for count in (*counts, "1")[:2])
+    return number(step, "--time"), steps, every
+
+
+def _numbers(text: str, option: str) -> list[float]:
+    return [number(word, option) for word in text.split(",")] if text else []
+
+
+def _rayleigh(text: str) -> tuple[float, float]:
+    values = _numbers(text, "--rayleigh")
+    if len(values) != 2 or min(values) < 0:
+        raise InputError(f"--rayleigh: ALPHA,BETA, both ≥ 0, in 1/s and s are needed; got {text!r}")
+    return values[0], values[1]
 
 
 def number(text: str, option: str) -> float:
     """Return a finite number or say which option holds what instead."""
-    from math import isfinite
-
     try:
         value = float(text) if "_" not in text else float("nan")
     except ValueError:
@@ -55,9 +160,6 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
     >>> material("steel:E=210e9,nu=0.3")
     ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
     """
-    from kratos_lite.errors import nearest
-    from kratos_lite.materials import MATERIALS
-
     option = f"--material {text}"
     *names, constants = text.split(":")
     part, law = None, "Isotropic3D"
@@ -88,9 +190,6 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
 
 def _where(model: Model, part: str | None) -> str | int | None:
     """Return what a word before the constants of a material means: a part, a property id, or all."""
-    from kratos_lite.errors import nearest
-    from kratos_lite.materials import MATERIALS
-
     if part is None or part in model.mesh.parts or (part[1:] in ("+", "-") and part[0] in "xyz"):
         return part
     if part.isdecimal():
@@ -102,8 +201,6 @@ def _where(model: Model, part: str | None) -> str | int | None:
 
 def motion(model: Model, options: Namespace) -> Motion | None:
     """Return the motion of the material that the options give, or None."""
-    from kratos_lite.ale import Rotation, Translation
-
     turns, passes = options.rotation, options.translation
     if (turns or passes) and model.motion is not None:
         raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
@@ -140,12 +237,10 @@ def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
     return vector(axis, option) if "," in axis else axis, rate, acceleration
 
 
-def apply(model: Model, options: Namespace) -> None:
-    """Add the materials, supports and loads of the command line to a model."""
-    from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
-
-    given = [material(text) for text in options.material]
-    for part, law in sorted(given, key=lambda pair: pair[0] is not None):  # the special wins over the general
+def apply(model: Model, options: Namespace, materials: list[tuple[str | None, LinearMaterial]]) -> None:
+    """Add the materials, supports, loads and motion of the command line to a model."""
+    # the special wins over the general
+    for part, law in sorted(materials, key=lambda pair: pair[0] is not None):
         model.assign(law, _where(model, part))
     for text in options.fix:
         part, rest = split_part(text, "--fix", "PART:axes or PART:axes=value")
@@ -166,20 +261,3 @@ def apply(model: Model, options: Namespace) -> None:
         model.add(PointLoad(part, vector(rest, "--point-load")))
     if (given_motion := motion(model, options)) is not None:
         model.add(given_motion)
-
-
-def marches(options: Namespace) -> bool:
-    """Whether a march is asked for by the options or by a run file."""
-    from kratos_lite.io.documents import ending
-
-    if options.march is not None:
-        return True
-    if ending(options.input) == ".json":
-        from kratos_lite.io.project import is_in_time
-
-        if is_in_time(options.input):
-            return True
-    for name in MARCHING:
-        if getattr(options, name):
-            raise InputError(f"--{name} belongs to a march; add --march STEP:STEPS")
-    return False

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
+from kratos_lite.io.case import Case
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
 from kratos_lite.io.kratos import model_from
-from kratos_lite.io.scene import Scene
+from kratos_lite.io.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
@@ -32,16 +33,60 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     InputError
         With file, line and cure of everything that is wrong.
     """
-    return load(path, materials=materials, strict=strict).model
+    case = read_case(path, materials=materials, strict=strict)
+    if not case.is_of_model:
+        raise InputError(f"{path}: describes a body; read it with kl.read_case")
+    return case.model
 
 
-def load(path: str | Path, *, materials: bool = True, strict: bool = True) -> Scene:
-    """Return the model that a file describes, and what a run file says beyond it; see `read`."""
+def read_case(
+    path: str | Path, *, materials: bool = True, strict: bool = True, allow_outside: bool = False
+) -> Case:
+    """Return what an input means: model or body, analysis, outputs and expected values.
+
+    Parameters
+    ----------
+    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; or a Python
+        script that defines `body`, `dt` and `steps`.
+    materials : take the materials from a model file; False leaves them to the caller.
+    strict : refuse `.mdpa` rows that do not stand on lines of their own.
+    allow_outside : let a .json file name files outside its folder.
+
+    Returns
+    -------
+    Case
+        To be changed, or run by `kratos_lite.run`.
+
+    Raises
+    ------
+    InputError, MeshError, ModelError, MaterialError
+        With file, line and cure of everything that is wrong.
+    """
+    path = Path(path)
     if ending(path) == ".json":
-        from kratos_lite.io.project import read_project
+        return _case_of_json(read_settings(path), strict, allow_outside)
+    if ending(path) == ".py":
+        from kratos_lite.io.readers.script import read_script
 
-        return read_project(path)
-    return Scene(model_from(read_document(path, strict=strict), materials=materials))
+        return read_script(path)
+    return Case(model_from(read_document(path, strict=strict), materials=materials), files=[path])
+
+
+def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
+    """Return the case of a JSON file; the reader is chosen by its keys."""
+    if "solver_settings" in settings or "problem_data" in settings:
+        from kratos_lite.io.kratos.run_file import read_kratos_project
+
+        return read_kratos_project(settings, Path(settings.source).parent, outside)
+    if "properties" in settings and "model" not in settings:
+        raise settings.error("properties", "this is a materials file; read the run file that names it")
+    if ("body" in settings or "mesh" in settings) and "model" not in settings:
+        from kratos_lite.io.readers.body_file import read_body_file
+
+        return read_body_file(settings, strict=strict)
+    from kratos_lite.io.readers.run_file import read_run_file
+
+    return read_run_file(settings, strict=strict, allow_outside=outside)
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:

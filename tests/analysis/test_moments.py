@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.writers.moments import MOMENT_COLUMNS
+from kratos_lite.io.writers.recorded import OF_MODELS as MOMENT_COLUMNS
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.cli import commands, main
+from kratos_lite.cli import commands, main, progress
 from kratos_lite.native import threads
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -426,9 +426,9 @@ WRONG_OPTIONS = {
     "output is a folder": ([*HELD, "-o", "sub.vtu"], "sub.vtu: cannot be written: it is a folder"),
     "output twice": (
         [*HELD, "-o", "out.json", "--json", "./out.json"],
-        "./out.json: is the input or another output",
+        "./out.json: is an input or another output",
     ),
-    "output is the input": ([*HELD, "-o", "box.vtu"], "box.vtu: is the input or another output already"),
+    "output is the input": ([*HELD, "-o", "box.vtu"], "box.vtu: is an input or another output"),
     "no name": ([*HELD, "-o", ""], "an output has an empty name"),
     "mesh format": (
         [*HELD, "-o", "out.inp"],
@@ -518,9 +518,7 @@ def test_a_run_file_overwrites_nothing_that_is_read_and_names_no_useless_format(
     Path("run.json").write_text(json.dumps(SELF[name]))
     before = fingerprints()
     assert run("solve", "run.json").refuses(
-        "results cannot be written as '.inp'"
-        if name == "format"
-        else "is the input or another output already"
+        "results cannot be written as '.inp'" if name == "format" else "is an input or another output"
     )
     assert fingerprints() == before
 
@@ -528,23 +526,19 @@ def test_a_run_file_overwrites_nothing_that_is_read_and_names_no_useless_format(
 def test_no_file_that_is_read_is_overwritten(run, box):
     kl.write("set.elem", held(box))
     Path("run.json").write_text('{"model": "box.vtu"}')
-    Path("of_set.json").write_text('{"model": "set"}')
-    Path("kratos.json").write_text(
-        '{"solver_settings": {"model_import_settings": {"input_filename": "box"},'
-        ' "material_import_settings": {"materials_filename": "mat.json"}}}'
-    )
-    Path("mat.json").write_text("{}")
+    Path("of_set.json").write_text('{"model": "set.elem"}')
+    shutil.copytree(EXAMPLES / "cantilever", ".", dirs_exist_ok=True)
     before = fingerprints()
     for words in (
         ("convert", "set.elem", "set.node"),
         ("convert", "set", "set.init"),
         ("convert", "set.cond", "./set.elem"),
         ("convert", "of_set.json", "set.prop"),
-        ("convert", "kratos.json", "box.mdpa"),
+        ("convert", "ProjectParameters.json", "cantilever.mdpa"),
         ("solve", "run.json", "-o", "box.vtu"),
-        ("solve", "kratos.json", "--json", "mat.json"),
+        ("solve", "ProjectParameters.json", "--json", "StructuralMaterials.json"),
     ):
-        assert run(*words).refuses("is the input or another output already")
+        assert run(*words).refuses("is an input or another output")
         assert fingerprints() == before
 
 
@@ -602,10 +596,10 @@ def test_a_file_that_fails_loses_no_summary(run, box, monkeypatch):
 
 
 def test_a_terminal_that_fails_loses_no_file(box, monkeypatch):
-    def closed(*_):
+    def closed(*_, **__):
         raise BrokenPipeError
 
-    monkeypatch.setattr(kl.Result, "__str__", closed)
+    monkeypatch.setattr(kl.Outcome, "summary", closed)
     assert main(["solve", "box.vtu", *HELD, "--json", "out.json", "--gravity", "0,0,-9.81"]) == 0
     assert len(displacement("out.json")) == 27
 
@@ -869,11 +863,11 @@ def shown(monkeypatch, is_terminal, calls):
     """Return what is shown of calls (second, phase, share)."""
     screen, now = Terminal(is_terminal), [0.0]
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(commands, "perf_counter", lambda: now[0])
-    progress = commands.TerminalProgress()
+    monkeypatch.setattr(progress, "perf_counter", lambda: now[0])
+    shown_progress = progress.TerminalProgress()
     for now[0], phase, share in calls:
-        progress(phase, share)
-    progress.close()
+        shown_progress(phase, share)
+    shown_progress.close()
     return screen.getvalue()
 
 

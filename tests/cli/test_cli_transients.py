@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.files import load
+from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
 
 MATERIAL = {"E": 3e10, "nu": 0.2, "density": 2500.0}
 TIME = {"step": 1e-3, "steps": 20, "every": 5}
@@ -78,12 +79,12 @@ def assert_same(path, moments):
 )
 def test_words_file_and_python_march_alike(run, folder, word, value, scheme):
     expected = marched(tower(), scheme=scheme, rayleigh=(0.5, 1e-5), lumped=True)
-    options = ("--scheme", word, "--rayleigh", "0.5,1e-5", "--lumped")
-    done = run("solve", "tower.mdpa", *WORDS, "--march", "1e-3:20:5", *options, "-o", "words.npz")
+    options = ("--integrator", word, "--rayleigh", "0.5,1e-5", "--lumped")
+    done = run("solve", "tower.mdpa", *WORDS, "--time", "1e-3:20:5", *options, "-o", "words.npz")
     assert (done.code, done.err) == (0, "")
     assert_same("words.npz", expected)
     write(
-        time={**TIME, "scheme": value, "rayleigh": [0.5, 1e-5], "lumped": True},
+        time={**TIME, "integrator": value, "rayleigh": [0.5, 1e-5], "lumped": True},
         output="file.npz",
         json="a.json",
     )
@@ -94,20 +95,20 @@ def test_words_file_and_python_march_alike(run, folder, word, value, scheme):
 
 
 def test_central_differences(run, folder):
-    write(time={"step": 1e-5, "steps": 30, "every": 30, "scheme": "central_difference"}, output="end.npz")
+    write(time={"step": 1e-5, "steps": 30, "every": 30, "integrator": "central_difference"}, output="end.npz")
     done = run("solve", "run.json")
-    assert done.rows["scheme"] == "central_difference, lumped mass"
+    assert done.rows["integrator"] == "central_difference, lumped mass"
     transient = tower().transient(scheme=kl.CentralDifference())
     assert_same("end.npz", [transient.moment(), *transient.march(1e-5, 30, every=30)])
-    write(time={**TIME, "scheme": "central_difference"})
+    write(time={**TIME, "integrator": "central_difference"})
     assert run("solve", "run.json").refuses("central differences are not stable", "the critical step is")
 
 
 def test_options_win_over_the_file(run, folder):
-    write(time={**TIME, "scheme": "hht", "rayleigh": [9.0, 0.0]}, output="file.npz")
-    words = ("--march", "2e-3:4:2", "--scheme", "bossak", "--rayleigh", "0,1e-6", "-o", "words.npz")
+    write(time={**TIME, "integrator": "hht", "rayleigh": [9.0, 0.0]}, output="file.npz")
+    words = ("--time", "2e-3:4:2", "--integrator", "bossak", "--rayleigh", "0,1e-6", "-o", "words.npz")
     done = run("solve", "run.json", *words)
-    assert done.rows["scheme"] == "bossak(-0.3)"
+    assert done.rows["integrator"] == "bossak(-0.3)"
     assert done.rows["damping"] == "0 1/s × M + 1e-06 s × K"
     transient = tower().transient(scheme=kl.bossak(), rayleigh=(0.0, 1e-6))
     assert_same("words.npz", [transient.moment(), *transient.march(2e-3, 4, every=2)])
@@ -117,9 +118,9 @@ def test_options_win_over_the_file(run, folder):
 def test_loads_and_supports_that_change(run, folder):
     write(
         fix={"z-": {"x": {"times": [0, 0.01], "values": [0, 1e-3]}, "y": 0, "z": 0}},
-        traction={"z+": {"value": [1e5, 0, 0], "times": [0, 0.01], "factors": [0, 1]}},
-        pressure={"x-": {"value": 10.0, "times": [0, 1], "factors": [1, 2]}},
-        gravity={"value": [0, 0, -9.81], "times": [0.0], "factors": [0.5]},
+        traction={"z+": {"value": [1e5, 0, 0], "amplitude": {"times": [0, 0.01], "values": [0, 1]}}},
+        pressure={"x-": {"value": 10.0, "amplitude": {"times": [0, 1], "values": [1, 2]}}},
+        gravity={"value": [0, 0, -9.81], "amplitude": 0.5},
         output="file.npz",
     )
     assert run("solve", "run.json").code == 0
@@ -136,11 +137,11 @@ def test_loads_and_supports_that_change(run, folder):
 
 
 def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
-    table = {"value": [1e5, 0, 0], "times": [0, 1], "factors": [0.5, 1]}
+    table = {"value": [1e5, 0, 0], "amplitude": {"times": [0, 1], "values": [0.5, 1]}}
     write(traction={"z+": table}, time=None, json="a.json")
-    assert "what changes with the time is that at t = 0" in run("solve", "run.json").rows["note"] + str(
-        json.loads((folder / "a.json").read_text())["notes"]
-    )
+    assert "loads and supports that change in time are those at t = 0" in run("solve", "run.json").rows[
+        "note"
+    ] + str(json.loads((folder / "a.json").read_text())["notes"])
     result = tower(kl.Traction("z+", (5e4, 0.0, 0.0))).solve()
     found = np.array(list(json.loads((folder / "a.json").read_text())["displacement"].values()))
     np.testing.assert_allclose(found, result.u, rtol=0, atol=1e-10 * np.abs(result.u).max())
@@ -149,27 +150,26 @@ def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
 def test_a_restart_goes_on_bit_by_bit(run, folder):
     write()
     run("solve", "run.json", "-o", "whole.npz")
-    assert run("solve", "run.json", "--march", "1e-3:10", "--state", "half.npz").code == 0
-    assert run("solve", "run.json", "--march", "1e-3:10:5", "--restart", "half.npz", "-o", "b.npz").code == 0
+    assert run("solve", "run.json", "--time", "1e-3:10", "--state", "half.npz").code == 0
+    assert run("solve", "run.json", "--time", "1e-3:10:5", "--restart", "half.npz", "-o", "b.npz").code == 0
     write("again.json", time={"step": 1e-3, "steps": 10, "every": 5, "restart": "half.npz"}, output="c.npz")
     assert run("solve", "again.json").code == 0
-    assert run("solve", "again.json", "--state", "half.npz").refuses("is the input or another output already")
+    assert run("solve", "again.json", "--state", "half.npz").refuses("is an input or another output")
     with np.load("whole.npz") as whole, np.load("b.npz") as b, np.load("c.npz") as c:
         for name in ("time", "step", "u", "v", "a"):
             assert np.array_equal(whole[name][2:], b[name])
             assert np.array_equal(whole[name][2:], c[name])
 
 
-def test_the_scene_gives_the_transient(folder):
-    write(time={**TIME, "scheme": "hht"})
-    scene = load("run.json")
-    assert str(scene.march) == "20 steps of 0.001 s by hht(-0.05)"
-    transient = scene.transient()
-    end = list(scene.moments(transient))[-1]
+def test_the_case_gives_the_transient(folder):
+    write(time={**TIME, "integrator": "hht"})
+    case = read_case("run.json")
+    assert str(case.time) == "20 steps of 0.001 s by hht(-0.05)"
+    *_, end = prepare(case)[1]
     assert np.array_equal(end.u, marched(tower(), scheme=kl.hht())[-1].u)
     write(time=None)
-    with pytest.raises(kl.ModelError, match="says nothing of a march"):
-        load("run.json").transient()
+    with pytest.raises(kl.ModelError, match="not in time; give its file a section 'time'"):
+        prepare(read_case("run.json"))
 
 
 # ---- outputs -------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ def test_a_summary_with_the_numbers(run, folder):
     assert rows["nodes"] == "28"
     assert rows["elements"].startswith("6 ")
     assert rows["unknowns"] == "72"
-    assert rows["scheme"] == "newmark(0.25, 0.5)"
+    assert rows["integrator"] == "newmark(0.25, 0.5)"
     assert rows["time"] == "0 … 0.02 s, 20 steps of 0.001 s"
     node = model.mesh.node_ids[size.argmax()]
     assert rows["largest displacement"] == (
@@ -222,24 +222,24 @@ def test_frames_table_and_picture(run, folder):
 
 
 def test_info_and_check_know_the_march(run, folder):
-    write(time={**TIME, "scheme": "bossak"})
+    write(time={**TIME, "integrator": "bossak"})
     assert "time        20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out
     done = run("check", "run.json")
     assert done.code == 0
     assert "run.json: 28 nodes, 6 elements, 20 steps of 0.001 s by bossak(-0.3), no errors" in done.out
     write(material={"E": 3e10, "nu": 0.2})
-    assert "to march Isotropic3D has density 0" in run("check", "run.json").out
-    write(time={**TIME, "scheme": "central_difference"})
+    assert "to solve Isotropic3D has density 0" in run("check", "run.json").out
+    write(time={**TIME, "integrator": "central_difference"})
     assert run("check", "run.json").refuses("the critical step is")
     write(fix=None)
-    assert "to march" not in run("check", "run.json").out  # inertia holds it
+    assert "to solve" not in run("check", "run.json").out  # inertia holds it
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
 def test_ctrl_c_keeps_the_series_and_the_state(folder):
     write(time={"step": 1e-5, "steps": 10_000_000, "every": 1}, output="t.csv")
     code = "import sys; from kratos_lite.cli import main; sys.exit(main(sys.argv[1:]))"
-    words = [sys.executable, "-c", code, "solve", "run.json", "--march", "1e-5:10000000", "-o", "out/t.pvd"]
+    words = [sys.executable, "-c", code, "solve", "run.json", "--time", "1e-5:10000000", "-o", "out/t.pvd"]
     process = subprocess.Popen([*words, "--state", "s.npz"], stderr=subprocess.PIPE, text=True)
     clock = time.monotonic()
     while not (folder / "out" / "t_00003.vtu").exists() and time.monotonic() - clock < 60:
@@ -266,12 +266,20 @@ def test_ctrl_c_keeps_the_series_and_the_state(folder):
         ({**TIME, "steps": 0}, "steps", "time.steps: steps must be a whole number ≥ 1; got 0"),
         ({**TIME, "steps": 1.5}, "steps", "time.steps must be an integer; got 1.5"),
         ({**TIME, "every": -1}, "every", "time.every: every must be a whole number ≥ 1; got -1"),
-        ({**TIME, "scheme": "nemark"}, "scheme", "unknown scheme 'nemark'. Did you mean newmark?"),
-        ({**TIME, "scheme": {"hht": 0.5}}, "scheme", "the α of HHT lies in -1/3 … 0; got 0.5"),
-        ({**TIME, "scheme": {"bossak": -0.5}}, "scheme", "the α of Bossak lies in -1/3 … 0; got -0.5"),
-        ({**TIME, "scheme": {"newmark": 0.5}}, "scheme", "newmark takes 0 or 2 numbers; got 1"),
-        ({**TIME, "scheme": {"hht": "a"}}, "scheme", "must be a name such as"),
-        ({**TIME, "scheme": 3}, "scheme", "must be a name such as"),
+        (
+            {**TIME, "integrator": "nemark"},
+            "integrator",
+            "unknown integrator 'nemark'. Did you mean",
+        ),
+        ({**TIME, "integrator": {"hht": 0.5}}, "integrator", "the α of HHT lies in -1/3 … 0; got 0.5"),
+        (
+            {**TIME, "integrator": {"bossak": -0.5}},
+            "integrator",
+            "the α of Bossak lies in -1/3 … 0; got",
+        ),
+        ({**TIME, "integrator": {"newmark": 0.5}}, "integrator", "newmark takes 0 or 2 numbers; got 1"),
+        ({**TIME, "integrator": {"hht": "a"}}, "integrator", "must be a name such as"),
+        ({**TIME, "integrator": 3}, "integrator", "must be a name such as"),
         ({**TIME, "rayleigh": [1.0]}, "rayleigh", "must be [α, β], both ≥ 0"),
         ({**TIME, "rayleigh": [-1.0, 0]}, "rayleigh", "must be [α, β], both ≥ 0"),
         ({**TIME, "lumped": 1}, "lumped", "time.lumped must be true or false; got 1"),
@@ -293,17 +301,17 @@ def test_a_wrong_section_is_told_with_its_place(run, folder, section, place, tex
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"output": "a.vtu"}, "output: a.vtu: a march is written as .pvd"),
-        ({"traction": {"z+": {"value": [1, 0, 0], "times": [0]}}}, "key 'traction.z+.factors' is missing"),
+        ({"output": "a.vtu"}, "output: a.vtu: states in time are written as .pvd"),
+        ({"traction": {"z+": {"value": [1, 0, 0]}}}, "key 'traction.z+.amplitude' is missing"),
         (
-            {"traction": {"z+": {"value": [1, 0, 0], "times": [0], "factors": [1], "x": 1}}},
+            {"traction": {"z+": {"value": [1, 0, 0], "amplitude": 1, "x": 1}}},
             "unknown key 'traction.z+.x'",
         ),
         (
-            {"traction": {"z+": {"value": [1, 0, 0], "times": [1, 0], "factors": [1, 2]}}},
+            {"traction": {"z+": {"value": [1, 0, 0], "amplitude": {"times": [1, 0], "values": [1, 2]}}}},
             "times of a series must ascend",
         ),
-        ({"gravity": {"value": 9.81, "times": [0], "factors": [1]}}, "gravity.value must be a list of three"),
+        ({"gravity": {"value": 9.81, "amplitude": 1}}, "gravity.value must be a list of three"),
         ({"fix": {"z-": {"x": {"times": [0, 1], "values": [0]}}}}, "as many values as times"),
         ({"fix": {"z-": {"x": {"time": [0, 1]}}}}, "unknown key 'fix.z-.x.time'"),
     ],
@@ -318,31 +326,31 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
 @pytest.mark.parametrize(
     ("words", "fragments"),
     [
-        (("--march", "1e-3"), ("--march: expected STEP:STEPS[:EVERY]",)),
-        (("--march", "1e-3:2.5"), ("--march: expected",)),
-        (("--march", "1e-3:0"), ("steps must be a whole number ≥ 1",)),
-        (("--march", "x:3"), ("--march: 'x' is not a finite number",)),
-        (("--march", "-1:3"), ("a step must be one number > 0, in s",)),
-        (("--march", "1:3", "--scheme", "euler"), ("unknown scheme 'euler'", "Known are newmark")),
-        (("--march", "1:3", "--scheme", "hht:a"), ("--scheme: 'a' is not a finite number",)),
-        (("--march", "1:3", "--scheme", "hht:1,2"), ("hht takes 0 or 1 numbers; got 2",)),
-        (("--march", "1:3", "--rayleigh", "1"), ("--rayleigh: ALPHA,BETA",)),
-        (("--march", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: ALPHA,BETA",)),
-        (("--march", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
-        (("--march", "1:3", "--modes", "2"), ("--modes and --march: give one of them",)),
-        (("--march", "1:3", "--solver", "amg"), ("--solver and --tolerance are for statics",)),
-        (("--march", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
-        (("--march", "1:3", "-o", "a.vtu"), ("a march is written as .pvd", "-o OUT.pvd")),
-        (("--march", "1:3", "--vtu", "ascii", "-o", "a.csv"), ("add -o OUT.pvd",)),
-        (("--march", "1:3", "--state", "a.csv"), ("the ending of --state must be .npz",)),
-        (("--march", "1:3", "-o", "tower.mdpa"), ("is the input or another output already",)),
-        (("--march", "1:3", "-o", "a.npz", "--state", "a.npz"), ("is the input or another output already",)),
-        (("-o", "a.pvd"), ("a.pvd: that is for a march; add --march STEP:STEPS, or write .vtu",)),
-        (("-o", "a.csv"), ("a.csv: that is for a march",)),
+        (("--time", "1e-3"), ("--time: expected STEP:STEPS[:EVERY]",)),
+        (("--time", "1e-3:2.5"), ("--time: expected",)),
+        (("--time", "1e-3:0"), ("steps must be a whole number ≥ 1",)),
+        (("--time", "x:3"), ("--time: 'x' is not a finite number",)),
+        (("--time", "-1:3"), ("a step must be one number > 0, in s",)),
+        (("--time", "1:3", "--integrator", "euler"), ("unknown integrator 'euler'", "Known are newmark")),
+        (("--time", "1:3", "--integrator", "hht:a"), ("--integrator: 'a' is not a finite number",)),
+        (("--time", "1:3", "--integrator", "hht:1,2"), ("hht takes 0 or 1 numbers; got 2",)),
+        (("--time", "1:3", "--rayleigh", "1"), ("--rayleigh: ALPHA,BETA",)),
+        (("--time", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: ALPHA,BETA",)),
+        (("--time", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
+        (("--time", "1:3", "--modes", "2"), ("--modes and --time: give one of them",)),
+        (("--time", "1:3", "--solver", "amg"), ("--solver is for statics",)),
+        (("--time", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
+        (("--time", "1:3", "-o", "a.vtu"), ("states in time are written as .pvd",)),
+        (("--time", "1:3", "--vtu", "ascii", "-o", "a.csv"), ("add -o OUT.pvd",)),
+        (("--time", "1:3", "--state", "a.csv"), ("a.csv: the ending must be .npz",)),
+        (("--time", "1:3", "-o", "tower.mdpa"), ("is an input or another output",)),
+        (("--time", "1:3", "-o", "a.npz", "--state", "a.npz"), ("is an input or another output",)),
+        (("-o", "a.pvd"), ("a.pvd: .pvd holds states in time; add --time STEP:STEPS, or write .vtu",)),
+        (("-o", "a.csv"), ("a.csv: .csv holds states in time",)),
         *(
-            ((f"--{name}", *value), (f"--{name} belongs to a march; add --march STEP:STEPS",))
+            ((f"--{name}", *value), (f"--{name} belongs to a time integration; add --time STEP:STEPS",))
             for name, value in (
-                ("scheme", ["hht"]),
+                ("integrator", ["hht"]),
                 ("rayleigh", ["0,1"]),
                 ("lumped", []),
                 ("restart", ["a.npz"]),
@@ -366,7 +374,7 @@ def test_modes_of_a_file_that_marches_are_those_of_its_model(run, folder):
 
 def test_what_is_doubtful_is_told(run, folder):
     """Supports that jump at the start, and bodies that nothing but inertia holds."""
-    held = ("--material", "E=1e6,nu=0.3,density=1000", "--march", "1e-3:3")
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--time", "1e-3:3")
     told = run("solve", "tower.mdpa", *held, "--fix", "z-:xyz", "--fix", "z+:x=0.01").out
     assert "supports are displaced by 0.01 m at the start of a model at rest" in told
     told = run("solve", "tower.mdpa", *held, "--traction", "z+:1e3,0,0").out

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.project import is_in_time, read_project
+from kratos_lite.io.files import read_case
+from kratos_lite.io.run import prepare
 from kratos_lite.model.loads import ScaledLoad
 
 TO_NODES = "assign_scalar_variable_process"
@@ -69,7 +70,7 @@ def write(tmp_path, monkeypatch):
 
 
 def moments(scene):
-    return list(scene.moments(scene.transient()))
+    return list(prepare(scene)[1])
 
 
 def same(found, expected):
@@ -87,18 +88,17 @@ def by_hand(load=None, **options):
 
 
 def test_the_scheme_damping_and_steps(write):
-    scene = read_project(write(*CLAMP, rayleigh_alpha=0.5, rayleigh_beta=1e-4))
-    assert str(scene.march) == "20 steps of 0.01 s by bossak(-0.3)"
-    assert scene.march.rayleigh == (0.5, 1e-4)
-    assert is_in_time("run.json")
-    assert scene.transient().equations.rayleigh == (0.5, 1e-4)
-    newmark = read_project(write(*CLAMP, scheme_type="newmark", damp_factor_m=-0.1))
-    assert str(newmark.march) == "20 steps of 0.01 s by newmark(0.25, 0.5)"
-    assert str(read_project(write(*CLAMP, damp_factor_m=-0.1)).march).endswith("bossak(-0.1)")
+    scene = read_case(write(*CLAMP, rayleigh_alpha=0.5, rayleigh_beta=1e-4))
+    assert str(scene.time) == "20 steps of 0.01 s by bossak(-0.3)"
+    assert scene.time.rayleigh == (0.5, 1e-4)
+    assert prepare(scene)[0].equations.rayleigh == (0.5, 1e-4)
+    newmark = read_case(write(*CLAMP, scheme_type="newmark", damp_factor_m=-0.1))
+    assert str(newmark.time) == "20 steps of 0.01 s by newmark(0.25, 0.5)"
+    assert str(read_case(write(*CLAMP, damp_factor_m=-0.1)).time).endswith("bossak(-0.1)")
 
 
 def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
-    scene = read_project(
+    scene = read_case(
         write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", "-9.81*(1+Z)"), ("Top", "SURFACE_LOAD_X", 1e4))
     )
     assert [type(load).__name__ for load in scene.model.loads] == ["ScaledLoad", "ScaledLoad"]
@@ -117,7 +117,7 @@ def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
 
 def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     write(*CLAMP, ("Top", "SURFACE_LOAD_X", "1e5*t", {"interval": [0.0, 0.055]}))
-    scene = read_project("run.json")
+    scene = read_case("run.json")
     (load,) = scene.model.loads
     forces = [load.at(t) for t in (0.0, 0.01, 0.05, 0.06, 0.2)]
     assert forces[0] is None
@@ -130,7 +130,7 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
 
 
 def test_gravity_stays_assembled_while_another_load_changes(write):
-    scene = read_project(
+    scene = read_case(
         write(*CLAMP, ("Structure", "VOLUME_ACCELERATION_Z", -9.81), ("Top", "SURFACE_LOAD_X", "t"))
     )
     assert [type(load).__name__ for load in scene.model.loads] == ["ScaledLoad", "TimeDependentLoad"]
@@ -138,7 +138,7 @@ def test_gravity_stays_assembled_while_another_load_changes(write):
 
 def test_supports_that_move_with_t(write):
     moved = [("Bottom", "DISPLACEMENT_X", "0.01*t^2"), *CLAMP[1:]]
-    scene = read_project(write(*moved))
+    scene = read_case(write(*moved))
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom", "x", lambda t: 0.01 * t * t)
     model.fix("Bottom", "yz")
@@ -148,27 +148,27 @@ def test_supports_that_move_with_t(write):
 
 
 def test_a_constant_support_replaces_a_moving_one_that_comes_before(write):
-    scene = read_project(write(("Bottom", "DISPLACEMENT_X", "t"), *CLAMP))
+    scene = read_case(write(("Bottom", "DISPLACEMENT_X", "t"), *CLAMP))
     assert not scene.model.supports.motions
-    scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "t")))
+    scene = read_case(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "t")))
     assert len(scene.model.supports.motions) == 1
 
 
 def test_a_start_on_a_support_leaves_its_movement(write):
     pulled = ("Structure", "DISPLACEMENT_X", "0.01*Z", {"interval": [0.0, 0.0], "constrained": False})
-    scene = read_project(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
+    scene = read_case(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
     assert len(scene.model.supports.motions) == 1
     end = moments(scene)[-1]
     bottom = scene.model.mesh.nodes("Bottom")
     np.testing.assert_allclose(end.u[bottom, 0], 0.01 * end.time, rtol=1e-12)
-    assert scene.march.displacement[:, 0].max() == 0.02
+    assert scene.time.displacement[:, 0].max() == 0.02
 
 
 @pytest.mark.parametrize("value", ["t", 0.01])
 def test_a_support_that_changes_for_a_while_is_refused(write, value):
     path = write(*CLAMP, ("Bottom", "DISPLACEMENT_X", value, {"interval": [0.05, 0.1], "constrained": False}))
     with pytest.raises(kl.InputError, match=r"run\.json:\d+:\d+: .* changes in a part of the run"):
-        read_project(path)
+        read_case(path)
 
 
 def test_a_kratos_file_with_the_key_of_ours_is_no_march(write, run):
@@ -176,14 +176,14 @@ def test_a_kratos_file_with_the_key_of_ours_is_no_march(write, run):
     content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
     content["solver_settings"]["solver_type"] = "static"
     path.write_text(json.dumps(content))
-    assert not is_in_time(path)
+    assert read_case(path).time is None
     assert "key 'time' is not used" in run("solve", path).out
 
 
 def test_nodal_data_of_the_mesh_file_is_the_start(write):
     rows = "".join(f"{i} 0 {i * 0.01}\n" for i in range(1, 21))
-    scene = read_project(write(*CLAMP, data=f"Begin NodalData VELOCITY_X\n{rows}End NodalData\n"))
-    velocity = scene.march.velocity
+    scene = read_case(write(*CLAMP, data=f"Begin NodalData VELOCITY_X\n{rows}End NodalData\n"))
+    velocity = scene.time.velocity
     assert velocity[:, 0].tolist() == pytest.approx([i * 0.01 for i in range(1, 21)])
     told = [note for note in scene.model.notes if "VELOCITY" in note]
     assert told == ["VELOCITY of fixed nodes is left out; Kratos keeps it in the first step"]
@@ -193,14 +193,14 @@ def test_nodal_data_of_the_mesh_file_is_the_start(write):
 def test_a_velocity_that_the_mesh_file_fixes_is_refused(write):
     path = write(*CLAMP, data="Begin NodalData VELOCITY_X\n1 1 0.0\nEnd NodalData\n")
     with pytest.raises(kl.InputError, match=r"mesh\.mdpa: VELOCITY_X is fixed; only DISPLACEMENT can be"):
-        read_project(path)
+        read_case(path)
 
 
 def test_options_change_a_dynamic_run_file(write, run):
     write(*CLAMP, ("Top", "SURFACE_LOAD_X", "1e5*t"))
-    words = ("--march", "5e-3:40:40", "--scheme", "newmark", "-o", "end.npz")
+    words = ("--time", "5e-3:40:40", "--integrator", "newmark", "-o", "end.npz")
     done = run("solve", "run.json", *words)
-    assert done.rows["scheme"] == "newmark(0.25, 0.5)"
+    assert done.rows["integrator"] == "newmark(0.25, 0.5)"
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom")
     model.add(kl.Traction("Top", (1e5, 0.0, 0.0)), amplitude=lambda t: t)
@@ -214,7 +214,7 @@ def test_options_change_a_dynamic_run_file(write, run):
 @pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
 def test_checks_compare_the_end_of_the_march(write, run, value, word, code):
     push = ("Top", "SURFACE_LOAD_X", "1e5*t")
-    end = moments(read_project(write(*CLAMP, push)))[-1]
+    end = moments(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh
     found = float(end.u[mesh.nodes("Top"), 0].mean())
     check = {

@@ -12,7 +12,8 @@ from scenes import case, present
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
-from kratos_lite.io.project import read_project
+from kratos_lite.io.case import Outputs
+from kratos_lite.io.files import read_case
 
 N = 3
 """Nodes along each side of the box."""
@@ -144,7 +145,7 @@ def write(folder, content, name="ProjectParameters.json"):
 
 
 def solved(folder, content):
-    return read_project(write(folder, content)).model.solve()
+    return read_case(write(folder, content)).model.solve()
 
 
 def by_hand(top=(0.0, 0.0, 0.0), gravity=(0.0, 0.0, 0.0)):
@@ -285,7 +286,7 @@ def test_the_same_folder_runs_in_kratos_and_here(folder, content):
     )
     assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-2000:]
     expected = json.loads((folder / "kratos.json").read_text())
-    project = read_project(path)
+    project = read_case(path)
     result = project.model.solve()
     for name, found in (("DISPLACEMENT", result.displacement()), ("REACTION", result.reaction())):
         reference = np.array([expected[name][str(i)] for i in result.mesh.node_ids])
@@ -304,10 +305,8 @@ def test_the_same_folder_runs_in_kratos_and_here(folder, content):
                 "relative_tolerance": 1e-8,
             },
         }
-        lines = read_project(
-            write(folder, content | {"processes": {**content["processes"], "checks": [check]}})
-        )
-        assert [line.split()[4] for line in lines.evaluate(result)] == ["passed"] * 4
+        lines = read_case(write(folder, content | {"processes": {**content["processes"], "checks": [check]}}))
+        assert [line.split()[4] for line in lines.compare(result)] == ["passed"] * 4
 
 
 def test_nodal_point_load_acts_once_where_faces_share_the_node(folder):
@@ -332,8 +331,8 @@ def test_nodal_point_load_acts_once_where_faces_share_the_node(folder):
     ],
 )
 def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expected):
-    project = read_project(case(name) / "ProjectParameters.json")
-    (line,) = project.evaluate(project.model.solve())
+    project = read_case(case(name) / "ProjectParameters.json")
+    (line,) = project.compare(project.model.solve())
     assert line.startswith(f"check {component} on {part}")
     assert (
         f"passed (node {line.split('node ')[1].split(':')[0]}: found {expected:g}, expected {expected:g}"
@@ -346,7 +345,7 @@ def test_2019_folder_runs_and_its_own_check_passes(name, part, component, expect
 
 def test_cantilever_beam_runs_as_kratos_computed_it(shared):
     folder = shared / "cases" / "response_cantilever_beam_8N"
-    project = read_project(folder / "adjoint_max_stress_primal_parameters.json")
+    project = read_case(folder / "adjoint_max_stress_primal_parameters.json")
     found = project.model.solve()
     hand = kl.Model(project.model.mesh, kl.Isotropic3D(E=206.9e9, nu=0.29, density=7850.0))
     hand.fix("DISPLACEMENT_support", "xyz")
@@ -360,19 +359,19 @@ def test_a_law_that_is_not_linear_is_refused_by_name_and_part(folder):
     body = body | {"Material": body["Material"] | {"constitutive_law": law}}
     (folder / "materials.json").write_text(json.dumps({"properties": [body]}))
     with pytest.raises(InputError, match=r"materials.json:\d+:\d+: part Structure.Body: 'SmallStrainIso"):
-        read_project(write(folder, run_file([CLAMP], [])))
+        read_case(write(folder, run_file([CLAMP], [])))
 
 
 def test_a_solver_of_eigenvalues_is_refused(folder):
     content = run_file([CLAMP], [], solver_type="eigen_value", eigensolver_settings={"solver_type": "feast"})
     with pytest.raises(InputError, match="solver_type 'eigen_value': run files are solved as"):
-        read_project(write(folder, content))
+        read_case(write(folder, content))
 
 
 def test_a_run_without_supports_and_with_unknown_settings_is_read_and_refused_when_solved(folder):
     content = run_file([], []) | {"rve_settings": {"perturbation": 1e-6}}
     del content["processes"]
-    project = read_project(write(folder, content))
+    project = read_case(write(folder, content))
     assert "key 'rve_settings' is not used" in project.model.notes
     with pytest.raises(ModelError, match="rigid motions"):
         project.model.solve()
@@ -382,16 +381,16 @@ def test_plastic_law_is_refused_by_name_and_part(shared):
     with pytest.raises(
         InputError, match=r"StructuralMaterials.json:\d+:\d+: part Parts_Central: 'SmallStrainIso"
     ):
-        read_project(shared / "cases" / "tensile_hexahedra" / "ProjectParameters.json")
+        read_case(shared / "cases" / "tensile_hexahedra" / "ProjectParameters.json")
 
 
 def test_eigenvalue_run_is_refused(shared):
     with pytest.raises(InputError, match="solver_type 'eigen_value': run files are solved as"):
-        read_project(shared / "cases" / "eigen_cube_8N" / "Eigen_TL_3D8N_Cube_test_parameters.json")
+        read_case(shared / "cases" / "eigen_cube_8N" / "Eigen_TL_3D8N_Cube_test_parameters.json")
 
 
 def test_run_without_supports_is_read_and_refused_when_solved(shared):
-    project = read_project(shared / "cases" / "rve_4N_pressure" / "smallest_rve_test_parameters.json")
+    project = read_case(shared / "cases" / "rve_4N_pressure" / "smallest_rve_test_parameters.json")
     assert "key 'rve_settings' is not used" in project.model.notes
     with pytest.raises(ModelError, match="rigid motions"):
         project.model.solve()
@@ -415,13 +414,13 @@ def test_run_without_supports_is_read_and_refused_when_solved(shared):
 def test_malformed_run_file_is_refused_with_the_problem(malformed, name, words):
     (path,) = malformed.glob(f"{name}_*.json")
     with pytest.raises(InputError) as caught:
-        read_project(path)
+        read_case(path)
     assert words in str(caught.value)
     assert str(caught.value).startswith(f"{path}:1:")
 
 
 def test_small_good_run_file_is_read(malformed):
-    project = read_project(malformed / "60_good.json")
+    project = read_case(malformed / "60_good.json")
     assert project.solver == "direct"
     assert project.model.mesh.n_elements == 1
 
@@ -453,14 +452,14 @@ def test_null_leaves_a_component_and_constrained_false_leaves_it_free(folder):
         "assign_vector_variable_process", "Structure.Top", "DISPLACEMENT", value=[None, 0.001, 0.002]
     )
     value["Parameters"]["constrained"] = [True, False, True]
-    model = read_project(write(folder, run_file([CLAMP, value], []))).model
+    model = read_case(write(folder, run_file([CLAMP, value], []))).model
     top = model.mesh.part("Top").nodes
     np.testing.assert_array_equal(model.supports.fixed[top], [[False, False, True]] * len(top))
     np.testing.assert_array_equal(model.supports.values[top, 2], 0.002)
 
 
 def test_a_process_outside_its_interval_does_nothing_and_is_noted(folder):
-    project = read_project(write(folder, run_file([CLAMP], [GRAVITY, push(1e9, interval=[5.0, 6.0])])))
+    project = read_case(write(folder, run_file([CLAMP], [GRAVITY, push(1e9, interval=[5.0, 6.0])])))
     assert "processes.loads_process_list[1]: SURFACE_LOAD_X is never set: its interval holds no step" in (
         project.model.notes
     )
@@ -478,14 +477,14 @@ def test_material_variables_that_are_not_used_are_noted(folder):
     materials = json.loads(json.dumps(MATERIALS))
     materials["properties"][0]["Material"]["Variables"]["YIELD_STRESS"] = 1e6
     write(folder, materials, "materials.json")
-    project = read_project(write(folder, run_file([CLAMP], [GRAVITY])))
+    project = read_case(write(folder, run_file([CLAMP], [GRAVITY])))
     assert "Properties 1: YIELD_STRESS not used by a static solution of solids" in project.model.notes
 
 
 def test_unknown_settings_are_noted_and_outputs_are_not_run(folder):
     vtk = {"python_module": "vtk_output_process", "Parameters": {}}
     content = run_file([CLAMP], [GRAVITY], outputs={"vtk": [vtk]}, shiny_setting=3)
-    notes = read_project(write(folder, content)).model.notes
+    notes = read_case(write(folder, content)).model.notes
     assert any(note.startswith("solver setting 'shiny_setting' is not used.") for note in notes)
     assert "linear solver skyline_lu_factorization: kratos_lite chooses its own" in notes
     assert any(note.startswith("output_processes.vtk[0]: vtk_output_process is not run") for note in notes)
@@ -511,8 +510,8 @@ def check(**settings):
     ],
 )
 def test_expected_values_are_compared_as_kratos_does(folder, settings, words):
-    project = read_project(write(folder, run_file([CLAMP], [GRAVITY], checks=[check(**settings)])))
-    (line,) = project.evaluate(project.model.solve())
+    project = read_case(write(folder, run_file([CLAMP], [GRAVITY], checks=[check(**settings)])))
+    (line,) = project.compare(project.model.solve())
     assert line.startswith("check ")
     assert words in line
 
@@ -522,8 +521,8 @@ def test_expected_values_of_a_missing_file_are_reported(folder):
         "python_module": "from_json_check_result_process",
         "Parameters": {"input_file_name": "none.json", "model_part_name": "Structure"},
     }
-    project = read_project(write(folder, run_file([CLAMP], [GRAVITY], checks=[entry])))
-    (line,) = project.evaluate(project.model.solve())
+    project = read_case(write(folder, run_file([CLAMP], [GRAVITY], checks=[entry])))
+    (line,) = project.compare(project.model.solve())
     assert line.startswith("check against none.json not evaluated: ")
 
 
@@ -566,8 +565,8 @@ def test_expected_values_of_a_file_are_compared_at_the_last_time(folder, content
     (folder / "box.mdpa").write_text(box_mdpa() + parts)
     write(folder, content, "reference.json")
     entry = file_check(**{"check_variables": ["DISPLACEMENT_X"], **settings})
-    project = read_project(write(folder, run_file([CLAMP], [GRAVITY], checks=[entry])))
-    (line,) = project.evaluate(project.model.solve())
+    project = read_case(write(folder, run_file([CLAMP], [GRAVITY], checks=[entry])))
+    (line,) = project.compare(project.model.solve())
     assert words in line
 
 
@@ -583,15 +582,15 @@ def test_expected_values_count_places_from_the_deformed_body_unless_told(folder)
         )
         for z, reference in ((2.0, False), (1.5, True))
     ]
-    project = read_project(write(folder, run_file([CLAMP, lift], [], checks=entries)))
-    assert [line.split()[4] for line in project.evaluate(project.model.solve())] == ["passed"] * 2
+    project = read_case(write(folder, run_file([CLAMP, lift], [], checks=entries)))
+    assert [line.split()[4] for line in project.compare(project.model.solve())] == ["passed"] * 2
 
 
 def test_constraints_are_left_out_with_a_note_when_the_run_file_says_so(folder):
     row = "Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_X DISPLACEMENT_X\n1 0.0 [1.0] 27 26\n"
     (folder / "box.mdpa").write_text(box_mdpa() + row + "End Constraints\n")
-    kept = read_project(write(folder, run_file([CLAMP], []))).model
-    left = read_project(write(folder, run_file([CLAMP], [], multi_point_constraints_used=False))).model
+    kept = read_case(write(folder, run_file([CLAMP], []))).model
+    left = read_case(write(folder, run_file([CLAMP], [], multi_point_constraints_used=False))).model
     assert (len(kept.supports.links), len(left.supports.links)) == (1, 0)
     assert "multi_point_constraints_used is false: 1 constraints left out" in left.notes
 
@@ -603,7 +602,7 @@ def test_an_impossible_material_of_the_mesh_file_is_placed(folder):
     start = text.index("Begin SubModelPartElements")
     (folder / "box.mdpa").write_text(text[:start] + text[start:].replace("\n8\n", "\n", 1))
     with pytest.raises(InputError, match=r"box\.mdpa:1: Properties 0: .* must be < 0.5"):
-        read_project(write(folder, run_file([CLAMP], [])))
+        read_case(write(folder, run_file([CLAMP], [])))
 
 
 def changed(**solver):
@@ -757,7 +756,7 @@ def test_bad_kratos_run_file_is_refused_with_place_and_problem(folder, name):
     content, words = BAD[name]
     path = write(folder, content)
     with pytest.raises(InputError) as caught:
-        read_project(path)
+        read_case(path)
     assert words in str(caught.value)
     line = int(str(caught.value).removeprefix(f"{path}:").split(":")[0])
     assert 1 <= line <= len(path.read_text().splitlines())
@@ -772,8 +771,8 @@ def test_files_outside_the_folder_are_read_only_when_allowed(folder):
     )
     path = write(inner, content)
     with pytest.raises(InputError, match="leaves the folder"):
-        read_project(path)
-    result = read_project(path, allow_outside=True).model.solve()
+        read_case(path)
+    result = read_case(path, allow_outside=True).model.solve()
     same_field(result, by_hand(gravity=(0.0, 0.0, -9.81)).solve())
 
 
@@ -823,7 +822,7 @@ def test_bad_materials_file_is_refused_with_place_and_problem(folder, name):
     content, words = BAD_MATERIALS[name]
     path = write(folder, content, "materials.json")
     with pytest.raises(InputError) as caught:
-        read_project(write(folder, changed()))
+        read_case(write(folder, changed()))
     assert words in str(caught.value)
     line = int(str(caught.value).removeprefix(f"{path}:").split(":")[0])
     assert 1 <= line <= len(path.read_text().splitlines())
@@ -836,7 +835,7 @@ def test_elements_without_material_are_named(folder):
     (folder / "box.mdpa").write_text(text)
     write(folder, bad_material(model_part_name="Half"), "materials.json")
     with pytest.raises(ModelError, match=r"element 8 \(SmallDisplacementElement3D8N\) has no material"):
-        read_project(write(folder, changed()))
+        read_case(write(folder, changed()))
 
 
 def test_a_later_material_takes_the_elements_of_an_earlier_one(folder):
@@ -921,9 +920,9 @@ def test_any_value_of_a_wrong_kind_ends_in_a_project_or_a_clear_error(folder, na
     ):
         write(folder, replaced(content, path, junk), name)
         try:
-            project = read_project(run)
+            project = read_case(run)
             if content in (CHECKED, REFERENCE):
-                project.evaluate(result)
+                project.compare(result)
         except KratosLiteError as error:
             refused += 1
             assert str(folder) in str(error), (path, junk, str(error))  # noqa: PT017
@@ -947,14 +946,12 @@ def test_own_run_file_with_all_keys(folder):
         "json": "box_result.json",
         "picture": "box.png",
     }
-    project = read_project(write(folder, own, "own.json"))
+    project = read_case(write(folder, own, "own.json"))
     assert (project.solver, project.tolerance) == ("dense", 1e-8)
-    assert project.output == {
-        "output": str(folder / "out" / "box.vtu"),
-        "json": str(folder / "box_result.json"),
-        "picture": str(folder / "box.png"),
-    }
-    assert project.evaluate(project.model.solve()) == []
+    assert project.outputs == Outputs(
+        [str(folder / "out" / "box.vtu")], str(folder / "box_result.json"), str(folder / "box.png")
+    )
+    assert project.compare(project.model.solve()) == []
     same_field(project.model.solve(), by_hand(top=(1e5, 0.0, 0.0), gravity=(0.0, 0.0, -9.81)).solve())
 
 
@@ -966,13 +963,13 @@ def test_own_run_file_by_part_with_pressure_and_point_load(folder):
         "pressure": {"Top": 2e4},
         "point_load": {"Tips": [0, 5.0, 0]},
     }
-    project = read_project(write(folder, own, "own.json"))
+    project = read_case(write(folder, own, "own.json"))
     hand = by_hand(top=(0.0, 0.0, -2e4))
     hand.add(
         kl.PointLoad(lambda X: (X[:, 0] > 1.9) & (X[:, 2] > 1.4) & (np.abs(X[:, 1] - 0.5) > 0.4), (0, 5.0, 0))
     )
     same_field(project.model.solve(), hand.solve())
-    assert (project.solver, project.tolerance, project.output) == ("auto", 1e-10, {})
+    assert (project.solver, project.tolerance, project.outputs) == ("auto", 1e-10, Outputs())
 
 
 BAD_OWN = {
@@ -1031,7 +1028,7 @@ def test_bad_own_run_file_is_refused_with_place_and_problem(folder, name):
     content, words = BAD_OWN[name]
     path = write(folder, content, "own.json")
     with pytest.raises(InputError) as caught:
-        read_project(path)
+        read_case(path)
     assert words in str(caught.value)
     assert str(caught.value).startswith(f"{path}:")
 
@@ -1039,7 +1036,7 @@ def test_bad_own_run_file_is_refused_with_place_and_problem(folder, name):
 def test_all_problems_of_an_own_run_file_are_told_together(folder):
     own = {"model": "none.mdpa", "sovler": 1, "tolerance": "x", "output": "/x", "fix": [], "gravity": 1}
     with pytest.raises(InputError) as caught:
-        read_project(write(folder, own, "own.json"))
+        read_case(write(folder, own, "own.json"))
     lines = str(caught.value).splitlines()
     assert [int(line.split("own.json:")[1].split(":")[0]) for line in lines] == [3, 4, 5, 2, 6, 7]
 
@@ -1050,7 +1047,7 @@ def test_damaged_run_files_end_in_a_project_or_a_clear_error(folder):
     for at in range(0, len(text), 7):
         path = write(folder, text[:at] + text[at + 1 :])
         try:
-            read_project(path)
+            read_case(path)
         except KratosLiteError as error:
             refused.append(str(error).startswith(str(folder)))
     assert len(refused) > 100
@@ -1063,7 +1060,7 @@ def test_pressures_that_kratos_lets_follow_the_faces_are_noted(folder, prefix, c
     (folder / "box.mdpa").write_text(box_mdpa().replace(f"SmallDisplacement{name}", prefix + name))
     scalar = "assign_scalar_variable_to_conditions_process"
     pressure = process(scalar, "Structure.Top", "POSITIVE_FACE_PRESSURE", value=1.0)
-    notes = read_project(write(folder, run_file([CLAMP], [pressure]))).model.notes
+    notes = read_case(write(folder, run_file([CLAMP], [pressure]))).model.notes
     assert (
         sum(note.startswith(f"{name}: the pressure acts on the undeformed body") for note in notes) == count
     )
@@ -1082,6 +1079,6 @@ def test_expressions_that_kratos_evaluates_on_the_moved_mesh_are_noted(
     folder, expression, step, moves, noted
 ):
     content = run_file([CLAMP], [push(expression)], step=step, move_mesh_flag=moves)
-    notes = read_project(write(folder, content)).model.notes
+    notes = read_case(write(folder, content)).model.notes
     assert sum("as the steps before moved it" in note for note in notes) == noted
     assert sum("X, Y, Z are 0 on conditions" in note for note in notes) == ("X" in expression)

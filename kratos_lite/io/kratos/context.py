@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
 
 FOREVER = 1e30

@@ -15,7 +15,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.processes import refuse_local_axes
-from kratos_lite.io.project.settings import Settings, find_file, is_number, read_settings, shown
+from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
 from kratos_lite.typing import Array
 
 Comparison: TypeAlias = Callable[[Result], str]

@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.io.document import Document, Properties
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import with_rows
 

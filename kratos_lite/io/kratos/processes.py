@@ -20,7 +20,7 @@ from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
-from kratos_lite.io.project.settings import Settings, is_number, shown
+from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 

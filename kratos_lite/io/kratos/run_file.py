@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from kratos_lite.errors import Problems, nearest
+from kratos_lite.io.case import Case
 from kratos_lite.io.document import Document
 from kratos_lite.io.documents import read_document
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
@@ -18,9 +19,8 @@ from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
 from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
-from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.settings import Settings, find_file, read_settings
-from kratos_lite.io.scene import Scene
+from kratos_lite.io.readers.motion import add_motion
+from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
@@ -43,7 +43,7 @@ OTHER_PHYSICS = (
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
-def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Scene:
+def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Case:
     """Return what a Kratos run file says.
 
     Parameters
@@ -84,10 +84,10 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
     add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
     if in_time is None:
-        return Scene(model, checks=checks)
+        return Case(model, expected=checks, files=settings.files)
     model.notes = [note for note in model.notes if STATIC_ONLY not in note]
     in_time.finish(model)
-    return Scene(model, checks=checks, march=march_in_kratos(settings, in_time))
+    return Case(model, march_in_kratos(settings, in_time), expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kratos_lite.errors import InputError
+from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import times_of
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
-from kratos_lite.io.project.settings import Settings
-from kratos_lite.io.scene import March
+from kratos_lite.io.settings import Settings
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.schemes import Implicit
@@ -21,7 +21,7 @@ DYNAMIC_KEYS = (
 )  # fmt: skip
 
 
-def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
+def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
     """Return the march of a dynamic run file of Kratos; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
@@ -30,10 +30,10 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> March:
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
     for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
         solver.expect(value >= 0, key, f"{key} must be ≥ 0; got {value:g}")
-    return March(
+    return TimeIntegration(
         solver.section("time_stepping").number("time_step"),
         len(times) - 1,
-        scheme=_scheme(solver),
+        integrator=_scheme(solver),
         rayleigh=(rayleigh[0], rayleigh[1]),
         displacement=processes.displacement,
         velocity=processes.velocity,
@@ -50,7 +50,7 @@ def _scheme(solver: Settings) -> Implicit:
         raise solver.error(
             "time_integration_method",
             f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
-            "the option --scheme central_difference then marches explicitly",
+            "the option --integrator central_difference then marches explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
     text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"

@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import voigt
-from kratos_lite.errors import InputError, SolveError
+from kratos_lite.errors import SolveError
 from kratos_lite.io.atomic import write_whole
+from kratos_lite.io.writers.endings import check_result
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
     from kratos_lite.mesh import Mesh
 
 Array = NDArray[Any]
-RESULT_ENDINGS = (".vtu", ".vtk", ".json")
-"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
 
 
 def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -44,7 +43,7 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
     """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk or .json."""
-    check_result_ending(path, mode)
+    check_result(path, mode)
     ending = Path(path).suffix.lower()
     if ending == ".json":
         write_json(path, result)
@@ -58,25 +57,6 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
         from kratos_lite.io.formats.meshio import write_meshio
 
         write_meshio(path, result.mesh, points, cells)
-
-
-def check_result_ending(path: str | Path, mode: str | None = None) -> None:
-    """Raise InputError, before any work, for a format that cannot hold a result or has no such mode."""
-    ending = Path(path).suffix.lower()
-    if not ending:
-        raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
-    if ending not in RESULT_ENDINGS:
-        raise InputError(
-            f"{path}: results cannot be written as {ending!r}; {' '.join(RESULT_ENDINGS)} hold all fields"
-        )
-    if mode is not None:
-        from kratos_lite.io.formats.vtu import check_mode
-
-        check_mode(mode)
-        if ending != ".vtu":
-            raise InputError(
-                f"{path}: only .vtu files are written as {mode}; leave the mode out, or write .vtu"
-            )
 
 
 def summary(result: Result) -> dict[str, Any]:

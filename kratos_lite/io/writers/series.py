@@ -1,103 +1,104 @@
-"""Trajectories: the states of a body or a model in time as files for ParaView, as tables and arrays."""
+"""Series of states in time: frames for ParaView, tables and arrays."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
-import numpy as np
-
-from kratos_lite.bodies import Body, State
-from kratos_lite.bodies.state import at
-from kratos_lite.errors import InputError, ModelError
-from kratos_lite.io.writers.moments import MOMENT_WRITERS, Arrays, Frames, Table, Writer
+from kratos_lite.analysis import Transient
+from kratos_lite.bodies import Body
+from kratos_lite.errors import InputError
+from kratos_lite.io.atomic import write_arrays, write_whole
+from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
+from kratos_lite.io.writers.endings import check_series
+from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
 from kratos_lite.typing import Array
 
-if TYPE_CHECKING:
-    from kratos_lite.analysis import Moment, Transient
 
-COLUMNS = (
-    "time [s]",
-    "kinetic energy [J]",
-    "internal energy [J]",
-    "potential energy [J]",
-    "energy [J]",
-    "external work [J]",
-    *(f"mass center {axis} [m]" for axis in "xyz"),
-    *(f"linear momentum {axis} [kg m/s]" for axis in "xyz"),
-    *(f"angular momentum {axis} [kg m2/s]" for axis in "xyz"),
-)
-"""Columns of a table: energy is the sum of the three before it, angular momentum about the mass center."""
+class Writer(ABC):
+    """One kind of file of a series."""
 
+    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
+        self.path, self.subject, self.mode = path, subject, mode
 
-def row_of(body: Body, state: State) -> Array:
-    """Return the row of a state in a table, by `COLUMNS`."""
-    with at(body, state):
-        energies = [
-            float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
-        ]
-        vectors = (body.mass_center(), body.linear_momentum(), body.angular_momentum())
-        work = float(state.external_work)
-        return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
+    @abstractmethod
+    def add(self, state: Any) -> None:
+        """Take one state."""
+
+    @abstractmethod
+    def write(self) -> None:
+        """Write what all states together make, as a whole or not at all."""
 
 
-class _BodyFrames(Frames):
-    """DISPLACEMENT and VELOCITY on the nodes of a body."""
+class Frames(Writer):
+    """Meshes, one for each state, and their index."""
 
-    owner: Body
+    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
+        super().__init__(path, subject, mode)
+        check_mode(mode)
+        self.mesh = subject.mesh()
+        self.frames: list[tuple[float, str]] = []
 
-    def __init__(self, path: Path, owner: Body, mode: str) -> None:
-        super().__init__(path, owner, mode)
-        check_single(owner, path)
-        if owner.mesh is None:
-            raise ModelError(f"{path}: this body has no mesh to be shown; write .csv or .npz")
+    def add(self, state: Any) -> None:
+        """Write the frame of a state."""
+        name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
+        fields, cells = self.subject.fields(state)
+        points: dict[str, Any] = {**fields, "NODE_ID": self.mesh.node_ids}
+        write_vtu(self.path.with_name(name), self.mesh, points, cells, mode=self.mode)
+        self.frames.append((state.time, name))
 
-    def add(self, state: State) -> None:
-        mesh, body = self.owner.mesh, self.owner
-        assert mesh is not None
-        with at(body, state):
-            moved = body.position(mesh.points) - mesh.points
-            self.frame(state.time, mesh, {"DISPLACEMENT": moved, "VELOCITY": body.velocity(mesh.points)})
-
-
-class _BodyTable(Table):
-    """Energies, momenta and the mass center."""
-
-    owner: Body
-    columns = COLUMNS
-
-    def __init__(self, path: Path, owner: Body, mode: str) -> None:
-        super().__init__(path, owner, mode)
-        check_single(owner, path)
-
-    def add(self, state: State) -> None:
-        self.rows.append(row_of(self.owner, state))
+    def write(self) -> None:
+        """Write the index."""
+        write_pvd(self.path, self.frames)
 
 
-class _BodyArrays(Arrays):
-    """Configurations and velocities."""
+class Table(Writer):
+    """Numbers as text, one line for each state."""
 
-    owner: Body
-    names = ("time", "step", "q", "u", "external_work")
+    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
+        super().__init__(path, subject, mode)
+        subject.row(subject.now())  # refuses many bodies before the first step
+        self.rows: list[Array] = []
 
-    def extra(self) -> dict[str, Any]:
-        return {"kind": np.array(self.owner.kind)}
+    def add(self, state: Any) -> None:
+        """Take the row of a state."""
+        self.rows.append(self.subject.row(state))
+
+    def write(self) -> None:
+        """Write the lines."""
+        lines = [",".join(self.subject.columns), *(",".join(map(repr, row.tolist())) for row in self.rows)]
+        write_whole(self.path, ("\n".join(lines) + "\n").encode())
 
 
-def check_single(body: Body, path: Path) -> None:
-    """Raise ModelError for bodies that hold many."""
-    if body.q.ndim > 1:
-        raise ModelError(f"{path}: only a single body can be written so; for many bodies write .npz")
+class Arrays(Writer):
+    """Numbers of each state as arrays, one row for each state."""
+
+    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
+        super().__init__(path, subject, mode)
+        self.states: list[Any] = []
+
+    def add(self, state: Any) -> None:
+        """Keep a state."""
+        self.states.append(state)
+
+    def write(self) -> None:
+        """Write the arrays."""
+        write_arrays(self.path, arrays_of(self.subject, self.states))
+
+
+KINDS: dict[str, type[Writer]] = {".pvd": Frames, ".csv": Table, ".npz": Arrays}
 
 
 class SeriesWriter:
-    """The states of a march as files; what they are is said by the ending of the path.
+    """Write states in time to files; the ending of the path says what they are.
 
     - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
-      DISPLACEMENT (m) and VELOCITY (m/s) on its nodes; of a transient also ACCELERATION (m/s²), REACTION (N).
-    - ``.csv``: a table with a line for each state: time, energies, mass center, momenta (`COLUMNS`); of a
-      transient time, energy, largest displacement, total reaction (`MOMENT_COLUMNS`).
+      DISPLACEMENT (m) and VELOCITY (m/s) on its nodes; of a transient also ACCELERATION (m/s²), REACTION (N)
+      and stresses (Pa).
+    - ``.csv``: a table with a line for each state: time, energies, mass center, momenta; of a transient time,
+      energy, largest displacement, total reaction.
     - ``.npz``: arrays with a row for each state: ``time``, ``step``, and ``q``, ``u``, ``external_work`` of a
       body, or ``u``, ``v``, ``a``, ``reactions`` of a transient.
 
@@ -108,7 +109,7 @@ class SeriesWriter:
     Parameters
     ----------
     path : the file to write.
-    owner : the body whose states come, many at once only as ``.npz``; or the transient whose moments come.
+    owner : the body whose states come, many at once only as ``.npz``; or the transient.
     mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
 
     Raises
@@ -131,20 +132,13 @@ class SeriesWriter:
     ['spin.pvd', 'spin_00000.vtu', 'spin_00001.vtu', 'spin_00002.vtu']
     """
 
-    kinds: ClassVar[dict[str, type[Writer]]] = {".pvd": _BodyFrames, ".csv": _BodyTable, ".npz": _BodyArrays}
-
     def __init__(self, path: str | Path, owner: Body | Transient, *, mode: str = "binary") -> None:
-        check_ending(path)
-        if not (isinstance(owner, Body) or hasattr(owner, "moment")):
-            raise InputError(
-                f"{path}: a series holds the states of one body, such as kl.RigidBody, or of a transient; "
-                f"got {type(owner).__name__}; make one series for each body"
-            )
-        self.owner, self.count = owner, 0
-        kinds = self.kinds if isinstance(owner, Body) else MOMENT_WRITERS
-        self._writer = kinds[Path(path).suffix.lower()](Path(path), owner, mode)
+        check_series(path)
+        self.count = 0
+        self._subject = recorded(owner, path)
+        self._writer = KINDS[Path(path).suffix.lower()](Path(path), self._subject, mode)
 
-    def add(self, state: State | Moment | None = None) -> None:
+    def add(self, state: Any = None) -> None:
         """Take one more state.
 
         Parameters
@@ -153,9 +147,7 @@ class SeriesWriter:
         """
         if not self.count:
             make_folder(self._writer.path)
-        if state is None:
-            state = State.of(self.owner) if isinstance(self.owner, Body) else self.owner.moment()
-        self._writer.add(state)
+        self._writer.add(self._subject.now() if state is None else state)
         self.count += 1
 
     def close(self) -> None:
@@ -172,15 +164,9 @@ class SeriesWriter:
         self.close()
 
 
-def make_folder(path: Path) -> None:
+def make_folder(path: str | Path) -> None:
     """Make the folder of a file if it is missing; InputError if that cannot be done."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{path}: its folder cannot be made: {error.strerror}") from error
-
-
-def check_ending(path: str | Path) -> None:
-    """Raise InputError for a path whose ending is none of a series."""
-    if Path(path).suffix.lower() not in SeriesWriter.kinds:
-        raise InputError(f"{path}: a series of states is written as {', '.join(SeriesWriter.kinds)}")

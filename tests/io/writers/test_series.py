@@ -8,7 +8,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.state import at
-from kratos_lite.io.writers.series import COLUMNS
+from kratos_lite.io.writers.recorded import OF_BODIES as COLUMNS
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 KINDS = (kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody)
@@ -129,7 +129,7 @@ def test_many_bodies_are_written_as_arrays_only(tmp_path):
 
 def test_bad_targets_are_refused_at_once(tmp_path):
     body = thrown(kl.RigidBody)
-    with pytest.raises(kl.InputError, match=r"a\.txt: a series of states is written as \.pvd, \.csv, \.npz"):
+    with pytest.raises(kl.InputError, match=r"a\.txt: states in time are written as \.pvd"):
         kl.SeriesWriter(tmp_path / "a.txt", body)
     with pytest.raises(kl.InputError, match="is written as binary, compressed, ascii; got 'zip'"):
         kl.SeriesWriter(tmp_path / "a.pvd", body, mode="zip")
@@ -177,7 +177,7 @@ def test_a_picture_says_when_a_body_starts_and_ends(tmp_path):
 
 
 def test_turning_points_are_among_the_positions_drawn():
-    from kratos_lite.io.writers.pictures import _telling
+    from kratos_lite.io.writers.trajectory import _telling
 
     body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
     body.constrain(kl.PrescribedDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))

@@ -1,4 +1,4 @@
-"""The command that marches scenes of bodies: summary, files, restart, interruption, and what goes wrong."""
+"""Bodies on the command line: summary, files, restart, interruption, and what goes wrong."""
 
 import json
 import os
@@ -40,7 +40,7 @@ def names(folder):
 
 
 def test_a_summary_with_the_numbers(run, folder):
-    done = run("march", "box.json")
+    done = run("solve", "box.json")
     assert (done.code, done.err) == (0, "")
     rows = done.rows
     assert rows["body"] == "pseudo-rigid, 12 velocities, ENERGY_MOMENTUM"
@@ -61,7 +61,7 @@ def test_a_summary_with_the_numbers(run, folder):
 
 def test_with_damping_the_loss_is_no_drift(run, folder):
     write(body={"kind": "pseudo-rigid", "damping": 1e-3}, loads=[])
-    scene, rows = run("info", "box.json").rows, run("march", "box.json").rows
+    scene, rows = run("info", "box.json").rows, run("solve", "box.json").rows
     lost = float(scene["energy"].split()[0]) - float(rows["sum of energies"].split()[0])
     assert lost > 1
     assert float(rows["dissipated"].split()[0]) == pytest.approx(lost, rel=1e-3)
@@ -69,11 +69,11 @@ def test_with_damping_the_loss_is_no_drift(run, folder):
 
 
 def test_missing_folders_are_made_by_a_march_alone(run, folder):
-    words = ("box.json", "--csv", "a/b/o.csv", "--state", "c/end.npz", "-q")
+    words = ("box.json", "-o", "a/b/o.csv", "--state", "c/end.npz", "-q")
     write(output={"csv": "x/o.csv"})
     assert run("check", "box.json").code == 0
     assert names(folder) == ["box.json"]
-    assert run("march", *words).code == 0
+    assert run("solve", *words).code == 0
     assert names(folder) == ["a", "box.json", "c"]
     assert (folder / "a" / "b" / "o.csv").is_file()
 
@@ -83,7 +83,7 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
     keys = {"pvd": "o.pvd", "csv": "o.csv", "npz": "o.npz", "picture": "o.png", "state": "end.npz"}
     (folder / "inner").mkdir()
     write("inner/box.json", output=keys)
-    done = run("march", "inner/box.json")
+    done = run("solve", "inner/box.json")
     assert done.code == 0
     frames = [f"o_0000{i}.vtu" for i in range(5)]  # the start, and four states
     assert names(folder / "inner") == sorted(["box.json", *keys.values(), *frames])
@@ -95,7 +95,7 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
 
 def test_options_win_over_the_scene(run, folder):
     write(output={"csv": "a.csv"})
-    assert run("march", "box.json", "--csv", "b.csv", "--steps", "3", "-q").out == ""
+    assert run("solve", "box.json", "-o", "b.csv", "--steps", "3", "-q").out == ""
     assert names(folder) == ["b.csv", "box.json"]
     assert [line.split(",")[0] for line in (folder / "b.csv").read_text().splitlines()[1:]] == [
         "0.0",
@@ -104,32 +104,32 @@ def test_options_win_over_the_scene(run, folder):
 
 
 def test_a_restart_comes_to_the_same_end(run, folder):
-    run("march", "box.json", "-q", "--state", "whole.npz")
-    run("march", "box.json", "-q", "--steps", "10", "--state", "half.npz")
-    done = run("march", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
+    run("solve", "box.json", "-q", "--state", "whole.npz")
+    run("solve", "box.json", "-q", "--steps", "10", "--state", "half.npz")
+    done = run("solve", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
     assert done.rows["time"] == "0.05 … 0.1 s, 10 steps"
     whole, end = kl.State.load("whole.npz"), kl.State.load("end.npz")
     assert (whole.time, whole.step) == (end.time, end.step)
     np.testing.assert_array_equal(whole.q, end.q)
     write(restart="half.npz")
-    assert run("march", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
+    assert run("solve", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
     np.testing.assert_array_equal(kl.State.load("again.npz").u, end.u)
 
 
 def test_a_restart_of_another_kind_is_refused(run, folder):
-    run("march", "box.json", "-q", "--state", "half.npz")
+    run("solve", "box.json", "-q", "--state", "half.npz")
     write(body="rigid")
-    assert run("march", "box.json", "--restart", "half.npz").refuses("state of a pseudo-rigid body")
-    assert run("march", "box.json", "--restart", "none.npz").refuses("none.npz: there is no such file")
+    assert run("solve", "box.json", "--restart", "half.npz").refuses("state of a pseudo-rigid body")
+    assert run("solve", "box.json", "--restart", "none.npz").refuses("none.npz: there is no such file")
 
 
 def test_an_explicit_step_that_is_too_long_is_refused_before_any_output(run, folder):
-    stiff = {"kind": "pseudo-rigid", "scheme": "DEF_EXP"}
+    stiff = {"kind": "pseudo-rigid", "integrator": "DEF_EXP"}
     write(body=stiff, time={"step": 0.1, "steps": 5})
-    for command in ("march", "check"):
+    for command in ("solve", "check"):
         assert run(command, "box.json").refuses("DEF_EXP is not stable", "the critical step is 0.00584 s")
     write(body=stiff, time={"step": 0.1, "steps": 5, "substeps": "auto"})
-    assert run("march", "box.json", "-q").code == 0
+    assert run("solve", "box.json", "-q").code == 0
 
 
 def test_what_exists_is_kept_when_a_march_fails(run, folder):
@@ -140,7 +140,7 @@ def test_what_exists_is_kept_when_a_march_fails(run, folder):
             "body.add(kl.Callback(lambda q, u, t: np.full(6, np.nan if t > 0.2 else 0.0)))\n"
             "dt, steps = 0.1, 10\n"
         )
-    done = run("march", "fails.py", "--csv", "a.csv", "--state", "s.npz")
+    done = run("solve", "fails.py", "-o", "a.csv", "--state", "s.npz")
     assert done.code == 2
     assert "error: what a callback returns at t = 0.25 s must be finite" in done.err
     assert len((folder / "a.csv").read_text().splitlines()) == 4
@@ -150,7 +150,7 @@ def test_what_exists_is_kept_when_a_march_fails(run, folder):
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
 def test_ctrl_c_keeps_what_is_there(folder):
     write(body="finite-element", time={"step": 0.001, "steps": 1_000_000})
-    words = [sys.executable, "-m", "kratos_lite", "march", "box.json", "--pvd", "o.pvd", "--state", "end.npz"]
+    words = [sys.executable, "-m", "kratos_lite", "solve", "box.json", "-o", "o.pvd", "--state", "end.npz"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
     while not (folder / "o_00003.vtu").exists() and time.monotonic() < deadline:
@@ -171,7 +171,7 @@ def test_ctrl_c_keeps_what_is_there(folder):
 
 def test_progress_is_shown_where_asked_for(run, folder):
     write(time={"step": 1e-4, "steps": 3000})
-    done = run("march", "box.json", "-q", "--progress")
+    done = run("solve", "box.json", "-q", "--progress")
     assert done.out == ""
     assert re.search(r"\rmarch +\d+%", done.err)
 
@@ -186,7 +186,7 @@ def test_check_and_info(run, folder):
     assert done.rows["critical step"].startswith("0.00584 s")
     assert done.rows["time"] == "from 0 s, 20 steps of 0.005 s"
     write(bdoy="rigid", loads=[{"type": "gravty"}])
-    for command in ("check", "info", "march"):
+    for command in ("check", "info", "solve"):
         assert run(command, "box.json").refuses("unknown key 'bdoy'. Did you mean body", "'gravty'")
 
 
@@ -198,7 +198,7 @@ def test_a_script_is_a_scene(run, folder):
             "body.set_velocity(angular=(0, 0, 1))\n"
             "dt, steps, every = 0.1, 10, 5\n"
         )
-    done = run("march", "spin.py", "--csv", "spin.csv")
+    done = run("solve", "spin.py", "-o", "spin.csv")
     assert done.rows["body"] == "rigid, 6 velocities, RIG_NEG"
     assert len((folder / "spin.csv").read_text().splitlines()) == 4
     assert run("check", "spin.py").out == "spin.py: rigid body, 10 steps of 0.1 s, no errors\n"
@@ -213,9 +213,9 @@ def test_a_script_sees_no_options_of_the_command(run, folder, monkeypatch):
             "assert sys.argv == ['spin.py'], sys.argv\n"
             "dt, steps = 0.1, 2\n"
         )
-    words = ["kratos-lite", "march", "spin.py"]
+    words = ["kratos-lite", "solve", "spin.py"]
     monkeypatch.setattr(sys, "argv", words)
-    assert run("march", "spin.py").err == ""
+    assert run("solve", "spin.py").err == ""
     assert sys.argv is words
 
 
@@ -227,43 +227,52 @@ def test_many_bodies_of_a_script(run, folder):
             "body.set_velocity((1, 0, 0))\n"
             "dt, steps = 0.1, 10\n"
         )
-    done = run("march", "many.py", "--npz", "many.npz")
+    done = run("solve", "many.py", "-o", "many.npz")
     assert done.rows["body"] == "5 × rigid, 6 velocities, RIG_NEG"
     assert done.rows["kinetic energy"] == "5 J"
     assert np.load("many.npz")["q"].shape == (11, 5, 12)
-    assert run("march", "many.py", "--csv", "a.csv").refuses("a.csv: only a single body")
+    assert run("solve", "many.py", "-o", "a.csv").refuses("a.csv: only a single body")
 
 
 def test_bad_targets_are_refused_before_the_march(run, folder):
     write(time={"step": 1e-9, "steps": 10**9})
-    assert run("march", "box.json", "--pvd", "box.json/o.pvd").refuses("the folder box.json does not exist")
-    assert run("march", "box.json", "--pvd", "none/o.txt").refuses("the ending of pvd must be .pvd")
-    assert run("march", "box.json", "--pvd", "o.vtu").refuses("the ending of pvd must be .pvd")
-    assert run("march", "box.json", "--state", "o.csv").refuses("the ending of state must be .npz")
-    assert run("march", "box.json", "--npz", "o.npz", "--state", "o.npz").refuses("another output already")
-    assert run("march", "box.json", "--steps", "0").refuses("--steps 0: a number of steps, 1 or more")
+    assert run("solve", "box.json", "-o", "box.json/o.pvd").refuses("the folder box.json does not exist")
+    assert run("solve", "box.json", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")
+    assert run("solve", "box.json", "-o", "o.vtu").refuses("o.vtu: states in time are written")
+    assert run("solve", "box.json", "--state", "o.csv").refuses("o.csv: the ending must be .npz")
+    assert run("solve", "box.json", "-o", "o.npz", "--state", "o.npz").refuses("another output")
+    assert run("solve", "box.json", "--steps", "0").refuses("--steps must be a whole number ≥ 1; got 0")
     assert names(folder) == ["box.json"]
 
 
-def test_scenes_and_run_files_are_not_mixed_up(run, folder):
-    for words in (("solve", "box.json"), ("convert", "box.json", "a.mdpa")):
-        assert run(*words).refuses("a scene of a body is not for", "kratos-lite march box.json")
-    (folder / "run.json").write_text('{"model": "a.mdpa"}')
-    assert run("march", "run.json").refuses("this is a run file of a model: kratos-lite solve run.json")
-    assert run("march", "none.json").refuses("none.json")
-    assert run("march", "a.mdpa").refuses("a scene is a .json file or a .py script")
+def test_what_bodies_do_not_take_is_refused(run, folder):
+    assert run("convert", "box.json", "a.mdpa").refuses("describes a body; only meshes and models")
+    assert run("solve", "none.json").refuses("none.json")
+    for words in (["--fix", "z-:xyz"], ["--modes", "3"], ["--rotation", "z:1"], ["--integrator", "hht"]):
+        assert run("solve", "box.json", *words).refuses(
+            f"{words[0]} is for models; box.json describes a body"
+        )
+    assert run("solve", "box.json", "--json", "a.json").refuses("a body has no summary in .json")
+    with pytest.raises(kl.InputError, match=r"box\.json: describes a body; read it with kl\.read_case"):
+        kl.read("box.json")
+
+
+def test_time_of_a_body_is_that_of_the_option(run, folder):
+    done = run("solve", "box.json", "--time", "0.01:4:2", "-o", "a.npz")
+    assert done.rows["time"] == "0 … 0.04 s, 4 steps"
+    assert np.load("a.npz")["step"].tolist() == [0, 2, 4]
 
 
 def test_debug_shows_the_traceback(run, folder):
     write(body="rigit")
     with pytest.raises(kl.InputError, match="rigit"):
-        run("march", "box.json", "--debug")
+        run("solve", "box.json", "--debug")
 
 
 def test_help_names_every_output(run):
-    done = run("march", "--help")
+    done = run("solve", "--help")
     assert done.code == 0
-    for word in ("--pvd", "--csv", "--npz", "--picture", "--state", "--restart", "examples:"):
+    for word in ("-o", "-o", "-o", "--picture", "--state", "--restart", "examples:"):
         assert word in done.out
     assert "give them new names" in " ".join(done.out.split())
 

@@ -1,4 +1,4 @@
-"""Loads and constraints of JSON scenes: objects with a type, and the arguments of its class as keys."""
+"""Loads and constraints of bodies in JSON: objects with a type, and the arguments of its class as keys."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ from typing import Any
 from kratos_lite import bodies
 from kratos_lite.bodies import Body
 from kratos_lite.errors import nearest
-from kratos_lite.io.project.settings import Settings
-from kratos_lite.io.scenes.values import Read, function, number, part, placed, points, text, vector
+from kratos_lite.io.readers.values import (
+    Read,
+    function,
+    number,
+    number_or_series,
+    part,
+    points,
+    text,
+    vector,
+)
+from kratos_lite.io.settings import Settings
 from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
 
 
@@ -57,13 +66,13 @@ OF_CONSTRAINTS: dict[str, Read] = {
 def add_load(body: Body, section: Settings) -> None:
     """Let the load of an object act on a body."""
     load = _build(section, body, LOADS, OF_LOADS, ("amplitude",))
-    amplitude = function(section, "amplitude", body.mesh) if "amplitude" in section else 1.0
-    placed(section, "type", body.add, load, amplitude)
+    amplitude = number_or_series(section, "amplitude") if "amplitude" in section else 1.0
+    section.placed("type", body.add, load, amplitude)
 
 
 def add_constraint(body: Body, section: Settings) -> None:
     """Hold a body by the constraint of an object."""
-    placed(section, "type", body.constrain, _build(section, body, CONSTRAINTS, OF_CONSTRAINTS))
+    section.placed("type", body.constrain, _build(section, body, CONSTRAINTS, OF_CONSTRAINTS))
 
 
 def _build(
@@ -85,4 +94,4 @@ def _build(
         raise section.error("type", f"{section.path}: a {name} also needs {', '.join(missing)}")
     given = [key for key in (*kind.needs, *kind.takes) if key in section]
     values = {"where" if key == "on" else key: readers[key](section, key, body.mesh) for key in given}
-    return placed(section, "type", kind.build, **values)
+    return section.placed("type", kind.build, **values)

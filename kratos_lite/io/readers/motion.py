@@ -6,9 +6,8 @@ from typing import Any
 
 from kratos_lite.ale import Motion, Rotation, Translation
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.io.json_file import Object
-from kratos_lite.io.project.settings import Settings
+from kratos_lite.io.readers.values import number_or_series
+from kratos_lite.io.settings import Settings
 from kratos_lite.time_series import TimeSeries
 
 COMMON = ("rate", "acceleration", "damping")
@@ -38,13 +37,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     if len(section.values) != 1:
         raise section.error("", "ale: one of 'rotation' and 'translation' is needed")
     (kind,) = section.values
-    inner = section.section(kind)
-    try:
-        model.add(read_motion(inner, kind, time))
-    except InputError:
-        raise
-    except KratosLiteError as error:
-        raise section.error(kind, f"{inner.path}: {error}") from None
+    section.placed(kind, model.add, read_motion(section.section(kind), kind, time))
 
 
 def read_motion(section: Settings, kind: str, time: float | None = None) -> Motion:
@@ -64,19 +57,4 @@ def read_motion(section: Settings, kind: str, time: float | None = None) -> Moti
         else:
             value = section.number(key) if key == "damping" else number_or_series(section, key)
             given[key] = value(time) if isinstance(value, TimeSeries) and time is not None else value
-    try:
-        return Rotation(**given) if kind == "rotation" else Translation(**given)
-    except InputError as error:
-        raise section.error("", f"{section.path}: {error}") from None
-
-
-def number_or_series(section: Settings, key: str) -> float | TimeSeries:
-    """Return a number, or the time series of ``{"times": […], "values": […]}``."""
-    if not isinstance(section.values[key], Object):
-        return section.number(key)
-    table = section.section(key)
-    table.check_keys(("times", "values"))
-    try:
-        return TimeSeries(table.numbers("times"), table.numbers("values"))
-    except InputError as error:
-        raise section.error(key, f"{table.path}: {error}") from None
+    return section.placed("", Rotation if kind == "rotation" else Translation, **given)

@@ -8,9 +8,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.cli import main
-from kratos_lite.io.project import read_project
-from kratos_lite.io.project.ale import add_motion
-from kratos_lite.io.project.settings import read_settings
+from kratos_lite.io.files import read_case
+from kratos_lite.io.readers.motion import add_motion
+from kratos_lite.io.settings import read_settings
 
 RUBBER = {"E": 1e6, "nu": 0.3, "density": 1000.0}
 
@@ -138,7 +138,7 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
     }
     path = folder / "ProjectParameters.json"
     path.write_text(json.dumps(content, indent=1))
-    model = read_project(path).model
+    model = read_case(path).model
     expected = kl.Model(model.mesh, kl.Isotropic3D(**RUBBER))
     expected.fix("inner")
     expected.add(kl.ale.Rotation("z", 8.0))
@@ -148,7 +148,7 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
     content["ale"]["rotation"]["speed"] = 1.0
     path.write_text(json.dumps(content, indent=1))
     with pytest.raises(kl.InputError, match=r"json:\d+:\d+: unknown key 'ale.rotation.speed'"):
-        read_project(path)
+        read_case(path)
 
 
 @pytest.mark.parametrize(
@@ -197,14 +197,14 @@ def test_options_that_are_wrong_end_in_one_line(folder, capsys, words, message):
 def test_a_wrong_section_is_refused_with_its_line(folder, ale, message):
     path = write(folder, model="wheel.mdpa", fix={"inner": "xyz"}, ale=ale)
     with pytest.raises(kl.KratosLiteError, match=r"run\.json:\d+:\d+") as caught:
-        read_project(path)
+        read_case(path)
     assert message in str(caught.value)
 
 
 def test_a_rate_may_be_a_table(folder):
     table = {"times": [0, 2], "values": [0, 10]}
     path = write(folder, model="wheel.mdpa", ale={"rotation": {"rate": table, "acceleration": 5}})
-    motion = read_project(path).model.motion
+    motion = read_case(path).model.motion
     assert motion.rate(1.0) == 5.0
     assert motion.acceleration(1.0) == 5.0
     assert not motion.steady

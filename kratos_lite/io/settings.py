@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from kratos_lite.errors import InputError, nearest
+from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.json_file import Object, read_json
 
+T = TypeVar("T")
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 
@@ -27,6 +28,7 @@ class Settings:
     source : name of the file, for messages.
     path : keys that lead here, for messages, such as ``solver_settings``.
     place : line and column of the key that leads here, for messages about an empty object.
+    files : files that the whole tree has named so far and that are there; `find_file` adds to them.
 
     Examples
     --------
@@ -35,8 +37,16 @@ class Settings:
     'amg'
     """
 
-    def __init__(self, values: Object, source: str, path: str = "", place: tuple[int, int] = (1, 1)) -> None:
+    def __init__(
+        self,
+        values: Object,
+        source: str,
+        path: str = "",
+        place: tuple[int, int] = (1, 1),
+        files: list[Path] | None = None,
+    ) -> None:
         self.values, self.source, self.path, self.place = values, source, path, place
+        self.files = [] if files is None else files
 
     def __contains__(self, key: str) -> bool:
         return key in self.values
@@ -54,6 +64,14 @@ class Settings:
         """Return an error at the place of a key, or of the object where it is missing."""
         line, column = self.values.places.get(key) or next(iter(self.values.places.values()), self.place)
         return InputError(f"{self.source}:{line}:{column}: {message}")
+
+    def placed(self, key: str, action: Callable[..., T], *arguments: Any, **named: Any) -> T:
+        """Return what an action returns; an error of the library gets the place of a key."""
+        try:
+            return action(*arguments, **named)
+        except KratosLiteError as error:
+            name = self.name(key) if key else self.path
+            raise self.error(key, f"{name}: {error}") from None
 
     def get(self, key: str, default: Any = REQUIRED) -> Any:
         """Return a value of any type."""
@@ -108,7 +126,9 @@ class Settings:
         """Return an inner object; an empty one where the key is missing, unless it is required."""
         default = REQUIRED if required else Object()
         value = self._typed(key, default, isinstance(self.values.get(key), Object), "an object {…}")
-        return Settings(value, self.source, self.name(key), self.values.places.get(key, self.place))
+        return Settings(
+            value, self.source, self.name(key), self.values.places.get(key, self.place), self.files
+        )
 
     def sections(self, key: str) -> list[Settings]:
         """Return a list of inner objects."""
@@ -117,7 +137,8 @@ class Settings:
         entries = self._typed(key, [], fits, "a list of objects [{…}, …]")
         place = self.values.places.get(key, self.place)
         return [
-            Settings(entry, self.source, f"{self.name(key)}[{i}]", place) for i, entry in enumerate(entries)
+            Settings(entry, self.source, f"{self.name(key)}[{i}]", place, self.files)
+            for i, entry in enumerate(entries)
         ]
 
     def unknown(self, known: Iterable[str]) -> list[str]:
@@ -147,7 +168,7 @@ def read_settings(path: str | Path) -> Settings:
     value = read_json(path)
     if not isinstance(value, Object):
         raise InputError(f"{path}:1:1: an object {{…}} is expected; got {type(value).__name__}")
-    return Settings(value, str(path))
+    return Settings(value, str(path), files=[Path(path)])
 
 
 def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
@@ -182,7 +203,9 @@ def find_file(
         raise settings.error(key, f"{settings.name(key)}: {error}") from None
     beside = folder / path.name
     if path.is_file():
+        settings.files.append(path)
         return path, ""
     if beside.is_file():
+        settings.files.append(beside)
         return beside, f"{name} is not there; {path.name} beside the run file is read"
     raise settings.error(key, f"{settings.name(key)}: there is no file {folder / name}; correct the name")

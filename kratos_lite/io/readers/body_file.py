@@ -1,31 +1,35 @@
-"""Scenes in JSON: strict, and every problem with its line."""
+"""Files with a body in JSON: its mesh, material, kind, start, loads, constraints and time."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody, State
+from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
-from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.documents import ending, read_document
+from kratos_lite.errors import Problems
+from kratos_lite.io.case import Case, Outputs
+from kratos_lite.io.documents import read_document
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
-from kratos_lite.io.project.run_file import read_material
-from kratos_lite.io.project.settings import Settings, find_file, inside, read_settings, shown
-from kratos_lite.io.scenes.actions import add_constraint, add_load
-from kratos_lite.io.scenes.scene import OUTPUTS, BodyScene
-from kratos_lite.io.scenes.values import Read, matrix, number, placed, vector
+from kratos_lite.io.readers.body_loads import add_constraint, add_load
+from kratos_lite.io.readers.run_file import mesh_file_of, output_of
+from kratos_lite.io.readers.time import read_time_of_body, restart_of
+from kratos_lite.io.readers.values import Read, is_by_part, matrix, number, read_material, vector
+from kratos_lite.io.settings import Settings, shown
+from kratos_lite.io.writers.endings import SERIES, check_ending
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import annulus, box
 from kratos_lite.model.mass_properties import MassProperties
 
+OUTPUTS = (*(ending[1:] for ending in SERIES), "picture", "state")
 KEYS = ("mesh", "material", "body", "start", "loads", "constraints", "time", "output", "restart")
 MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str], Any]]]] = {
     "box": (
@@ -51,7 +55,7 @@ OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
     "formulation": Settings.text,
     "modes": Settings.integer,
     "lumped": Settings.flag,
-    "scheme": Settings.text,
+    "integrator": Settings.text,
     "damping": Settings.number,
     "tolerance": Settings.number,
 }
@@ -65,80 +69,62 @@ CHARACTERISTICS: dict[str, Read] = {
 }
 
 
-def read_json_scene(path: Path, strict: bool = True) -> BodyScene:
-    """Return the scene of a JSON file; its files are named from its folder.
+def read_body_file(settings: Settings, *, strict: bool = True) -> Case:
+    """Return the case of a JSON file with a body; its files are named from its folder.
+
+    Parameters
+    ----------
+    settings : the file.
+    strict : as of `kratos_lite.read`, for its mesh.
 
     Raises
     ------
     InputError
         With file, line, column and cure of every problem that is found.
     """
-    settings, problems = read_settings(path), Problems()
-    if "model" in settings or "solver_settings" in settings:
-        raise InputError(f"{path}: this is a run file of a model: kratos-lite solve {path}")
+    folder, problems = Path(settings.source).parent, Problems()
     for key in settings.unknown(KEYS):
         problems.add(str(settings.error(key, settings.unknown_key(key, KEYS))))
-    files = [path]
-    time = problems.of(_time, settings)
-    output = problems.of(_outputs, settings, path.parent)
-    body = problems.of(_body_of, settings, path.parent, files, strict)
+    time = problems.of(read_time_of_body, settings)
+    outputs = problems.of(_outputs, settings, folder)
+    body = problems.of(_body_of, settings, folder, strict)
     if body is None:
         problems.raise_if_any()
     problems.of(_start, settings, body)
     for key, add in (("loads", add_load), ("constraints", add_constraint)):
         for section in problems.of(settings.sections, key) or []:
             problems.of(add, body, section)
-    if "restart" in settings:
-        problems.of(_restart, settings, path.parent, files, body)
+    if "restart" in settings and (restart := problems.of(restart_of, settings, folder)) and time:
+        time = replace(time, restart=restart)
     problems.raise_if_any()
-    line, column = settings.section("time").values.places["step"]
-    return BodyScene(body, **time, output=output, files=files, place=f"{path}:{line}:{column}")
+    return Case(body, time, outputs=outputs, files=settings.files)
 
 
-def _time(settings: Settings) -> dict[str, Any]:
-    time = settings.section("time", required=True)
-    time.check_keys(("step", "steps", "every", "substeps"))
-    found: dict[str, Any] = {"dt": time.number("step")}
-    if not found["dt"] > 0:
-        raise time.error("step", f"time.step must be a number of seconds > 0; got {found['dt']:g}")
-    for key in ("steps", "every", "substeps"):
-        if key == "substeps" and time.values.get(key) == "auto":
-            found[key] = "auto"
-        elif key == "steps" or key in time:
-            found[key] = time.integer(key)
-            if found[key] < 1:
-                raise time.error(key, f"time.{key} must be a whole number ≥ 1; got {found[key]}")
-    return found
-
-
-def _outputs(settings: Settings, folder: Path) -> dict[str, str]:
-    output = settings.section("output")
-    output.check_keys(OUTPUTS)
-    found = {}
-    for key in output.values:
-        try:
-            found[key] = str(inside(folder, output.text(key)))
-        except ValueError as error:
-            raise output.error(key, f"output.{key}: {error}") from None
-    return found
+def _outputs(settings: Settings, folder: Path) -> Outputs:
+    section = settings.section("output")
+    section.check_keys(OUTPUTS)
+    found = {key: output_of(section, key, folder) for key in section.values}
+    for key, path in found.items():
+        if key != "picture":
+            section.placed(key, check_ending, path, ".npz" if key == "state" else f".{key}")
+    results = [path for key, path in found.items() if key not in ("picture", "state")]
+    return Outputs(results, picture=found.get("picture"), state=found.get("state"))
 
 
 # ---- mesh and material -----------------------------------------------------------------------------
 
 
-def _mesh_and_material(
-    settings: Settings, folder: Path, files: list[Path], strict: bool
-) -> tuple[Mesh | None, Material | None]:
-    mesh, material = _mesh(settings, folder, files, strict) if "mesh" in settings else (None, None)
+def _mesh_and_material(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh | None, Material | None]:
+    mesh, material = _mesh(settings, folder, strict) if "mesh" in settings else (None, None)
     if "material" in settings:
         material = _material(settings.section("material"), mesh)
     return mesh, material
 
 
-def _mesh(settings: Settings, folder: Path, files: list[Path], strict: bool) -> tuple[Mesh, Material | None]:
+def _mesh(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh, Material | None]:
     value = settings.get("mesh")
     if isinstance(value, str):
-        return _mesh_of_file(settings, folder, files, strict)
+        return _mesh_of_file(settings, folder, strict)
     if not isinstance(value, Object) or len(value) != 1 or next(iter(value)) not in MESHES:
         kinds = " or ".join(f'{{"{name}": {{…}}}}' for name in MESHES)
         raise settings.error("mesh", f"mesh must be the name of a file, {kinds}; got {shown(value)}")
@@ -150,37 +136,29 @@ def _mesh(settings: Settings, folder: Path, files: list[Path], strict: bool) -> 
     for key in required:
         section.get(key)
     values = {key: readers[key](section, key) for key in section.values}
-    return placed(settings.section("mesh"), name, make, **values), None
+    return settings.section("mesh").placed(name, make, **values), None
 
 
-def _mesh_of_file(
-    settings: Settings, folder: Path, files: list[Path], strict: bool
-) -> tuple[Mesh, Material | None]:
+def _mesh_of_file(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh, Material | None]:
     """Return the mesh of a file, and its materials by property id if all elements have one."""
-    path, note = find_file(settings, "mesh", folder)
-    if note:
-        raise settings.error("mesh", f"mesh: {note}; correct the path")
-    if ending(path) == ".json":
-        raise settings.error("mesh", f"mesh must be a mesh file such as .mdpa; got {path.name}")
-    files.append(path)
-    document = read_document(path, strict=strict)
+    document = read_document(mesh_file_of(settings, "mesh", folder), strict=strict)
     mesh = model_from(document, materials=False).mesh
     numbers = {int(number) for block in mesh.blocks for number in np.unique(block.properties)}
     given = {n: document.properties[n].values for n in sorted(numbers) if n in document.properties}
-    found = {n: placed(settings, "mesh", material_from, values) for n, values in given.items()}
+    found = {n: settings.placed("mesh", material_from, values) for n, values in given.items()}
     known = {n: material for n, material in found.items() if material is not None}
     return mesh, known if len(known) == len(numbers) else None
 
 
 def _material(section: Settings, mesh: Mesh | None) -> Material:
     """Return one material, or materials by the names of parts."""
-    if not any(isinstance(value, Object) for value in section.values.values()):
+    if not is_by_part(section):
         return read_material(section)
     if mesh is None:
         raise section.error("", "material: materials of parts need a mesh")
     found = {}
     for name in section.values:
-        placed(section, name, mesh.part, name)
+        section.placed(name, mesh.part, name)
         found[name] = read_material(section.section(name))
     return found
 
@@ -188,8 +166,8 @@ def _material(section: Settings, mesh: Mesh | None) -> Material:
 # ---- body ------------------------------------------------------------------------------------------
 
 
-def _body_of(settings: Settings, folder: Path, files: list[Path], strict: bool) -> Body:
-    return _body(settings, *_mesh_and_material(settings, folder, files, strict))
+def _body_of(settings: Settings, folder: Path, strict: bool) -> Body:
+    return _body(settings, *_mesh_and_material(settings, folder, strict))
 
 
 def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> Body:
@@ -197,21 +175,24 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     whole = isinstance(value, str)
     section = Settings(Object(), settings.source, "body") if whole else settings.section("body")
     owner, key = (settings, "body") if whole else (section, "kind")
-    kind = placed(owner, key, BODIES.__getitem__, owner.text(key))
+    kind = owner.placed(key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
-    options = [name for name in (*OPTIONS, "mass_properties") if name in arguments]
+    names = {"integrator": "scheme"}
+    options = [name for name in (*OPTIONS, "mass_properties") if names.get(name, name) in arguments]
     section.check_keys(("kind", *options))
-    given: dict[str, Any] = {name: OPTIONS[name](section, name) for name in OPTIONS if name in section}
+    given: dict[str, Any] = {
+        names.get(name, name): OPTIONS[name](section, name) for name in OPTIONS if name in section
+    }
     if "mass_properties" in section:
         inner = section.section("mass_properties")
-        given["mass_properties"] = placed(section, "mass_properties", _characteristics, inner, mesh, material)
+        given["mass_properties"] = section.placed("mass_properties", _characteristics, inner, mesh, material)
     elif mesh is None:
         raise settings.error("mesh", "key 'mesh' is missing: it is the shape of the body")
     if material is None and "mass_properties" not in given and not issubclass(kind, Obstacle):
         raise settings.error(
             "material", 'key \'material\' is missing, and the mesh has none: {"E": …, "nu": …, "density": …}'
         )
-    return placed(owner, key, kind, mesh, material, **given)
+    return owner.placed(key, kind, mesh, material, **given)
 
 
 def _characteristics(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
@@ -229,14 +210,8 @@ def _start(settings: Settings, body: Body) -> None:
     start = settings.section("start")
     start.check_keys(("rotation", "velocity", "angular_velocity"))
     if "rotation" in start:
-        placed(start, "rotation", body.rotate, exp(np.array(start.vector("rotation"))))
+        start.placed("rotation", body.rotate, exp(np.array(start.vector("rotation"))))
     keys = {"linear": "velocity", "angular": "angular_velocity"}
     given = {name: start.vector(key) for name, key in keys.items() if key in start}
     if given:
         body.set_velocity(**given)
-
-
-def _restart(settings: Settings, folder: Path, files: list[Path], body: Body) -> None:
-    path, _ = find_file(settings, "restart", folder)
-    files.append(path)
-    placed(settings, "restart", lambda: State.load(path).put_into(body))

@@ -1,0 +1,222 @@
+"""What a constraint on a single body is.
+
+A constraint has a Jacobian H, along whose rows its reactions push, and a gap, which a step closes.  The gap
+is taken at the end of the step: a point that is fixed stays where it is, and a link keeps its length, to
+round-off.
+
+Source: Solfec-1.0 user manual, constraints; its velocity-level laws are replaced by those of positions.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import Entries
+from kratos_lite.bodies.validation import points_of
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.typing import Array
+
+Points: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
+"""Points (3,) or (m, 3) in m of the undeformed body; or nodes by a part of the mesh or a predicate."""
+
+
+class Constraint(ABC):
+    """Something that holds material points of a body, along r directions at each point.
+
+    Parameters
+    ----------
+    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
+        predicate on its points (n, 3), for the nodes there.
+
+    Attributes
+    ----------
+    points : (m, 3) m, in the undeformed body.
+    positional : whether it is about positions, so that it also holds a body at rest.
+    turning : whether its directions change as the body moves.
+    reactions : (m, 3) N, mean force on the points over the last step.
+
+    Raises
+    ------
+    InputError
+        There is no point, or points have not three finite coordinates.
+    """
+
+    positional: ClassVar[bool] = True
+    turning: ClassVar[bool] = False
+
+    def __init__(self, points: Points) -> None:
+        self._where = points if isinstance(points, str) or callable(points) else None
+        self._hold(np.zeros((1, 3)) if isinstance(points, str) or callable(points) else points_of(points))
+        self._body: FreeBody | None = None
+        self._jacobian: Array | None = None
+
+    def _hold(self, points: Array) -> None:
+        """Take note of the points."""
+        self.points = np.atleast_2d(points)
+        if not len(self.points):
+            raise InputError(f"a {type(self).__name__} needs one point at least; got none")
+        self.reactions = np.zeros_like(self.points)
+
+    # ---- what a kind of constraint defines -------------------------------------------------------
+
+    @abstractmethod
+    def directions(self, x: Array) -> Array:
+        """Return the directions along which points are held.
+
+        Parameters
+        ----------
+        x : (m, 3) m, where the points are.
+
+        Returns
+        -------
+        (m, r, 3) float.
+        """
+
+    @abstractmethod
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much the points miss the constraint.
+
+        Lengths are divided by h/2, the time in which the velocity at the end of a step closes them.
+
+        Parameters
+        ----------
+        x, v : (m, 3), positions in m and velocities in m/s.
+        time, h : time and length of the step in s.
+
+        Returns
+        -------
+        (m, r) float, m/s.
+        """
+
+    def starting_velocities(self, v: Array, time: float, h: float) -> Array:
+        """Return the velocities along the directions with which the points start.
+
+        Parameters
+        ----------
+        v : (m, r) m/s, those that they have.
+        time, h : time and length of the steps to come in s.
+
+        Returns
+        -------
+        (m, r) float, m/s.
+        """
+        return np.zeros_like(v)
+
+    def begin(self, body: FreeBody, h: float) -> None:  # noqa: B027 - most have nothing to prepare
+        """Prepare a step.
+
+        Parameters
+        ----------
+        body : in its state before the step.
+        h : length of the step in s.
+        """
+
+    # ---- what is the same for all ----------------------------------------------------------------
+
+    def bind(self, body: FreeBody) -> None:
+        """Take hold of a body where it is now.
+
+        Parameters
+        ----------
+        body : a single one.
+
+        Raises
+        ------
+        MeshError
+            A point lies outside the body.
+        ModelError
+            The body is many bodies, or the constraint holds another one already.
+        """
+        if body.q.ndim > 1:
+            raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
+        if self._body is not None and self._body is not body:
+            raise ModelError("this constraint holds another body already; make one for each body")
+        if self._where is not None:
+            if body.mesh is None:
+                raise ModelError("nodes are chosen from a mesh, and this body has none; give points (m, 3)")
+            self._hold(body.mesh.points[body.mesh.nodes(self._where)])
+        body.locate(self.points)
+        self._body, self._start = body, body.position(self.points)
+
+    @property
+    def count(self) -> int:
+        """Number of rows m r."""
+        return len(self.points)
+
+    def jacobian_entries(self, body: FreeBody, q: Array) -> Entries:
+        """Return what is not 0 of H: points move along their directions with H u.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+
+        Returns
+        -------
+        rows (k,), dofs (k,) and values (k,) of H (m r, dofs).
+        """
+        directions = self.directions(body.position(self.points, q))
+        row, dof, value = [], [], []
+        for i, X in enumerate(self.points):
+            dofs, matrix = body.jacobian(X, q)
+            block = directions[i] @ matrix
+            r, k = np.nonzero(np.abs(block) > 1e-14 * np.abs(matrix).max())
+            row.append(r + i * len(block))
+            dof.append(dofs[k])
+            value.append(block[r, k])
+        return np.concatenate(row), np.concatenate(dof), np.concatenate(value)
+
+    def jacobian(self, body: FreeBody, q: Array) -> Array:
+        """Return H as a full matrix; it is kept where it is always the same.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+
+        Returns
+        -------
+        (m r, dofs) float.
+        """
+        if self._jacobian is not None:
+            return self._jacobian
+        row, dof, value = self.jacobian_entries(body, q)
+        H = np.zeros((self.count, body.dofs))
+        H[row, dof] = value
+        if body.jacobian_is_constant and not self.turning:
+            self._jacobian = H
+        return H
+
+    def gaps(self, body: FreeBody, q: Array, u: Array, time: float, h: float) -> Array:
+        """Return the gaps of a body; see `gap`.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q, u : its configuration and velocity.
+        time, h : time and length of the step in s.
+
+        Returns
+        -------
+        (m r,) float, m/s.
+        """
+        x, v = body.position(self.points, q), body.velocity(self.points, q, u)
+        return self.gap(x, v, time, h).ravel()
+
+    def set_reactions(self, body: FreeBody, q: Array, multipliers: Array) -> None:
+        """Note the reactions.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+        multipliers : (m r,) N, along the directions.
+        """
+        directions = self.directions(body.position(self.points, q))
+        self.reactions = np.einsum("mr,mri->mi", multipliers.reshape(directions.shape[:2]), directions)

@@ -1,0 +1,111 @@
+"""Constraints that stay as they are: fixed points, fixed directions and rigid links."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.bodies.constraints.base import Constraint, Points
+from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.validation import one_point, vector_of
+from kratos_lite.errors import InputError
+from kratos_lite.typing import Array
+
+
+class FixPoint(Constraint):
+    """Points that stay where they are.
+
+    Parameters
+    ----------
+    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
+        predicate on its points (n, 3), for the nodes there.
+    """
+
+    @property
+    def count(self) -> int:
+        """Number of rows: three for each point."""
+        return 3 * len(self.points)
+
+    def directions(self, x: Array) -> Array:
+        """Return x, y and z."""
+        return np.broadcast_to(np.eye(3), (len(self.points), 3, 3))
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return how far the points have moved; see `Constraint.gap`."""
+        return np.asarray((x - self._start) * (2 / h))
+
+
+class AlongDirection(Constraint):
+    """A constraint along one direction fixed in space.
+
+    Parameters
+    ----------
+    points : (3,) or (m, 3) m, in the undeformed body; or a part or side of the mesh (``"x-"``), or a
+        predicate on its points (n, 3), for the nodes there.
+    direction : (3,), of any length but 0.
+    """
+
+    def __init__(self, points: Points, direction: ArrayLike) -> None:
+        super().__init__(points)
+        n = vector_of(direction, "a direction")
+        length = float(np.linalg.norm(n))
+        if n.shape != (3,) or length == 0:
+            raise InputError(f"a direction needs three components, not all 0; got {direction!r}")
+        self.direction = n / length
+
+    def directions(self, x: Array) -> Array:
+        """Return the direction, for each point."""
+        return np.broadcast_to(self.direction, (len(self.points), 1, 3))
+
+    def _moved(self, x: Array) -> Array:
+        """Return how far points at x (m, 3) have moved along the direction, (m, 1) in m."""
+        return np.asarray((x - self._start) @ self.direction)[:, None]
+
+
+class FixDirection(AlongDirection):
+    """Points that do not move along a direction, but are free across it."""
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return how far the points have moved; see `Constraint.gap`."""
+        return self._moved(x) * (2 / h)
+
+
+class RigidLink(Constraint):
+    """A rod without mass from a material point to a fixed point in space.
+
+    Parameters
+    ----------
+    point : (3,) m, in the undeformed body.
+    anchor : (3,) m, in space.
+
+    The length is the distance at the time when the constraint is made.
+    """
+
+    turning = True
+
+    def __init__(self, point: ArrayLike, anchor: ArrayLike) -> None:
+        super().__init__(one_point(point))
+        self.anchor = one_point(anchor)
+
+    def bind(self, body: FreeBody) -> None:
+        """Take hold of a body where it is now.
+
+        Raises
+        ------
+        InputError
+            Point and anchor coincide.
+        """
+        super().bind(body)
+        self.length = float(np.linalg.norm(self._start[0] - self.anchor))
+        if self.length == 0:
+            raise InputError("a rigid link needs a length: point and anchor coincide; use FixPoint")
+
+    def directions(self, x: Array) -> Array:
+        """Return the direction from the anchor to the point."""
+        y = x - self.anchor
+        return np.asarray(y / np.linalg.norm(y))[:, None]
+
+    def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
+        """Return by how much the link is too long; see `Constraint.gap`."""
+        stretch = np.linalg.norm(x - self.anchor, axis=1) - self.length
+        return np.asarray(stretch[:, None] * (2 / h))

@@ -1,0 +1,178 @@
+"""Case: what an input means, whichever its format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kratos_lite.errors import ModelError
+from kratos_lite.typing import Array
+from kratos_lite.validation import flag, positive_step, whole_number
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis import CentralDifference
+    from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.bodies import Body
+
+
+@dataclass(frozen=True, eq=False)
+class TimeIntegration:
+    """How a model or body moves through time.
+
+    Attributes
+    ----------
+    step : in s.
+    steps : number of steps.
+    every : a state is kept after so many steps, and after the last.
+    substeps : of bodies: parts of each step, or ``"auto"``.
+    integrator : of models, the trapezoidal rule if not given; bodies have their own.
+    rayleigh : of models: α in 1/s and β in s of the damping α M + β K.
+    lumped : of models: whether the mass stands in the nodes.
+    displacement, velocity : of models: (n, 3) at the start; at rest if not given.
+    balanced : False lets a model start with the acceleration 0 from any displacement and velocity, as Kratos
+        does.
+    restart : file of a state from which to go on, or None.
+    place : of the step in its file, for messages.
+    """
+
+    step: float
+    steps: int
+    every: int = 1
+    substeps: int | str = 1
+    integrator: Implicit | CentralDifference | None = None
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    lumped: bool = False
+    displacement: Array | None = None
+    velocity: Array | None = None
+    balanced: bool = True
+    restart: str | None = None
+    place: str = ""
+
+    def __post_init__(self) -> None:
+        positive_step(self.step)
+        whole_number(self.steps, "steps")
+        whole_number(self.every, "every")
+        flag(self.lumped, "lumped")
+
+    def __str__(self) -> str:
+        by = f" by {self.integrator.name}" if self.integrator else ""
+        return f"{self.steps} steps of {self.step:g} s{by}"
+
+
+@dataclass
+class Outputs:
+    """Files to write.
+
+    Attributes
+    ----------
+    results : results by their endings: at rest .vtu, .vtk or .json; in time .pvd, .csv or .npz.
+    json : summary, displacements and reactions of a model at its end.
+    picture : of the end of a model, or of the path of a body.
+    state : the last state, from which another run goes on.
+    mode : how .vtu files store their numbers: ``binary`` if not given, ``compressed`` or ``ascii``.
+    """
+
+    results: list[str] = field(default_factory=list)
+    json: str | None = None
+    picture: str | None = None
+    state: str | None = None
+    mode: str | None = None
+
+    def paths(self) -> list[str]:
+        """Return all files.
+
+        Returns
+        -------
+        list of str
+            Results, json, picture, state.
+        """
+        single = (self.json, self.picture, self.state)
+        return [*self.results, *(path for path in single if path is not None)]
+
+
+@dataclass
+class Case:
+    """A model or body with all that an input says about its analysis, outputs and expected values.
+
+    Every input becomes one: model files, run files of Kratos and of kratos_lite, files and scripts of bodies,
+    and what the options of the command line add.
+
+    Attributes
+    ----------
+    subject : the model, whose `notes` tell what was not used; or the body, which may hold many.
+    time : how it moves through time, or None where it rests.
+    modes : number of natural frequencies that are asked for instead, or 0.
+    solver, tolerance : of a model at rest, as for `Model.solve`.
+    outputs : files to write.
+    expected : comparisons of the end of a model with expected values; each returns a line.
+    files : files that were read.
+    """
+
+    subject: Model | Body
+    time: TimeIntegration | None = None
+    modes: int = 0
+    solver: str = "auto"
+    tolerance: float = 1e-10
+    outputs: Outputs = field(default_factory=Outputs)
+    expected: list[Callable[[Result], str]] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def analysis(self) -> str:
+        """The analysis: ``static``, ``steady``, ``transient``, ``modal`` or ``bodies``."""
+        if not self.is_of_model:
+            return "bodies"
+        if self.modes:
+            return "modal"
+        if self.time is not None:
+            return "transient"
+        return "static" if self.model.motion is None else "steady"
+
+    @property
+    def is_of_model(self) -> bool:
+        """Whether the subject is a model, not a body."""
+        return hasattr(self.subject, "supports")
+
+    @property
+    def model(self) -> Model:
+        """The model.
+
+        Raises
+        ------
+        ModelError
+            The subject is a body.
+        """
+        if not self.is_of_model:
+            raise ModelError("this is a case of bodies; it has no model")
+        return self.subject  # type: ignore[return-value]
+
+    @property
+    def body(self) -> Body:
+        """The body.
+
+        Raises
+        ------
+        ModelError
+            The subject is a model.
+        """
+        if self.is_of_model:
+            raise ModelError("this is a case of a model; it has no body")
+        return self.subject  # type: ignore[return-value]
+
+    def compare(self, result: Result) -> list[str]:
+        """Return a line for each expected value: passed, failed or not evaluated, with the numbers.
+
+        Parameters
+        ----------
+        result : of the model, at its end.
+
+        Returns
+        -------
+        list of str
+            Such as ``check … passed (…)``.
+        """
+        return [comparison(result) for comparison in self.expected]

@@ -1,0 +1,98 @@
+"""Outputs: what a case writes is checked here before any work, and written here after it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from kratos_lite.analysis.result import Result
+from kratos_lite.errors import InputError
+from kratos_lite.io.case import Case, Outputs
+from kratos_lite.io.documents import ELEM_SET, ending
+from kratos_lite.io.writers.endings import check_ending, check_result, check_series
+from kratos_lite.io.writers.results import write_result
+
+
+def check_outputs(case: Case) -> None:
+    """Raise, before any work is done, for an output of a case that cannot be written.
+
+    Folders may be missing for states in time; they are made then.
+    """
+    outputs, restart = case.outputs, case.time.restart if case.time else None
+    read = [*case.files, *([Path(restart)] if restart else [])]
+    check_targets(read, outputs.paths(), new_folders=case.time is not None)
+    for path in outputs.results:
+        if case.time is None:
+            check_result(path, outputs.mode)
+        else:
+            check_series(path)
+    if outputs.mode and not outputs.results:
+        kind = "OUT.vtu" if case.time is None else "OUT.pvd"
+        raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o {kind}")
+    if outputs.mode and case.time and not any(ending(path) == ".pvd" for path in outputs.results):
+        raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o OUT.pvd")
+    for single, wanted in ((outputs.json, ".json"), (outputs.state, ".npz")):
+        if single is not None:
+            check_ending(single, wanted)
+    if outputs.picture is not None:
+        from kratos_lite.io.writers.pictures import check_picture  # rarely needed
+
+        check_picture(outputs.picture)
+    if not case.is_of_model and outputs.json is not None:
+        raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
+
+
+def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
+    """Write what the end of a model gives: its summary and, at rest, results and picture."""
+    if outputs.json is not None:
+        write_result(outputs.json, result)
+    if in_time:
+        return
+    for path in outputs.results:
+        write_result(path, result, outputs.mode)
+    if outputs.picture is not None:
+        from kratos_lite.io.writers.pictures import draw
+
+        draw(outputs.picture, result)
+
+
+def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: bool = False) -> None:
+    """Raise InputError for a target that is read, given twice, or cannot be written.
+
+    Where `new_folders` are made for the targets, a folder may be missing.
+    """
+    taken = {os.path.realpath(path) for source in read for path in _on_disk(source)}
+    for target in targets:
+        if not target:
+            raise InputError("an output has an empty name; give a file name such as out.vtu")
+        folder = Path(target).parent
+        if not folder.is_dir() and not (new_folders and not folder.exists()):
+            raise InputError(f"{target}: the folder {folder} does not exist")
+        for path in _set_of(Path(target)):
+            real, name = os.path.realpath(path), target if path == Path(target) else str(path)
+            if path.exists() and not path.is_file():
+                raise InputError(f"{name}: cannot be written: it is a folder or a device, not a file")
+            if os.path.islink(real):
+                raise InputError(f"{name}: cannot be written: its symbolic links lead in a circle")
+            if real in taken:
+                raise InputError(f"{name}: is an input or another output; choose another name")
+        taken |= {os.path.realpath(path) for path in _set_of(Path(target))}
+
+
+def _on_disk(path: Path) -> list[Path]:
+    """Return a path, and those files of its five-file set or of the stem of one that are there."""
+    members = _set_of(path)
+    if not path.is_file() and path.name:
+        members += [path.with_name(path.name + suffix) for suffix in ELEM_SET]
+    zipped = [file.with_name(file.name + ".gz") for file in members if file.name]
+    return [path, *(file for file in (*members, *zipped) if file.is_file())]
+
+
+def _set_of(path: Path) -> list[Path]:
+    """Return all five files of a set, or the one file."""
+    if ending(path) not in ELEM_SET:
+        return [path]
+    gz = ".gz" if path.suffix.lower() == ".gz" else ""
+    stem = path.with_suffix("") if gz else path
+    return [stem.with_suffix(suffix + gz) for suffix in ELEM_SET]

@@ -1,0 +1,1 @@
+"""Readers: what each format of a run says, as a `Case`."""

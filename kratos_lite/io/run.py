@@ -1,0 +1,70 @@
+"""Run a case: a table from the name of its analysis to the module that runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any
+
+from kratos_lite.errors import ModelError
+from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import check_outputs
+from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.typing import Progress
+
+ANALYSES = {
+    "static": "at_rest",
+    "steady": "at_rest",
+    "modal": "modal",
+    "transient": "transient",
+    "bodies": "bodies",
+}
+"""The module of `kratos_lite.io.runners` that runs each analysis."""
+
+
+def run(case: Case, progress: Progress | None = None) -> Outcome:
+    """Run what an input describes.
+
+    States in time are written as they come; `Outcome.write` writes what the end gives.
+
+    Parameters
+    ----------
+    case : such as `kratos_lite.read_case` returns.
+    progress : called with the phase and the share done, 0 … 1.
+
+    Returns
+    -------
+    Outcome
+        Summary, result and comparisons with expected values.
+
+    Raises
+    ------
+    InputError, MeshError, ModelError, SolveError
+        An output cannot be written, or the analysis cannot be done.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0, density=1000.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0.0, 0.0, 1e6)))
+    >>> outcome = kl.run(kl.Case(bar))
+    >>> print(f"{outcome.result.u[:, 2].max():.3g} m")
+    0.001 m
+    """
+    check_outputs(case)
+    outcome: Outcome = runner_of(case).run(case, progress)
+    return outcome
+
+
+def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:
+    """Return the transient or body of a case in time and its states, checked; no step is taken yet."""
+    if case.time is None:
+        raise ModelError("this case is not in time; give its file a section 'time'")
+    subject, states = runner_of(case).prepare(case, progress)
+    return subject, states
+
+
+def runner_of(case: Case) -> Any:
+    """Return the module that runs the analysis of a case."""
+    return import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis]}")

@@ -1,0 +1,1 @@
+"""Runners: how each analysis of a case is done, one file each."""

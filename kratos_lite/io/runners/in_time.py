@@ -1,0 +1,55 @@
+"""What models and bodies in time share: files that are written step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any, Protocol
+
+import numpy as np
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.case import Case, TimeIntegration
+from kratos_lite.io.writers.series import SeriesWriter, make_folder
+
+
+class Monitor(Protocol):
+    """Takes each state for the summary."""
+
+    def add(self, state: Any) -> None:
+        """Take a state."""
+
+
+def placed(time: TimeIntegration, action: Callable[[], Iterator[Any]]) -> Iterator[Any]:
+    """Return what an action returns; an InputError, as of a step that is too long, gets its place."""
+    try:
+        return action()
+    except InputError as error:
+        raise InputError(f"{time.place}: {error}" if time.place else str(error)) from None
+
+
+def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Monitor) -> None:
+    """Take all steps of a case, and write its series and its last state.
+
+    After an error or Ctrl-C the series hold the states up to there, and the last of them is written too.
+    """
+    outputs, last = case.outputs, [start]
+    for path in outputs.paths():
+        make_folder(path)
+    with ExitStack() as stack:
+        if outputs.state is not None:
+            stack.callback(_save, last, outputs.state)
+        series = [
+            stack.enter_context(SeriesWriter(path, subject, mode=outputs.mode or "binary"))
+            for path in outputs.results
+        ]
+        stack.enter_context(np.errstate(over="ignore", invalid="ignore"))
+        for recorder in (*series, monitor):
+            recorder.add(start)
+        for last[0] in states:
+            for recorder in (*series, monitor):
+                recorder.add(last[0])
+
+
+def _save(last: list[Any], path: str) -> None:
+    last[0].save(path)

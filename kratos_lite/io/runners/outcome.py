@@ -1,0 +1,76 @@
+"""Outcome: what a case came to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kratos_lite.analysis.result import Result
+from kratos_lite.io.case import Case
+from kratos_lite.io.outputs import write_at_end
+
+WIDTH = 22
+"""Of the left column of tables."""
+
+
+@dataclass
+class Outcome:
+    """What a case came to; printed, it is the summary.
+
+    Attributes
+    ----------
+    case : what was run.
+    rows : the summary: labels and values; those of the result where there are none.
+    result : of a model at its end, or None.
+    lines : a table instead of the summary, as of natural frequencies.
+    """
+
+    case: Case
+    rows: list[tuple[str, str]]
+    result: Result | None = None
+    lines: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return "\n".join(self.summary())
+
+    def summary(self, *, verbose: bool = False) -> list[str]:
+        """Return the lines of the summary.
+
+        Parameters
+        ----------
+        verbose : say also what the solution did without.
+
+        Returns
+        -------
+        list of str
+            A label and a value each.
+        """
+        rows = self.rows or (self.result.table() if self.result else [])
+        shown = [(name, text) for name, text in rows if verbose or name != "skipped"]
+        return [*self.lines, *(f"{name:<{WIDTH}}{text}" for name, text in shown)]
+
+    def compare(self) -> list[str]:
+        """Return a line for each expected value of the case: passed, failed or not evaluated.
+
+        Returns
+        -------
+        list of str
+            Nothing where there is no result.
+        """
+        return [] if self.result is None else self.case.compare(self.result)
+
+    def write(self) -> list[str]:
+        """Write what the end gives; return all files of the case, also those written before.
+
+        Returns
+        -------
+        list of str
+            Paths.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written.
+        """
+        if self.result is not None:
+            write_at_end(self.case.outputs, self.result, in_time=self.case.time is not None)
+        return self.case.outputs.paths()

@@ -1,0 +1,109 @@
+"""Models in time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis import Moment, Transient
+from kratos_lite.analysis.result import vector
+from kratos_lite.io.case import Case
+from kratos_lite.io.runners.in_time import follow, placed
+from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.io.writers.pictures import draw
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.loads import NodalForces, TimeDependentLoad
+from kratos_lite.model.structure import Structure
+from kratos_lite.typing import Progress
+
+
+def prepare(case: Case, progress: Progress | None = None) -> tuple[Transient, Iterator[Moment]]:
+    """Return the transient of a case and its states, checked, without a step."""
+    time = case.time
+    assert time is not None
+    names = ("integrator", "rayleigh", "lumped", "displacement", "velocity")
+    given: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
+    given["scheme"] = given.pop("integrator")
+    transient = case.model.transient(**given)
+    if not time.balanced and not (time.displacement is None and time.velocity is None):
+        transient = Transient(_held_at_first(transient), **given)
+    if time.restart is not None:
+        transient.put(Moment.load(time.restart))
+    return transient, placed(time, lambda: transient.march(time.step, time.steps, every=time.every))
+
+
+def _held_at_first(transient: Transient) -> Structure:
+    """Return the model of a transient with a load at its start that balances stiffness and damping there."""
+    e = transient.equations
+    inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)
+    balance = NodalForces(e.system.scatter(inner))
+    model = copy(e.model)
+    model.loads = [*model.loads, TimeDependentLoad(lambda time: None if time > 0 else balance)]
+    return model
+
+
+def run(case: Case, progress: Progress | None = None) -> Outcome:
+    """Take the steps of a model; its result is that of the end."""
+    transient, states = prepare(case, progress)
+    start = transient.moment()
+    summary, clock = _Summary(transient), perf_counter()
+    follow(case, transient, start, states, summary)
+    rows = summary.rows(case, perf_counter() - clock)
+    if case.outputs.picture is not None:
+        _draw(case.outputs.picture, case.model.mesh, summary.last)
+    return Outcome(case, rows, transient.result(summary.last))
+
+
+def _draw(path: str, mesh: Mesh, state: Moment) -> None:
+    title = f"displacement at t = {state.time:g} s"
+    draw(path, mesh, state.u, np.linalg.norm(state.u, axis=1), title=title, unit="m")
+
+
+class _Summary:
+    """What the summary says of a transient: its start, its last state and the one that moved farthest."""
+
+    def __init__(self, transient: Transient) -> None:
+        self.transient, self.energy = transient, transient.energy()
+        self.kept = 0
+        self.largest, self.row = 0.0, 0
+        self.start = self.last = self.farthest = transient.moment()
+
+    def add(self, state: Moment) -> None:
+        """Take a state."""
+        self.last, self.kept = state, self.kept + 1
+        length = np.linalg.norm(state.u, axis=1)
+        row = int(length.argmax())
+        if length[row] > self.largest:
+            self.largest, self.farthest, self.row = float(length[row]), state, row
+
+    def rows(self, case: Case, seconds: float) -> list[tuple[str, str]]:
+        """Return the rows of the table."""
+        e, mesh, time = self.transient.equations, case.model.mesh, case.time
+        assert time is not None
+        kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block))
+        steps = self.last.step - self.start.step
+        span = f"{self.start.time:.6g} … {self.last.time:.6g} s, {steps} steps of {time.step:g} s"
+        force, scale = self.last.reactions.sum(axis=0), float(np.abs(self.last.reactions).sum())
+        where = f"at node {mesh.node_ids[self.row]}, t = {self.farthest.time:.6g} s, of {self.kept} kept"
+        rows = [
+            ("nodes", str(mesh.n_nodes)),
+            ("elements", kinds),
+            ("unknowns", str(len(e.system.reduced.free))),
+            ("integrator", self.transient.scheme.name + (", lumped mass" if e.mass.lumped else "")),
+            ("time", span),
+            ("largest displacement", f"{self.largest:.6e} m {where}"),
+            ("energy", f"{self.energy:.6e} J at the start, {self.transient.energy():.6e} J at the end"),
+            ("total reaction", f"{vector(force, scale)} N at the end"),
+            ("time per step", f"{seconds / max(steps, 1):.3g} s, {seconds:.3g} s in all"),
+        ]
+        if any(time.rayleigh):
+            rows.insert(4, ("damping", "{:g} 1/s × M + {:g} s × K".format(*e.rayleigh)))
+        rows += self.transient.result(self.last).report.motion_rows()
+        still = [] if self.largest else ["no load, no support that moves and no velocity: nothing moves"]
+        still += [f"rigid motions are held by inertia alone: {e.free_motions}"] if e.free_motions else []
+        rows += [("warning", text) for text in (*e.warnings, *still)]
+        return rows + [("note", text) for text in case.model.notes]

@@ -1,0 +1,44 @@
+"""Endings of outputs: which formats hold a result, and which hold states in time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.formats.vtu import check_mode
+
+RESULTS = (".vtu", ".vtk", ".json")
+"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
+SERIES = (".pvd", ".csv", ".npz")
+"""Formats of states in time: for ParaView, a table, arrays."""
+
+
+def check_result(path: str | Path, mode: str | None = None) -> None:
+    """Raise InputError for a format that cannot hold a result, or that has no such mode of .vtu files."""
+    ending = Path(path).suffix.lower()
+    if not ending:
+        raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
+    if ending in SERIES:
+        raise InputError(f"{path}: {ending} holds states in time; add --time STEP:STEPS, or write .vtu")
+    if ending not in RESULTS:
+        raise InputError(
+            f"{path}: results cannot be written as {ending!r}; {' '.join(RESULTS)} hold all fields"
+        )
+    if mode is not None:
+        check_mode(mode)
+        if ending != ".vtu":
+            raise InputError(
+                f"{path}: only .vtu files are written as {mode}; leave the mode out, or write .vtu"
+            )
+
+
+def check_series(path: str | Path) -> None:
+    """Raise InputError for a format that cannot hold states in time."""
+    if Path(path).suffix.lower() not in SERIES:
+        raise InputError(f"{path}: states in time are written as .pvd (for ParaView), .csv or .npz")
+
+
+def check_ending(path: str | Path, wanted: str) -> None:
+    """Raise InputError for a path with another ending."""
+    if Path(path).suffix.lower() != wanted:
+        raise InputError(f"{path}: the ending must be {wanted}")

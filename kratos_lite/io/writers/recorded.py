@@ -1,0 +1,166 @@
+"""What bodies and transients offer to writers of series: fields of a state, a row of numbers, arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from kratos_lite.analysis import Transient
+from kratos_lite.bodies import Body, State
+from kratos_lite.bodies.state import at
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.io.writers.results import fields
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
+
+OF_BODIES = (
+    "time [s]",
+    "kinetic energy [J]",
+    "internal energy [J]",
+    "potential energy [J]",
+    "energy [J]",
+    "external work [J]",
+    *(f"mass center {axis} [m]" for axis in "xyz"),
+    *(f"linear momentum {axis} [kg m/s]" for axis in "xyz"),
+    *(f"angular momentum {axis} [kg m2/s]" for axis in "xyz"),
+)
+"""Columns of a table: energy is the sum of the three before it, angular momentum about the mass center."""
+OF_MODELS = (
+    "time [s]",
+    "energy [J]",
+    "largest displacement [m]",
+    *(f"total reaction {axis} [N]" for axis in "xyz"),
+)
+"""Columns of a table of a transient."""
+
+
+class Recorded(Protocol):
+    """What is recorded of a subject in time.
+
+    Attributes
+    ----------
+    columns : of a table.
+    names : of arrays, attributes of a state.
+    """
+
+    columns: tuple[str, ...]
+    names: tuple[str, ...]
+
+    def now(self) -> Any:
+        """Return the state of the subject as it is now."""
+
+    def mesh(self) -> Mesh:
+        """Return the mesh that is shown."""
+
+    def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return fields of nodes and of elements by their Kratos names."""
+
+    def row(self, state: Any) -> Array:
+        """Return the row of a table, by `columns`."""
+
+    def extra(self) -> dict[str, Array]:
+        """Return arrays that belong to no state."""
+
+
+class RecordedBody:
+    """A body, or many as arrays only."""
+
+    columns: tuple[str, ...] = OF_BODIES
+    names: tuple[str, ...] = ("time", "step", "q", "u", "external_work")
+
+    def __init__(self, body: Body, path: str | Path) -> None:
+        self.body, self.path = body, path
+
+    def now(self) -> State:
+        """Return the state of the body as it is now."""
+        return State.of(self.body)
+
+    def mesh(self) -> Mesh:
+        """Return the mesh; ModelError for a body without one."""
+        check_single(self.body, self.path)
+        if self.body.mesh is None:
+            raise ModelError(f"{self.path}: this body has no mesh to be shown; write .csv or .npz")
+        return self.body.mesh
+
+    def fields(self, state: State) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return DISPLACEMENT and VELOCITY of the nodes."""
+        X = self.mesh().points
+        with at(self.body, state):
+            moved = self.body.position(X) - X
+            return {"DISPLACEMENT": moved, "VELOCITY": self.body.velocity(X)}, {}
+
+    def row(self, state: State) -> Array:
+        """Return time, energies, work, mass center and momenta."""
+        body = self.body
+        check_single(body, self.path)
+        with at(body, state):
+            energies = [
+                float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
+            ]
+            vectors = (body.mass_center(), body.linear_momentum(), body.angular_momentum())
+            work = float(state.external_work)
+            return np.concatenate([[state.time, *energies, sum(energies), work], *vectors])
+
+    def extra(self) -> dict[str, Array]:
+        """Return the kind of the body."""
+        return {"kind": np.array(self.body.kind)}
+
+
+class RecordedModel:
+    """A transient of a model."""
+
+    columns: tuple[str, ...] = OF_MODELS
+    names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
+
+    def __init__(self, transient: Transient) -> None:
+        self.transient = transient
+
+    def now(self) -> Any:
+        """Return the state of the model as it is now."""
+        return self.transient.moment()
+
+    def mesh(self) -> Mesh:
+        """Return the mesh of the model."""
+        return self.transient.equations.model.mesh
+
+    def fields(self, state: Any) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return DISPLACEMENT, VELOCITY, ACCELERATION, REACTION and stresses."""
+        points, cells = fields(self.transient.result(state))
+        return {**points, "VELOCITY": state.v, "ACCELERATION": state.a}, cells
+
+    def row(self, state: Any) -> Array:
+        """Return time, energy, largest displacement and total reaction."""
+        largest = np.linalg.norm(state.u, axis=1).max()
+        reaction = state.reactions.sum(axis=0)
+        return np.array([state.time, self.transient.energy(state), largest, *reaction])
+
+    def extra(self) -> dict[str, Array]:
+        """Return nothing."""
+        return {}
+
+
+def recorded(subject: Body | Transient, path: str | Path) -> Recorded:
+    """Return what a subject offers; InputError for one that is no body and no transient."""
+    if isinstance(subject, Transient):
+        return RecordedModel(subject)
+    if isinstance(subject, Body):
+        return RecordedBody(subject, path)
+    raise InputError(
+        f"{path}: a series holds the states of one body, such as kl.RigidBody, or of a transient; "
+        f"got {type(subject).__name__}; make one series for each body"
+    )
+
+
+def check_single(body: Body, path: str | Path) -> None:
+    """Raise ModelError for many bodies at once."""
+    if body.q.ndim > 1:
+        raise ModelError(f"{path}: only a single body can be written so; for many bodies write .npz")
+
+
+def arrays_of(subject: Recorded, states: Sequence[Any]) -> dict[str, Array]:
+    """Return the numbers of states as arrays, one row for each state."""
+    found = {name: np.array([getattr(state, name) for state in states]) for name in subject.names}
+    return {**subject.extra(), **found}
