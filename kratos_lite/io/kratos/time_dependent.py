@@ -79,8 +79,8 @@ class ProcessesInTime:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
         loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
-        for rows, axis, course in self._moving:
-            model.fix(rows, axis, course, override=True)
+        for rows, axis, motion in self._moving:
+            model.fix(rows, axis, motion, override=True)
         if model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self._moving:
