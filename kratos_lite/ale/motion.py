@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.ale.boundaries import cut_nodes, dashpots, leak, periodic_pairs
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.kinematic_linear import lame_constants
+from kratos_lite.elements.tables import lame_constants
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Attachment, Structure

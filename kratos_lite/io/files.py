@@ -10,11 +10,11 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
 from kratos_lite.io.kratos import model_from
-from kratos_lite.io.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.io.document import Document
+    from kratos_lite.io.settings import Settings
     from kratos_lite.mesh import Mesh
 
 
@@ -64,6 +64,8 @@ def read_case(
     """
     path = Path(path)
     if ending(path) == ".json":
+        from kratos_lite.io.settings import read_settings
+
         return _case_of_json(read_settings(path), strict, allow_outside)
     if ending(path) == ".py":
         from kratos_lite.io.readers.script import read_script
@@ -89,30 +91,40 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
     return read_run_file(settings, strict=strict, allow_outside=outside)
 
 
-def write(path: str | Path, thing: Any) -> list[str]:
+def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     """Write a result, a state, a model or a mesh by the ending of `path`.
 
-    A result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or a mesh
-    to .mdpa, an .elem set, .vtu or a format of meshio.
+    Parameters
+    ----------
+    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or a
+        mesh to .mdpa, an .elem set, .vtu or a format of meshio.
+    thing : a `Result`, `State`, `Model` or `Mesh`.
+    mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
     -------
     list of str
         What the format cannot hold and was left out.
+
+    Raises
+    ------
+    InputError
+        The thing is none of these, or the format cannot hold it.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.state import State
     from kratos_lite.io.document import Document
+    from kratos_lite.io.writers.results import write_result
     from kratos_lite.io.writers.state import write_state
     from kratos_lite.mesh import Mesh
 
     if isinstance(thing, Result):
-        thing.save(path)
+        write_result(path, thing, mode)
         return []
+    if mode is not None:
+        raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
     if isinstance(thing, State):
-        if ending(path) != ".npz":
-            raise InputError(f"{path}: a state is written as .npz")
         write_state(path, thing)
         return []
     if isinstance(thing, Model):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
@@ -139,7 +139,7 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
     where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
     nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
     if (det < 0).all():
-        cure = "the element is turned inside out; mesh.reoriented() mends the node order"
+        cure = "the element is inverted; mesh.reoriented() corrects the node order"
     elif (det == 0).all():
         cure = "the element has no volume; two of its nodes may coincide"
     else:

@@ -331,7 +331,10 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
         (("--time", "1e-3:0"), ("steps must be a whole number ≥ 1",)),
         (("--time", "x:3"), ("--time: 'x' is not a finite number",)),
         (("--time", "-1:3"), ("a step must be one number > 0, in s",)),
-        (("--time", "1:3", "--integrator", "euler"), ("unknown integrator 'euler'", "Known are central_difference, newmark")),
+        (
+            ("--time", "1:3", "--integrator", "euler"),
+            ("unknown integrator 'euler'", "Known are central_difference, newmark"),
+        ),
         (("--time", "1:3", "--integrator", "hht:a"), ("--integrator: 'a' is not a finite number",)),
         (("--time", "1:3", "--integrator", "hht:1,2"), ("hht takes 0 or 1 numbers; got 2",)),
         (("--time", "1:3", "--rayleigh", "1"), ("--rayleigh: ALPHA,BETA",)),

@@ -1,4 +1,4 @@
-"""Time integration of a Kratos run file: its integrator, damping, steps and start."""
+"""Time integration of a Kratos run file: integrator, damping, steps and initial state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DYNAMIC_KEYS = (
 
 
 def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
-    """Return the steps of a dynamic run file of Kratos; InputError with the place of what is wrong."""
+    """Return the time integration of a dynamic run file; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
     text = f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
@@ -50,7 +50,7 @@ def _integrator(solver: Settings) -> ModelIntegrator:
         raise solver.error(
             "time_integration_method",
             f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
-            "the option --integrator central_difference then steps explicitly",
+            "the option --integrator central_difference then integrates explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
     text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"

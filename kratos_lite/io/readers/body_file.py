@@ -22,7 +22,7 @@ from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.readers.body_loads import add_constraint, add_load
 from kratos_lite.io.readers.run_file import mesh_file_of, output_of
 from kratos_lite.io.readers.time import read_time_of_body, restart_of
-from kratos_lite.io.readers.values import Read, is_by_part, matrix, number, read_material, vector
+from kratos_lite.io.readers.values import Read, is_by_part, matrix, read_material
 from kratos_lite.io.settings import Settings, shown
 from kratos_lite.io.writers.endings import SERIES, check_ending
 from kratos_lite.mesh import Mesh
@@ -31,7 +31,7 @@ from kratos_lite.model.mass_properties import MassProperties
 
 OUTPUTS = (*(ending[1:] for ending in SERIES), "picture", "state")
 KEYS = ("mesh", "material", "body", "start", "loads", "constraints", "time", "output", "restart")
-MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str], Any]]]] = {
+MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Read]]] = {
     "box": (
         box,
         {
@@ -51,7 +51,7 @@ MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str],
     ),
 }
 """Meshes that are made, by name: function, and how its arguments are read."""
-OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
+OPTIONS: dict[str, Read] = {
     "formulation": Settings.text,
     "modes": Settings.integer,
     "lumped": Settings.flag,
@@ -60,10 +60,10 @@ OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
     "tolerance": Settings.number,
 }
 """Options of bodies; which of them a kind has is said by its arguments."""
-CHARACTERISTICS: dict[str, Read] = {
-    "mass": number,
-    "volume": number,
-    "center": vector,
+MASS_PROPERTIES: dict[str, Read] = {
+    "mass": Settings.number,
+    "volume": Settings.number,
+    "center": Settings.vector,
     "inertia": matrix,
     "euler": matrix,
 }
@@ -103,12 +103,16 @@ def read_body_file(settings: Settings, *, strict: bool = True) -> Case:
 def _outputs(settings: Settings, folder: Path) -> Outputs:
     section = settings.section("output")
     section.check_keys(OUTPUTS)
-    found = {key: output_of(section, key, folder) for key in section.values}
-    for key, path in found.items():
+    for key in section.values:
         if key != "picture":
-            section.placed(key, check_ending, path, ".npz" if key == "state" else f".{key}")
-    results = [path for key, path in found.items() if key not in ("picture", "state")]
-    return Outputs(results, picture=found.get("picture"), state=found.get("state"))
+            section.placed(key, check_ending, section.text(key), ".npz" if key == "state" else f".{key}")
+    return outputs_of({key: output_of(section, key, folder) for key in section.values})
+
+
+def outputs_of(paths: dict[str, str]) -> Outputs:
+    """Return the outputs of a body from paths by the keys `OUTPUTS`."""
+    results = [path for key, path in paths.items() if key not in ("picture", "state")]
+    return Outputs(results, picture=paths.get("picture"), state=paths.get("state"))
 
 
 # ---- mesh and material -----------------------------------------------------------------------------
@@ -132,9 +136,9 @@ def _mesh(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh, Materia
     make, readers = MESHES[name]
     section = settings.section("mesh").section(name)
     section.check_keys(readers)
-    required = [k for k, p in inspect.signature(make).parameters.items() if p.default is p.empty]
-    for key in required:
-        section.get(key)
+    for key, parameter in inspect.signature(make).parameters.items():
+        if parameter.default is parameter.empty:
+            section.get(key)
     values = {key: readers[key](section, key) for key in section.values}
     return settings.section("mesh").placed(name, make, **values), None
 
@@ -172,9 +176,9 @@ def _body_of(settings: Settings, folder: Path, strict: bool) -> Body:
 
 def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> Body:
     value = settings.get("body")
-    whole = isinstance(value, str)
-    section = Settings(Object(), settings.source, "body") if whole else settings.section("body")
-    owner, key = (settings, "body") if whole else (section, "kind")
+    is_word = isinstance(value, str)
+    section = Settings(Object(), settings.source, "body") if is_word else settings.section("body")
+    owner, key = (settings, "body") if is_word else (section, "kind")
     kind = owner.placed(key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
     options = [name for name in (*OPTIONS, "mass_properties") if name in arguments]
@@ -182,7 +186,7 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     given: dict[str, Any] = {name: OPTIONS[name](section, name) for name in OPTIONS if name in section}
     if "mass_properties" in section:
         inner = section.section("mass_properties")
-        given["mass_properties"] = section.placed("mass_properties", _characteristics, inner, mesh, material)
+        given["mass_properties"] = section.placed("mass_properties", _mass_properties, inner, mesh, material)
     elif mesh is None:
         raise settings.error("mesh", "key 'mesh' is missing: it is the shape of the body")
     if material is None and "mass_properties" not in given and not issubclass(kind, Obstacle):
@@ -192,10 +196,10 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     return owner.placed(key, kind, mesh, material, **given)
 
 
-def _characteristics(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
+def _mass_properties(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
     """Return mass_properties: those of the mesh with the given ones in their place."""
-    section.check_keys(CHARACTERISTICS)
-    given = {key: CHARACTERISTICS[key](section, key, mesh) for key in section.values}
+    section.check_keys(MASS_PROPERTIES)
+    given = {key: MASS_PROPERTIES[key](section, key) for key in section.values}
     if mesh is None or material is None:
         section.get("mass")
         return MassProperties(**given)

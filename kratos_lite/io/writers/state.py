@@ -15,7 +15,9 @@ WHAT = "a state that kl.write wrote"
 
 
 def write_state(path: str | Path, state: State) -> None:
-    """Write a state, as a whole or not at all."""
+    """Write a state, as a whole or not at all; InputError unless the path ends with .npz."""
+    if Path(path).suffix.lower() != ".npz":
+        raise InputError(f"{path}: a state is written as .npz")
     write_arrays(path, {**{name: np.asarray(getattr(state, name)) for name in HEAD}, **state.values})
 
 
