@@ -96,8 +96,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or a
-        mesh to .mdpa, an .elem set, .vtu or a format of meshio.
+    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or
+        a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
     thing : a `Result`, `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 

@@ -333,7 +333,7 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
         (("--time", "-1:3"), ("a step must be one number > 0, in s",)),
         (
             ("--time", "1:3", "--integrator", "euler"),
-            ("unknown integrator 'euler'", "Known are central_difference, newmark"),
+            ("integrator 'euler'", "Known are central_difference"),
         ),
         (("--time", "1:3", "--integrator", "hht:a"), ("--integrator: 'a' is not a finite number",)),
         (("--time", "1:3", "--integrator", "hht:1,2"), ("hht takes 0 or 1 numbers; got 2",)),
