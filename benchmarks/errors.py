@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from benchmarks import fields
 from benchmarks.scenes import Scene
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import rule_for
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 import kratos_lite as kl
 from benchmarks import fields
-from kratos_lite.elements.kinematic_linear import tabulate
 from kratos_lite.elements.surface import area_vectors, face_rule
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh.generators import SPLITS, raise_order
 from kratos_lite.quadrature import rule_for
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, number
 
 
 class TimeSeries:
@@ -99,16 +99,13 @@ def function_of(value: Factor, what: str) -> Callable[[float], float]:
         given = value
 
         def checked(time: float) -> float:
-            number = finite(given(time), f"{what} at t = {time:g} s")
-            if number.ndim:
-                raise InputError(f"{what} at t = {time:g} s must be one number; got shape {number.shape}")
-            return float(number)
+            return number(given(time), f"{what} at t = {time:g} s")
 
         return checked
-    number = finite(value, what)
-    if number.ndim:
-        raise InputError(f"{what} must be a number, a TimeSeries or a function of the time; got {value!r}")
-    return lambda time: float(number)
+    constant = finite(value, what)
+    if constant.ndim:
+        raise InputError(f"{what} must be a number, a TimeSeries or a function of time; got {value!r}")
+    return lambda time: float(constant)
 
 
 def slope_of(value: Factor, what: str) -> Callable[[float], float]:

@@ -71,7 +71,8 @@ def finite(
         axes = ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "")
         raise error(f"{what} must have shape ({axes}); got {array.shape}")
     if not np.isfinite(array).all():
-        raise error(f"{what} must be finite; got {short(value)}")
+        found = value if array.size < 10 else float(array[~np.isfinite(array)][0])
+        raise error(f"{what} must be finite; got {short(found)}")
     return array
 
 

@@ -57,7 +57,7 @@ def work(job: Job) -> Array | None:
     if job.given.get("write"):
         with job.phase("write"):
             ending = ".vtu" if job.given["write"] is True else job.given["write"]
-            result.save(f"{job.given['folder']}/result{ending}", job.given.get("mode"))
+            kl.write(f"{job.given['folder']}/result{ending}", result, job.given.get("mode"))
     return np.asarray(result.displacement())
 
 

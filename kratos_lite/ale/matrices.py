@@ -36,6 +36,14 @@ class MotionMatrices:
     All are data (nnz,) on one pattern.  Loads come from `mass`, which is consistent also where that of the
     equations is lumped.
 
+    Parameters
+    ----------
+    motion : of the material.
+    points : (n, 3) nodes in m.
+    groups : the elements.
+    pattern : of the matrices.
+    mass : of the same elements.
+
     Attributes
     ----------
     G : ∫ ρ N_i c·grad N_j, row i of the test function.
@@ -52,7 +60,12 @@ class MotionMatrices:
         self._made: dict[str, Array] = {}
 
     def make(self, names: str) -> None:
-        """Make G, H or both, of those not made before, in one pass over the elements."""
+        """Make G, H or both, of those not made before, in one pass over the elements.
+
+        Parameters
+        ----------
+        names : ``"G"``, ``"H"`` or ``"GH"``.
+        """
         missing = "".join(name for name in names if name not in self._made)
         if missing:
             motion = self.motion  # points from the center on, where no digits are lost
@@ -102,7 +115,17 @@ class MotionMatrices:
         return np.asarray(matrix.data)
 
     def times(self, data: Array, v: Array) -> Array:
-        """Return the matrix of `data` times nodal vectors v (n, 3)."""
+        """Return a product with nodal vectors.
+
+        Parameters
+        ----------
+        data : (nnz,) of a matrix on the pattern.
+        v : (n, 3).
+
+        Returns
+        -------
+        (n, 3).
+        """
         from scipy.sparse import csr_array
 
         n = self.pattern.n_nodes
@@ -126,7 +149,16 @@ class MotionMatrices:
     # ---- centrifugal stiffening ---------------------------------------------------------------------
 
     def stiffening(self, u0: Array) -> Array:
-        """Return ∫ σ(u0) : (grad N_i ⊗ grad N_j) as data (nnz,) in N/m, of displacements u0 (n, 3)."""
+        """Return the stiffness of the centrifugal stress, ∫ σ(u0) : (grad N_i ⊗ grad N_j).
+
+        Parameters
+        ----------
+        u0 : (n, 3) displacements in m.
+
+        Returns
+        -------
+        (nnz,) in N/m.
+        """
         data = np.zeros(len(self.pattern.indices))
         for number, group in enumerate(self.groups):
             stress = tensor(gauss_point_fields.at_gauss(self.points, group, u0))

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.ale.boundaries import cut_nodes, dashpots, leak, periodic_pairs
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.kinematic_linear import lame_constants
+from kratos_lite.elements.tables import lame_constants
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Attachment, Structure
@@ -93,34 +93,105 @@ class Motion(Attachment):
 
     @abstractmethod
     def field(self, X: Array) -> Array:
-        """Return the velocity c of the material through the mesh for the rate 1 at points X (..., 3)."""
+        """Return the velocity c of the material through the mesh for the rate 1.
+
+        Parameters
+        ----------
+        X : (..., 3) points in m.
+
+        Returns
+        -------
+        (..., 3), m for a rotation, without unit for a translation.
+        """
 
     def body_velocity(self, X: Array) -> Array:
-        """Return the velocity of the undeformed body in space for the rate 1 at points X (..., 3)."""
+        """Return the velocity of the undeformed body in space for the rate 1.
+
+        Parameters
+        ----------
+        X : (..., 3) points in m.
+
+        Returns
+        -------
+        (..., 3), as `field`.
+        """
         return np.asarray((X - self.center) @ self.A.T)
 
     @abstractmethod
     def wave_directions(self) -> Array:
-        """Return the unit directions (k, 3) of the waves that matter."""
+        """Return the directions of the waves that matter.
+
+        Returns
+        -------
+        (k, 3) unit vectors.
+        """
 
     @abstractmethod
     def critical_rate(self, wave_speed: float, points: Array) -> float:
-        """Return the rate at which the material of a thick body is as fast as waves of a speed in m/s."""
+        """Return the rate at which the material of a thick body is as fast as its waves.
+
+        Parameters
+        ----------
+        wave_speed : m/s.
+        points : (n, 3) of the body in m.
+
+        Returns
+        -------
+        In the unit of the rate.
+        """
 
     @abstractmethod
     def phase(self, X: Array, points: Array) -> tuple[Array, NDArray[np.complex128]]:
-        """Return r and e^{i φ} of points X (..., 3): φ is the angle, or goes once along `points` (n, 3)."""
+        """Return the distance and the phase of points around the body, or along it.
+
+        Parameters
+        ----------
+        X : (..., 3) points in m.
+        points : (n, 3) of the whole body in m.
+
+        Returns
+        -------
+        r (...) and e^{i φ} (...): φ is the angle about the axis, or goes once along the body.
+        """
 
     def open_faces(self, mesh: Mesh) -> tuple[Ints, ...]:
-        """Return the nodes of each face of a mesh through which material passes."""
+        """Return the nodes of each face through which material passes.
+
+        Parameters
+        ----------
+        mesh : that of the body.
+
+        Returns
+        -------
+        Node rows of each face; none where no face is open.
+        """
         return ()
 
     def boundary_damping(self, mesh: Mesh, system: ConstrainedSystem) -> BlockMatrix | None:
-        """Return the damping of the open faces, (3a, 3a) in N s/m, or None."""
+        """Return the damping of the open faces.
+
+        Parameters
+        ----------
+        mesh : that of the body.
+        system : its equations, whose nodes the matrix has.
+
+        Returns
+        -------
+        (3a, 3a) in N s/m, or None.
+        """
         return None
 
     def leak(self, mesh: Mesh) -> float:
-        """Return the largest share of the velocity that passes through the boundary, but for open faces."""
+        """Return how much of the velocity passes through the boundary, but for open faces.
+
+        Parameters
+        ----------
+        mesh : that of the body.
+
+        Returns
+        -------
+        The largest share, 0 … 1.
+        """
         return leak(mesh, self.field, self.open_faces(mesh))
 
     def attach(self, structure: Structure) -> None:
@@ -142,7 +213,17 @@ class Motion(Attachment):
         structure.motion = self
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what is doubtful about the motion of a structure, but for its rate."""
+        """Return what is doubtful about the motion of a structure, but for its rate.
+
+        Parameters
+        ----------
+        structure : what moves.
+        groups : its elements.
+
+        Returns
+        -------
+        One sentence each.
+        """
         share = self.leak(structure.mesh)
         return [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []
 
@@ -253,7 +334,7 @@ class Translation(Motion):
     Examples
     --------
     >>> Translation("x", rate=20.0, boundaries="periodic").field(np.zeros(3)).tolist()
-    [-1.0, 0.0, 0.0]
+    [-1.0, -0.0, -0.0]
     """
 
     kind, unit, is_open = "translation", "m/s", True

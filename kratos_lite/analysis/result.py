@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -255,12 +254,3 @@ class Result:
         rows = self.table()
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
-
-    def save(self, path: str | Path, mode: str | None = None) -> None:
-        """Write the result to a file by its ending: .vtu (ParaView), .vtk or .json.
-
-        The mode of a .vtu file is ``binary`` (the default), ``compressed`` or ``ascii``.
-        """
-        from kratos_lite.io.writers.results import write_result
-
-        write_result(path, self, mode)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows

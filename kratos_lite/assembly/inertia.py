@@ -17,7 +17,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import has_positive_row_sums, tabulate
+from kratos_lite.elements.tables import has_positive_row_sums, tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 

@@ -13,7 +13,8 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS, lame_constants
+from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS
+from kratos_lite.elements.tables import lame_constants
 from kratos_lite.typing import Array, Progress
 
 SCATTER_BYTES = 64_000_000

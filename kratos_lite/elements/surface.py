@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array

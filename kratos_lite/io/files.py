@@ -89,25 +89,37 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
     return read_run_file(settings, strict=strict, allow_outside=outside)
 
 
-def write(path: str | Path, thing: Any) -> list[str]:
+def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     """Write a result, a model or a mesh by the ending of `path`.
 
-    A result goes to .vtu, .vtk or .json; a model or a mesh to .mdpa, an .elem set,
-    .vtu or a format of meshio.
+    Parameters
+    ----------
+    path : a result goes to .vtu, .vtk or .json; a model or a mesh to .mdpa, an .elem set, .vtu or a format of
+        meshio.
+    thing : a `Result`, `Model` or `Mesh`.
+    mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
     -------
     list of str
         What the format cannot hold and was left out.
+
+    Raises
+    ------
+    InputError
+        The thing is none of these, or the format cannot hold it.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
     from kratos_lite.io.document import Document
+    from kratos_lite.io.writers.results import write_result
     from kratos_lite.mesh import Mesh
 
     if isinstance(thing, Result):
-        thing.save(path)
+        write_result(path, thing, mode)
         return []
+    if mode is not None:
+        raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
     if isinstance(thing, Model):
         from kratos_lite.io.kratos.to_document import document_from
 

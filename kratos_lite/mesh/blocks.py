@@ -140,6 +140,11 @@ def without_repeats(rows: Ints) -> Ints:
     return rows[first]
 
 
+def ids_of(blocks: Iterable[Block]) -> Ints:
+    """Return the ids of all cells of some blocks, in order."""
+    return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])
+
+
 def rows_of_ids(ids: Ints, wanted: ArrayLike, order: Ints | None = None) -> Ints:
     """Return where each wanted id stands in `ids`; -1 where it does not.
 

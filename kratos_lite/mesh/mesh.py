@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, distinct, rows_of_ids, select, without_repeats
+from kratos_lite.mesh.blocks import (
+    NO_ROWS,
+    Block,
+    Part,
+    distinct,
+    ids_of,
+    rows_of_ids,
+    select,
+    without_repeats,
+)
 from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.topology import Faces, inverted, mirror
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
@@ -68,7 +77,7 @@ class Mesh:
         self.conditions = list(conditions)
         self.parts = dict(parts or {})
         self.source = source
-        self._faces: tuple[list[NDArray[np.int32]], Faces | None] = ([], None)
+        self._faces: tuple[list[Rows], Faces | None] = ([], None)
         self._check()
 
     def _check(self) -> None:
@@ -81,12 +90,7 @@ class Mesh:
         sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
         for name, part in self.parts.items():
             for what, size in sizes.items():
-                rows = getattr(part, what)
-                if len(rows) and not (0 <= rows.min() and rows.max() < size):
-                    raise MeshError(
-                        f"part {name!r}: rows of {what} must lie in 0 … {size - 1}; "
-                        f"got {rows.min()} … {rows.max()}"
-                    )
+                _existing(getattr(part, what), size, f"part {name!r}: rows of {what}")
 
     # ---- sizes and ids ---------------------------------------------------------------------
 
@@ -108,7 +112,7 @@ class Mesh:
     @property
     def element_ids(self) -> Ints:
         """(m,) element ids through all blocks in order."""
-        return np.concatenate([NO_ROWS, *(block.ids for block in self.blocks)])
+        return ids_of(self.blocks)
 
     @cached_property
     def _node_order(self) -> Ints:
@@ -255,11 +259,9 @@ class Mesh:
         if chosen.dtype.kind not in "iu":
             raise MeshError("nodes are chosen by part name, predicate, mask or integer rows")
         rows = chosen.astype(np.int64).ravel()
-        if len(rows) and (rows.min() < 0 or rows.max() >= self.n_nodes):
-            raise MeshError(f"node rows must lie in 0 … {self.n_nodes - 1}; got {rows.min()} … {rows.max()}")
-        return without_repeats(rows)
+        return without_repeats(_existing(rows, self.n_nodes, "node rows"))
 
-    def used_nodes(self) -> NDArray[np.bool_]:
+    def used_nodes(self) -> Mask:
         """Return which nodes belong to an element.
 
         Returns
@@ -308,18 +310,12 @@ class Mesh:
         rows = np.asarray(where)
         if rows.dtype.kind not in "iu" or rows.ndim != 1:
             raise MeshError("elements are chosen by part name, property id or an array of integer rows")
-        if len(rows) and (rows.min() < 0 or rows.max() >= self.n_elements):
-            raise MeshError(
-                f"element rows must lie in 0 … {self.n_elements - 1}; got {rows.min()} … {rows.max()}"
-            )
-        return rows.astype(np.int64)
+        return _existing(rows, self.n_elements, "element rows").astype(np.int64)
 
     def _elements_among(self, nodes: Ints) -> Ints:
         inside = np.zeros(self.n_nodes, dtype=bool)
         inside[nodes] = True
-        return np.flatnonzero(
-            np.concatenate([np.zeros(0, bool), *(inside[b.nodes].all(axis=1) for b in self.blocks)])
-        )
+        return np.flatnonzero(np.concatenate([NO_ROWS, *(inside[b.nodes].all(axis=1) for b in self.blocks)]))
 
     def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
         """Return which elements contain points, and where in them the points lie.
@@ -395,14 +391,8 @@ class Mesh:
             if turn.any() and block.shape is not None:
                 nodes[turn] = nodes[turn][:, mirror(block.shape)]
             blocks.append(replace(block, nodes=nodes))
-        return Mesh(
-            self.points,
-            blocks,
-            node_ids=self.node_ids,
-            conditions=self.conditions,
-            parts=self.parts,
-            source=self.source,
-        )
+        rest: Any = {"conditions": self.conditions, "parts": self.parts, "source": self.source}
+        return Mesh(self.points, blocks, node_ids=self.node_ids, **rest)
 
     def faces(self, where: Where) -> list[Block]:
         """Return the faces of a part: its conditions, or else the boundary faces among its nodes.
@@ -422,3 +412,10 @@ class Mesh:
         inside[self.nodes(where)] = True
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
+
+
+def _existing(rows: Ints, size: int, what: str) -> Ints:
+    """Return rows, all of which exist."""
+    if len(rows) and not (0 <= rows.min() and rows.max() < size):
+        raise MeshError(f"{what} must lie in 0 … {size - 1}; got {rows.min()} … {rows.max()}")
+    return rows

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh

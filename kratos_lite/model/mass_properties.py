@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.kinematic_linear import tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.shapes import Shape
@@ -97,6 +97,21 @@ class MassProperties:
         A new mass alone leaves the inertia as it is; a new `inertia` brings its own `euler`, and the
         other way round.
 
+        Parameters
+        ----------
+        changes : values by their names.
+
+        Returns
+        -------
+        A new body.
+
+        Raises
+        ------
+        InputError
+            A body has no value of such a name.
+
+        Examples
+        --------
         >>> body = MassProperties.box((1.0, 1.0, 1.0), density=6.0).with_(mass=2.0)
         >>> float(body.mass), body.inertia.diagonal().tolist()
         (2.0, [1.0, 1.0, 1.0])
@@ -109,7 +124,13 @@ class MassProperties:
         return MassProperties(**{**values, **changes})
 
     def check_deformable(self) -> None:
-        """Raise ModelError unless the volume is known and E0 positive definite, as deformation needs."""
+        """Show that the body can deform: the volume is known and E0 positive definite.
+
+        Raises
+        ------
+        ModelError
+            It cannot.
+        """
         if np.isnan(self.volume).any():
             raise ModelError("a body that deforms needs its volume in m³; give volume=…")
         smallest, bad = _smallest(self.euler)
@@ -124,7 +145,21 @@ class MassProperties:
 
     @classmethod
     def stack(cls, bodies: Sequence[MassProperties]) -> MassProperties:
-        """Return many bodies as one, along a new first axis."""
+        """Return many bodies as one, along a new first axis.
+
+        Parameters
+        ----------
+        bodies : one or more with the same leading axes.
+
+        Returns
+        -------
+        All of them.
+
+        Raises
+        ------
+        InputError
+            There are none, or their leading axes differ.
+        """
         if not bodies or len({body.mass.shape for body in bodies}) > 1:
             shapes = [body.mass.shape for body in bodies]
             raise InputError(f"bodies to stack must have the same leading axes; got {shapes or 'none'}")
@@ -132,8 +167,19 @@ class MassProperties:
 
     @classmethod
     def box(cls, sides: ArrayLike, density: ArrayLike) -> MassProperties:
-        """Return boxes centerd at the origin; sides (..., 3) in m, density (...) in kg/m³.
+        """Return boxes centered at the origin.
 
+        Parameters
+        ----------
+        sides : (..., 3) in m.
+        density : (...) in kg/m³.
+
+        Returns
+        -------
+        The mass properties (...).
+
+        Examples
+        --------
         >>> MassProperties.box((0.4, 0.6, 1.0), 1000.0).inertia.diagonal().round(9).tolist()
         [27.2, 23.2, 10.4]
         """
@@ -145,7 +191,17 @@ class MassProperties:
 
     @classmethod
     def ball(cls, radius: ArrayLike, density: ArrayLike) -> MassProperties:
-        """Return balls centerd at the origin; radius (...) in m, density (...) in kg/m³."""
+        """Return balls centered at the origin.
+
+        Parameters
+        ----------
+        radius : (...) in m.
+        density : (...) in kg/m³.
+
+        Returns
+        -------
+        The mass properties (...).
+        """
         r = _check_positive(finite(radius, "a radius"), "radius", "m")
         volume = 4 * np.pi / 3 * r**3
         mass = np.asarray(_check_positive(finite(density, "a density"), "density", "kg/m³") * volume)
@@ -153,10 +209,19 @@ class MassProperties:
 
     @classmethod
     def of(cls, points: ArrayLike, groups: Sequence[ElementGroup]) -> MassProperties:
-        """Return the mass properties of a mesh; points (n, 3) in m.
+        """Return the mass properties of a mesh.
 
         They are exact for every shape, also for warped faces and curved quadratic cells, and lose no
         digits far from the origin beyond those that the coordinates have lost.
+
+        Parameters
+        ----------
+        points : (n, 3) nodes in m.
+        groups : the elements with their materials.
+
+        Returns
+        -------
+        Those of one body.
 
         Raises
         ------
@@ -228,7 +293,7 @@ def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
     if len(bad):
         raise MeshError(
             f"the element in row {group.rows[chunk][bad[0]]} ({group.element.__name__}) has volume "
-            f"{volumes[bad[0]]:.3g} m³; it must be > 0; mesh.reoriented() mends elements turned inside out"
+            f"{volumes[bad[0]]:.3g} m³; it must be > 0; mesh.reoriented() fixes inverted elements"
         )
 
 

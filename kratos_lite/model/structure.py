@@ -155,6 +155,10 @@ class Structure:
     def element_groups(self) -> list[ElementGroup]:
         """Return the elements grouped by kind, rule and material.
 
+        Returns
+        -------
+        The groups.
+
         Raises
         ------
         ModelError
@@ -330,13 +334,22 @@ class Structure:
         self.loads.append(load if amplitude is None else ScaledLoad(load, amplitude))
 
     def rigid_modes(self) -> Array:
-        """Return the six rigid-body modes (3n, 6) of all nodes: translations x y z, rotations about x y z."""
+        """Return the rigid-body modes of all nodes.
+
+        Returns
+        -------
+        (3n, 6): translations in x, y and z, rotations about x, y and z.
+        """
         return rigid_modes(self.mesh.points)
 
     # ---- checks -------------------------------------------------------------------------------
 
     def check_geometry(self) -> list[str]:
-        """Check coordinates, node lists and det J of all elements, whatever their material; return warnings.
+        """Check coordinates, node lists and det J of all elements, whatever their material.
+
+        Returns
+        -------
+        Warnings, one sentence each.
 
         Raises
         ------
@@ -346,7 +359,11 @@ class Structure:
         return checks.check_geometry(self.mesh)
 
     def check(self) -> list[str]:
-        """Check the model as a static solution does, without solving; return the warnings.
+        """Check the model as a static solution does, without solving.
+
+        Returns
+        -------
+        Warnings, one sentence each.
 
         Raises
         ------
@@ -356,13 +373,17 @@ class Structure:
         return self.checked()[2]
 
     def checked(self, *, free: bool = False) -> tuple[list[ElementGroup], NDArray[np.int64], list[str]]:
-        """Return element groups, the part of each node and the warnings of a model that passes all checks.
+        """Return what a static solution starts from, of a model that passes all checks.
 
         Parts are numbered from 0; they share neither nodes nor constraints.  Nodes without elements have -1.
 
         Parameters
         ----------
         free : let rigid-body modes be free, as inertia holds what supports do not; then there is one part.
+
+        Returns
+        -------
+        Element groups, the part of each node (n,), and warnings.
 
         Raises
         ------
@@ -391,7 +412,12 @@ class Structure:
     # ---- summary ------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary: label and value."""
+        """Return the rows of a summary.
+
+        Returns
+        -------
+        Labels and values.
+        """
         mesh = self.mesh
         used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
         without = int((self._material_of < 0).sum())

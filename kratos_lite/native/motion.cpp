@@ -102,11 +102,12 @@ private:
 
         // Bodies first … first + count to packs; lanes past them repeat the first, and are never stored.
         void gather(int64_t first, int count, Pack* packs) const {
-            const double* body = from + first * stride;
-            for (int k = 0; k < width; ++k)
-                for (int l = 0; l < LANES; ++l) packs[k][l] = body[k];
-            for (int l = 1; l < count && stride; ++l) {
-                body += stride;
+            if (!stride || count == 1) {
+                for (int k = 0; k < width; ++k) std::fill_n(packs[k], LANES, from[first * stride + k]);
+                return;
+            }
+            for (int l = 0; l < LANES; ++l) {
+                const double* body = from + (first + (l < count ? l : 0)) * stride;
                 for (int k = 0; k < width; ++k) packs[k][l] = body[k];
             }
         }

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.errors import InputError
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 from kratos_lite.view.canvas import new_figure
 
 OBLIQUE: Array = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
@@ -50,9 +50,7 @@ def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:
             *x, a, ha="center", va="center", size=9, color="w" if corner else "#23538f", bbox=box, zorder=3
         )
     if points is not None:
-        G = np.asarray(points, dtype=float)
-        if G.ndim != 2 or G.shape[1] != d:
-            raise InputError(f"points must have shape (g, {d}) for {shape.__name__}; got {G.shape}")
+        G = finite(points, f"points in a {shape.__name__}", ("g", d))
         axes.plot(*flat(G).T, "x", color="#c8442b", ms=8, mew=2, zorder=2)
     _triad(axes, X, flat(np.eye(d)))
     axes.set_title(shape.__name__, fontsize=11)

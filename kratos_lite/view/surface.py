@@ -12,6 +12,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 from kratos_lite.view.canvas import color_bar, colors_of, lines, new_figure, polygons
 
 ISOMETRIC: Array = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
@@ -65,12 +66,12 @@ def surface_figure(
         raise InputError("there is nothing to draw: the mesh has no element of a known shape")
     X = mesh.points
     if displacement is not None:
-        u = _numbers("displacement", displacement, (mesh.n_nodes, 3))
+        u = finite(displacement, "displacement", (mesh.n_nodes, 3))
         scale = _exaggeration(X, u) if scale is None else scale
         title = f"{title}\ndeformation × {scale:g}".strip()
         lines(axes, _outline(mesh))
         X = X + scale * u
-    field = None if values is None else _numbers("values", values, (mesh.n_nodes,))
+    field = None if values is None else finite(values, "values", (mesh.n_nodes,))
     colors = _paint(axes, mesh.boundary, X, field)
     _rulers(axes, mesh.points, X)
     if colors is not None:
@@ -79,15 +80,6 @@ def surface_figure(
         color_bar(figure, axes, colors, unit)
     axes.set_title(title, fontsize=11)
     return figure
-
-
-def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.asarray(given, dtype=float)
-    if array.shape != shape:
-        raise InputError(f"{name} must have shape {shape}; got {array.shape}")
-    if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite; got {array[~np.isfinite(array)][0]}")
-    return array
 
 
 def _exaggeration(X: Array, u: Array) -> float:

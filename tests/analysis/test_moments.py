@@ -84,8 +84,8 @@ def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
     rows = dict(result.table())
     assert rows["solver"] == "newmark(0.25, 0.5): step 600, t = 12 s"
     assert {"total reaction", "largest von Mises"} <= rows.keys()
-    result.save(tmp_path / "late.vtu")
-    result.save(tmp_path / "late.json")
+    kl.write(tmp_path / "late.vtu", result)
+    kl.write(tmp_path / "late.json", result)
 
 
 def test_a_moment_is_drawn_deformed(tmp_path):

@@ -678,7 +678,7 @@ def test_ctrl_c_while_modules_are_imported_ends_with_130(run, box, monkeypatch):
 
 
 def test_ctrl_c_while_solving_ends_with_130(run, box, monkeypatch):
-    monkeypatch.setattr("kratos_lite.analysis.model.solve_static", interrupt)
+    monkeypatch.setattr(kl.Model, "solve", interrupt)
     done = run("solve", "box.vtu", *HELD, "-o", "out.vtu")
     assert (done.code, done.out) == (130, "")
     assert done.err == "interrupted; nothing half-written is left\n"

@@ -16,7 +16,7 @@ from kratos_lite.ale import MotionMatrices, Rotation
 from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements.kinematic_linear import lame_constants
+from kratos_lite.elements.tables import lame_constants
 from kratos_lite.solvers.mass import Mass
 
 ROOT = Path(__file__).resolve().parents[2]

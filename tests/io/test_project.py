@@ -591,7 +591,7 @@ def test_constraints_are_left_out_with_a_note_when_the_run_file_says_so(folder):
     (folder / "box.mdpa").write_text(box_mdpa() + row + "End Constraints\n")
     kept = read_case(write(folder, run_file([CLAMP], []))).model
     left = read_case(write(folder, run_file([CLAMP], [], multi_point_constraints_used=False))).model
-    assert (len(kept.supports.links), len(left.supports.links)) == (1, 0)
+    assert (len(kept.supports.constraints), len(left.supports.constraints)) == (1, 0)
     assert "multi_point_constraints_used is false: 1 constraints left out" in left.notes
 
 

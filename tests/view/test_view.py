@@ -148,7 +148,7 @@ def test_gauss_points_are_marked_in_red(tmp_path):
     ]
     assert red[0] == 0
     assert red[1] > 20
-    with pytest.raises(InputError, match=r"points must have shape \(g, 3\) for Tetrahedron4; got \(1, 2\)"):
+    with pytest.raises(InputError, match=r"points in a Tetrahedron4 must have shape \(g, 3\); got \(1, 2\)"):
         draw_element(tmp_path / "a.png", Tetrahedron4, [[0.25, 0.25]])
 
 

@@ -88,7 +88,7 @@ class RigidLink(Constraint):
         self.anchor = one_point(anchor)
 
     def bind(self, body: FreeBody) -> None:
-        """Take hold of a body where it is now; see `Constraint.bind`.
+        """Take hold of a body where it is now.
 
         Raises
         ------

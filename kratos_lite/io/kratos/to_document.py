@@ -54,7 +54,7 @@ def document_from(model: Model) -> Document:
         parts=_parts(mesh),
         source=mesh.source,
     )
-    document = Document(copy, properties, nodal_data=[*_fixed(model), *data], constraints=_links(model))
+    document = Document(copy, properties, nodal_data=[*_fixed(model), *data], constraints=_constraints(model))
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
@@ -138,11 +138,11 @@ def kratos_name(part: str) -> str:
     return part.replace("+", "_plus").replace("-", "_minus")
 
 
-def _links(model: Model) -> list[Constraint]:
+def _constraints(model: Model) -> list[Constraint]:
     def dof(number: int) -> tuple[int, str]:
         return int(model.mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
 
     return [
-        Constraint(i, dof(link.slave), tuple(map(dof, link.masters)), link.weights, link.constant)
-        for i, link in enumerate(model.supports.constraints, start=1)
+        Constraint(i, dof(each.slave), tuple(map(dof, each.masters)), each.weights, each.constant)
+        for i, each in enumerate(model.supports.constraints, start=1)
     ]

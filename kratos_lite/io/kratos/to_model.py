@@ -13,7 +13,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
-from kratos_lite.mesh import Block, distinct, rows_of_ids
+from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
 
 STATIC_ONLY = "do not matter in linear statics"
 
@@ -52,7 +52,7 @@ def model_from(
     if processes:
         processes(values)
     values.apply(model)
-    _link(model, document)
+    _constrain(model, document)
     return model
 
 
@@ -64,16 +64,10 @@ def check_elements(document: Document) -> None:
             line = None if block.lines is None else int(block.lines[0])
             known = [*ELEMENTS, *(alias for name in ELEMENTS for alias in ELEMENTS.aliases(name))]
             hint = nearest(block.name, known) if "3D" in block.name else ""
-            problems.add(
-                f"unknown element {block.name!r} ({len(block)} of them);{hint} "
-                f"Known are {', '.join(sorted(ELEMENTS, key=_by_number))} and their Kratos names",
-                line,
-            )
+            have = ", ".join(sorted(ELEMENTS, key=lambda name: (len(name), name)))
+            text = f"unknown element {block.name!r} ({len(block)} of them);{hint} Known are {have}"
+            problems.add(f"{text} and their Kratos names", line)
     problems.raise_if_any()
-
-
-def _by_number(name: str) -> tuple[int, str]:
-    return len(name), name
 
 
 def _renamed(blocks: list[Block]) -> list[str]:
@@ -101,18 +95,18 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
         if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
         elif data.variable.startswith("DISPLACEMENT") and data.values.any():
-            text = f"initial values of {data.variable} {STATIC_ONLY}"
-            model.notes.append(str(Note(data.line, text, data.source)))
-    if document.condition_data:
-        ids = np.concatenate([np.zeros(0, dtype=np.int64), *(block.ids for block in mesh.conditions)])
-        for data in document.condition_data:
-            rows = rows_of_ids(ids, data.ids)
-            known = rows >= 0
-            if data.values.size and _fits(data, model, problems, mesh.source):
-                values.conditional.put(data.variable, rows[known], data.values[known])
+            _note(model, data, f"initial values of {data.variable} {STATIC_ONLY}")
+    for data in document.condition_data:
+        rows = rows_of_ids(ids_of(mesh.conditions), data.ids)
+        if data.values.size and _fits(data, model, problems, mesh.source):
+            values.conditional.put(data.variable, rows[rows >= 0], data.values[rows >= 0])
     for data in document.element_data:
-        model.notes.append(f"line {data.line}: ElementalData {data.variable} is not used")
+        _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
+
+
+def _note(model: Model, data: Data, text: str) -> None:
+    model.notes.append(str(Note(data.line, text, data.source)))
 
 
 def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
@@ -125,8 +119,7 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
         text = f"{data.variable} has values {size}; expected {'[3] (x, y, z)' if wanted else 'one number'}"
         problems.add(f"{data.source or source}:{data.line}: {text}")
     else:
-        text = f"{data.variable} is not used by a static solution of solids"
-        model.notes.append(str(Note(data.line, text, data.source)))
+        _note(model, data, f"{data.variable} is not used by a static solution of solids")
     return False
 
 
@@ -139,18 +132,17 @@ def _note_overridden(values: Variables, data: Data, rows: NDArray[np.int64], mod
                 more = f" (and {changed.sum() - 1} more)" if changed.sum() > 1 else ""
                 node = data.ids[changed][0]
                 text = f"{name} of node {node}{more} is fixed to another value before; the last one counts"
-                model.notes.append(str(Note(data.line, text, data.source)))
+                _note(model, data, text)
 
 
-def _link(model: Model, document: Document) -> None:
+def _constrain(model: Model, document: Document) -> None:
     """Add the multi-point constraints of a document."""
     rows = document.mesh.node_rows
     for constraint in document.constraints:
         dofs = [constraint.slave, *constraint.masters]
         if not all(name in ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z") for _, name in dofs):
-            model.notes.append(
-                f"line {constraint.line}: constraint {constraint.id} is not on displacements; ignored"
-            )
+            text = f"constraint {constraint.id} is not on displacements; ignored"
+            model.notes.append(str(Note(constraint.line, text)))
             continue
         slave, *masters = [(int(rows([node])[0]), name[-1].lower()) for node, name in dofs]
         weights: dict[tuple[int, str], float] = {}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.mesh import Mesh, with_rows
+from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads import SURFACES, ConditionLoads, Gravity
 from kratos_lite.typing import Array
 
@@ -181,7 +181,7 @@ class Variables:
 
     def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
-        ids = np.concatenate([np.zeros(0, dtype=np.int64), *(b.ids for b in self.mesh.conditions)])
+        ids = ids_of(self.mesh.conditions)
         for variable in (*dict.fromkeys(LOADS.values()), *PRESSURES):
             cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
             on_conditions, on_nodes = self._carriers(cells)

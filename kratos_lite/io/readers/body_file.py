@@ -22,7 +22,7 @@ from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.readers.body_loads import add_constraint, add_load
 from kratos_lite.io.readers.run_file import mesh_file_of, output_of
 from kratos_lite.io.readers.time import read_time_of_body, restart_of
-from kratos_lite.io.readers.values import Read, is_by_part, matrix, number, read_material, vector
+from kratos_lite.io.readers.values import Read, is_by_part, matrix, read_material
 from kratos_lite.io.settings import Settings, shown
 from kratos_lite.io.writers.endings import SERIES, check_ending
 from kratos_lite.mesh import Mesh
@@ -31,7 +31,7 @@ from kratos_lite.model.mass_properties import MassProperties
 
 OUTPUTS = (*(ending[1:] for ending in SERIES), "picture", "state")
 KEYS = ("mesh", "material", "body", "start", "loads", "constraints", "time", "output", "restart")
-MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str], Any]]]] = {
+MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Read]]] = {
     "box": (
         box,
         {
@@ -51,7 +51,7 @@ MESHES: dict[str, tuple[Callable[..., Mesh], dict[str, Callable[[Settings, str],
     ),
 }
 """Meshes that are made, by name: function, and how its arguments are read."""
-OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
+OPTIONS: dict[str, Read] = {
     "formulation": Settings.text,
     "modes": Settings.integer,
     "lumped": Settings.flag,
@@ -60,10 +60,10 @@ OPTIONS: dict[str, Callable[[Settings, str], Any]] = {
     "tolerance": Settings.number,
 }
 """Options of bodies; which of them a kind has is said by its arguments."""
-CHARACTERISTICS: dict[str, Read] = {
-    "mass": number,
-    "volume": number,
-    "center": vector,
+MASS_PROPERTIES: dict[str, Read] = {
+    "mass": Settings.number,
+    "volume": Settings.number,
+    "center": Settings.vector,
     "inertia": matrix,
     "euler": matrix,
 }
@@ -185,7 +185,7 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     }
     if "mass_properties" in section:
         inner = section.section("mass_properties")
-        given["mass_properties"] = section.placed("mass_properties", _characteristics, inner, mesh, material)
+        given["mass_properties"] = section.placed("mass_properties", _mass_properties, inner, mesh, material)
     elif mesh is None:
         raise settings.error("mesh", "key 'mesh' is missing: it is the shape of the body")
     if material is None and "mass_properties" not in given and not issubclass(kind, Obstacle):
@@ -195,10 +195,10 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     return owner.placed(key, kind, mesh, material, **given)
 
 
-def _characteristics(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
+def _mass_properties(section: Settings, mesh: Mesh | None, material: Material | None) -> MassProperties:
     """Return mass_properties: those of the mesh with the given ones in their place."""
-    section.check_keys(CHARACTERISTICS)
-    given = {key: CHARACTERISTICS[key](section, key, mesh) for key in section.values}
+    section.check_keys(MASS_PROPERTIES)
+    given = {key: MASS_PROPERTIES[key](section, key) for key in section.values}
     if mesh is None or material is None:
         section.get("mass")
         return MassProperties(**given)

@@ -15,8 +15,8 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 
-Read: TypeAlias = Callable[[Settings, str, "Mesh | None"], Any]
-"""Reads the value of a key of an object; the mesh is that of the body, if it has one."""
+Read: TypeAlias = Callable[[Settings, str], Any]
+"""Reads the value of a key of an object."""
 
 
 def number_or_series(section: Settings, key: str) -> float | TimeSeries:
@@ -50,26 +50,6 @@ def is_by_part(section: Settings) -> bool:
     return any(isinstance(value, Object) for value in section.values.values())
 
 
-def number(section: Settings, key: str, mesh: Mesh | None) -> float:
-    """Return a number."""
-    return section.number(key)
-
-
-def text(section: Settings, key: str, mesh: Mesh | None) -> str:
-    """Return a string."""
-    return section.text(key)
-
-
-def vector(section: Settings, key: str, mesh: Mesh | None) -> list[float]:
-    """Return three numbers."""
-    return section.vector(key)
-
-
-def function(section: Settings, key: str, mesh: Mesh | None) -> float | TimeSeries:
-    """Return a number or a time series."""
-    return number_or_series(section, key)
-
-
 def part(section: Settings, key: str, mesh: Mesh | None) -> str:
     """Return the name of a part of the mesh, or of one of its sides."""
     name = section.text(key)
@@ -96,7 +76,7 @@ def points(section: Settings, key: str, mesh: Mesh | None) -> Array:
     return np.array(value, dtype=float)
 
 
-def matrix(section: Settings, key: str, mesh: Mesh | None) -> Array:
+def matrix(section: Settings, key: str) -> Array:
     """Return a matrix (3, 3): its three rows, or its diagonal."""
     value = section.get(key)
     if _is_vector(value):

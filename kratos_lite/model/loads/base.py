@@ -21,12 +21,16 @@ class Load(ABC):
 
     @abstractmethod
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return the nodal forces (n, 3) in N.
+        """Return the nodal forces of the load.
 
         Parameters
         ----------
         mesh : points (n, 3), elements, conditions and named parts.
         groups : the elements with their materials.
+
+        Returns
+        -------
+        (n, 3) in N.
 
         Raises
         ------
@@ -67,7 +71,15 @@ class TimeDependentLoad(Load):
         self.function = function
 
     def at(self, time: float) -> Load | None:
-        """Return the load at a time in s, or None.
+        """Return the load at a time.
+
+        Parameters
+        ----------
+        time : s.
+
+        Returns
+        -------
+        A load, or None where nothing acts.
 
         Raises
         ------
@@ -86,7 +98,16 @@ class TimeDependentLoad(Load):
         return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
 
     def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
-        """Return the nodal forces in N as a function of time, by those of a constant load."""
+        """Return the nodal forces as a function of time.
+
+        Parameters
+        ----------
+        forces_of : gives the nodal forces (n, 3) in N of a constant load.
+
+        Returns
+        -------
+        A function of the time in s: (n, 3) in N, or 0.
+        """
         kept: list[tuple[float, Load | None, Array | float]] = []
 
         def forces(time: float) -> Array | float:

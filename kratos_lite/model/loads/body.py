@@ -29,11 +29,26 @@ class BodyForce(Load):
         self.where = where
 
     def per_volume(self, group: ElementGroup) -> Array:
-        """Return the force per volume on the elements of a group, (3,) or nodal (n, 3)."""
+        """Return the force per volume.
+
+        Parameters
+        ----------
+        group : elements of one material.
+
+        Returns
+        -------
+        (3,) or nodal (n, 3) in N/m³.
+        """
         return self.force
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return ∫ N b dV as nodal forces (n, 3) in N."""
+        """Return ∫ N b dV as nodal forces (n, 3) in N.
+
+        Raises
+        ------
+        InputError
+            A nodal force has another number of nodes.
+        """
         if self.force.ndim == 2 and len(self.force) != mesh.n_nodes:
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")

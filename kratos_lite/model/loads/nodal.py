@@ -28,7 +28,13 @@ class PointLoad(Load):
         self.force = vectors(force, "a point load", "(3,) in N")
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return the nodal forces (n, 3) in N."""
+        """Return the nodal forces (n, 3) in N.
+
+        Raises
+        ------
+        ModelError
+            No node is chosen.
+        """
         total = np.zeros_like(mesh.points)
         rows = mesh.nodes(self.where)
         if not len(rows):
@@ -49,7 +55,13 @@ class NodalForces(Load):
         self.values = vectors(values, "nodal forces", "(n, 3) in N", (2,))
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return a copy of the values."""
+        """Return a copy of the values.
+
+        Raises
+        ------
+        InputError
+            The mesh has another number of nodes.
+        """
         if self.values.shape != mesh.points.shape:
             raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
         return self.values.copy()

@@ -70,6 +70,11 @@ class Pressure(Load):
     pressure : float, Pa; or a function of places (m, 3) that returns (m,), interpolated from nodes.
     normal : ``"outward"`` takes the outward normal of the body; ``"nodes"`` the normal about which
         the nodes of each condition run counter-clockwise, as Kratos does.
+
+    Raises
+    ------
+    InputError
+        The normal is neither, or the pressure no number.
     """
 
     def __init__(self, where: Where, pressure: float | OfPlace, normal: str = "outward") -> None:

@@ -12,7 +12,7 @@ from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wron
 from kratos_lite.io.formats.mdpa.rows import Layout, read_rows, width_of_first_line
 from kratos_lite.io.formats.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
-from kratos_lite.mesh import Block, Mesh, distinct
+from kratos_lite.mesh import Block, Mesh, distinct, ids_of
 from kratos_lite.shapes import FACE_SHAPES
 
 NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
@@ -92,7 +92,7 @@ def _width(kind: str, name: str) -> int | None:
 
 
 def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
-    ids = np.concatenate([block.ids for block in blocks])
+    ids = ids_of(blocks)
     lines = np.concatenate([block.lines for block in blocks if block.lines is not None])
     for row, first in repeated(ids):
         text = already(f"{word} {ids[row]}", lines[first], f"; give each {word} its own id")

@@ -17,7 +17,7 @@ from kratos_lite.io.formats.mdpa.parts import PartReader
 from kratos_lite.io.formats.mdpa.scan import TOP, Frame, Source, scan
 from kratos_lite.io.formats.mdpa.values import Table, read_table, read_values
 from kratos_lite.io.text import blank_comments, integer, read_bytes
-from kratos_lite.mesh import NO_ROWS, Block
+from kratos_lite.mesh import ids_of
 from kratos_lite.typing import Ints
 
 
@@ -75,9 +75,9 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     _refuse_repeated_constraints(source, document)
     ids = {
         "nodes": mesh.node_ids,
-        "elements": _ids(mesh.blocks),
-        "conditions": _ids(mesh.conditions),
-        "geometries": _ids(document.geometries),
+        "elements": mesh.element_ids,
+        "conditions": ids_of(mesh.conditions),
+        "geometries": ids_of(document.geometries),
         "constraints": _numbers(c.id for c in document.constraints),
         "properties": _numbers(properties),
         "tables": _numbers(tables),
@@ -87,10 +87,6 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     document.condition_data = [read_data(source, f, ids["conditions"]) for f in frames["ConditionalData"]]
     mesh.parts = PartReader(source, ids).read(frames["SubModelPart"])
     return document
-
-
-def _ids(blocks: list[Block]) -> Ints:
-    return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])
 
 
 def _numbers(numbers: Iterable[int]) -> Ints:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,7 @@ from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
 from kratos_lite.io.names import kratos_name
-from kratos_lite.mesh import NO_ROWS, Block, Mesh
-from kratos_lite.typing import Ints
+from kratos_lite.mesh import Block, Mesh, ids_of
 
 Lines = Iterator[str]
 
@@ -226,8 +225,8 @@ def _parts(document: Document) -> Lines:
     ids = {
         "nodes": mesh.node_ids,
         "elements": mesh.element_ids,
-        "conditions": _ids(mesh.conditions),
-        "geometries": _ids(document.geometries),
+        "conditions": ids_of(mesh.conditions),
+        "geometries": ids_of(document.geometries),
         "constraints": np.array([c.id for c in document.constraints], dtype=np.int64),
     }
     children: dict[str, list[str]] = {}
@@ -256,7 +255,3 @@ def _parts(document: Document) -> Lines:
 
     for name in children.get("", ()):
         yield from lines(name, "")
-
-
-def _ids(blocks: Sequence[Block]) -> Ints:
-    return np.concatenate([NO_ROWS, *(block.ids for block in blocks)])

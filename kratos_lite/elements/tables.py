@@ -1,0 +1,56 @@
+"""Tables: shape functions at the points of a rule, and the small algebra that elements share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array
+
+
+@remembered
+def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
+    """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
+    N = np.array([shape.N(xi) for xi in rule.points])
+    dN = np.array([shape.dN(xi) for xi in rule.points])
+    N.setflags(write=False)
+    dN.setflags(write=False)
+    return N, dN
+
+
+@remembered
+def reference_products(shape: type[Shape], rule: Rule) -> Array:
+    """Return R = Σ γ dN_a/dxi_k dN_b/dxi_l as (9, n n), rows k l and columns a b.  Read-only, made once."""
+    dN = tabulate(shape, rule)[1]
+    R: Array = np.einsum("g,gak,gbl->klab", rule.weights, dN, dN, optimize=True).reshape(9, -1)
+    R.setflags(write=False)
+    return R
+
+
+@remembered
+def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
+    """Return whether the row sums of the mass matrix of the reference cell are all positive."""
+    sums = rule.weights @ tabulate(shape, rule)[0]
+    return bool((sums > 1e-9 * sums.max()).all())
+
+
+def determinant(J: Array) -> Array:
+    """Return det of (..., 3, 3)."""
+    a, b, c = np.moveaxis(J, -1, 0)
+    return (a * np.cross(b, c)).sum(axis=-1)
+
+
+def cofactors(J: Array) -> Array:
+    """Return det(J) J^-1 of (..., 3, 3)."""
+    a, b, c = np.moveaxis(J, -1, 0)
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+
+
+def lame_constants(C: Array) -> tuple[float, float] | None:
+    """Return (λ, μ) if C is an isotropic elasticity matrix to the last bits, else None."""
+    lam, mu = float(C[0, 1]), float(C[3, 3])
+    ideal = np.diag([2 * mu] * 3 + [mu] * 3)
+    ideal[:3, :3] += lam
+    return (lam, mu) if (np.abs(C - ideal) <= 4e-16 * np.abs(C).max()).all() else None
