@@ -142,7 +142,7 @@ class FiniteElementBody(Deformable):
                 lowest = group.at(moved, chunk).dV.min(axis=1)
                 if (lowest <= 0).any():
                     element = self.mesh.element_ids[group.rows[chunk][int(np.argmin(lowest))]]
-                    raise InputError(f"these displacements turn element {element} inside out: det J ≤ 0")
+                    raise InputError(f"these displacements invert element {element}: det J ≤ 0")
         self.q = q.ravel().copy()
 
     def rotate(self, rotation: ArrayLike) -> None:
