@@ -28,6 +28,10 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
 
+    Returns
+    -------
+    The model, with its loads and supports.
+
     Raises
     ------
     InputError
