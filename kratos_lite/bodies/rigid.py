@@ -219,7 +219,7 @@ class Obstacle(RigidBody):
         """Return zeros."""
         return np.zeros_like(v)
 
-    def add(self, load: object, amplitude: object = 1.0) -> None:
+    def add(self, load: object, *, amplitude: object = None) -> None:
         """Raise ModelError: nothing pushes an obstacle."""
         raise ModelError(
             "nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody"
