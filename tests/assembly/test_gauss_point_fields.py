@@ -342,7 +342,7 @@ def collapsed(mesh):
 @pytest.mark.parametrize(
     ("spoil", "text"),
     [
-        (turned, "turned inside out"),
+        (turned, "is inverted"),
         (flattened, "must be > 0"),
         (swapped, "two of its nodes look swapped"),
         (folded, "slightly < 0 at a node"),
