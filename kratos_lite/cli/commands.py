@@ -81,25 +81,28 @@ def _print(lines: list[str]) -> None:
 
 def info(options: Namespace) -> int:
     """Describe a file; of a run file, what it means."""
-    from kratos_lite.io.describe import describe, describe_case
     from kratos_lite.io.documents import ending
-    from kratos_lite.io.files import read_case
 
     if ending(options.input) in (".json", ".py"):
+        from kratos_lite.io.files import read_case
+        from kratos_lite.io.run import describe_case
+
         print(describe_case(read_case(options.input, strict=not options.lenient)))
     else:
+        from kratos_lite.io.describe import describe
+
         print(describe(_document(options)))
     return 0
 
 
 def _document(options: Namespace) -> Document:
     """Return what a file says; of a run file, what the model says that it means."""
-    from kratos_lite.io.document import Note
     from kratos_lite.io.documents import ending, read_document
-    from kratos_lite.io.files import read_case
 
     if ending(options.input) not in (".json", ".py"):
         return read_document(options.input, strict=not options.lenient)
+    from kratos_lite.io.document import Note
+    from kratos_lite.io.files import read_case
     from kratos_lite.io.kratos.to_document import document_from
 
     case = read_case(options.input)

@@ -12,7 +12,6 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
-from kratos_lite.io.readers.time import integrator_of
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
 from kratos_lite.validation import whole_number
@@ -88,6 +87,8 @@ def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration 
     if options.steps is not None:
         changes["steps"] = whole_number(options.steps, "--steps")
     if options.integrator:
+        from kratos_lite.io.readers.time import integrator_of  # it brings the readers of JSON
+
         name, _, words = options.integrator.partition(":")
         changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
     if options.rayleigh:

@@ -6,12 +6,10 @@ import errno
 import io
 import os
 import stat
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +25,9 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
     >>> float(read_arrays(folder / "a.npz", ["time"], "a moment")["time"])
     2.0
     """
+    import zlib  # these two only where they are needed, for a quick start
+    from zipfile import BadZipFile
+
     try:  # from memory, as NumPy leaves a file open that it cannot read
         with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
             return {name: file[name] for name in names}

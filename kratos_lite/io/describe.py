@@ -1,4 +1,4 @@
-"""Describe: documents and cases in words, for ``kratos-lite info``."""
+"""Describe: documents in words, for ``kratos-lite info``."""
 
 from __future__ import annotations
 
@@ -9,20 +9,9 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.io.case import Case
 from kratos_lite.io.document import Data, Document
 from kratos_lite.io.formats.mdpa.values import Table
-from kratos_lite.io.run import runner_of
 from kratos_lite.mesh import Block
-
-
-def describe_case(case: Case) -> str:
-    """Return what a case is: its model or body, and how it moves through time."""
-    name = case.files[0].name
-    if not case.is_of_model:
-        return f"{'file':<22}{name}\n{runner_of(case).describe(case)}"
-    time = f"\n{'time':<12}{case.time}" if case.time else ""
-    return f"{'file':<12}{name}\n{case.model}{time}"
 
 
 def describe(document: Document) -> str:

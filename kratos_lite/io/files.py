@@ -10,11 +10,11 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
 from kratos_lite.io.kratos import model_from
-from kratos_lite.io.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.io.document import Document
+    from kratos_lite.io.settings import Settings
     from kratos_lite.mesh import Mesh
 
 
@@ -64,6 +64,8 @@ def read_case(
     """
     path = Path(path)
     if ending(path) == ".json":
+        from kratos_lite.io.settings import read_settings
+
         return _case_of_json(read_settings(path), strict, allow_outside)
     if ending(path) == ".py":
         from kratos_lite.io.readers.script import read_script

@@ -68,3 +68,12 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator
 def runner_of(case: Case) -> Any:
     """Return the module that runs the analysis of a case."""
     return import_module(f"kratos_lite.io.runners.{ANALYSES[case.analysis]}")
+
+
+def describe_case(case: Case) -> str:
+    """Return what a case is: its model or body, and how it moves through time."""
+    name = case.files[0].name
+    if not case.is_of_model:
+        return f"{'file':<22}{name}\n{runner_of(case).describe(case)}"
+    time = f"\n{'time':<12}{case.time}" if case.time else ""
+    return f"{'file':<12}{name}\n{case.model}{time}"

@@ -179,8 +179,12 @@ def scattered():
 
 def distorted(kind="8N"):
     mesh = box(cells=(4, 4, 3), kind=kind)
+    held = np.flatnonzero(mesh.points[:, 0] <= mesh.points[:, 0].min())
     mesh.points += 0.01 * np.random.default_rng(7).uniform(-1, 1, mesh.points.shape)
-    return clamped(mesh)
+    model = kl.Model(mesh, STEEL)
+    model.fix(held)
+    model.add(GRAVITY)
+    return model
 
 
 def one_unknown():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kratos_lite.typing import Array, Ints
 
 MOST = 1000
-"""Problems of one kind that are told apart."""
+"""Problems of one kind that are reported; the rest would only repeat them."""
 
 
 def already(what: str, line: int, how: str = "") -> str:

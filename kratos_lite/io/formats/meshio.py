@@ -282,7 +282,7 @@ class _Reading:
             ids = np.arange(first + 1, start + 1)
             block = Block(name, np.vstack(nodes).astype(np.int32), ids, np.concatenate(properties), kind)
             if len(block):
-                self._turn_wedges(block)
+                self._orient_wedges(block)
                 blocks.append(block)
         return blocks
 
@@ -302,10 +302,10 @@ class _Reading:
                 return np.asarray(values[b], dtype=np.int64).copy()
         return np.ones(len(self.found.cells[b].data), dtype=np.int64)
 
-    def _turn_wedges(self, block: Block) -> None:
+    def _orient_wedges(self, block: Block) -> None:
         """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects.
 
-        VTK's text turns its linear wedge inside out, VTK's formulas (and most writers) do not; the sign of
+        VTK's text inverts its linear wedge, VTK's formulas (and most writers) do not; the sign of
         the volume tells which was meant.
         """
         if block.name != "KinematicLinear3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
@@ -313,8 +313,8 @@ class _Reading:
         X = self.found.points[block.nodes]
         upward = X[:, 3:].sum(axis=1) - X[:, :3].sum(axis=1)
         normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
-        turned = np.einsum("ij,ij->i", normal, upward) < 0
-        block.nodes[turned] = block.nodes[turned][:, [0, 2, 1, 3, 5, 4]]
+        inverted = np.einsum("ij,ij->i", normal, upward) < 0
+        block.nodes[inverted] = block.nodes[inverted][:, [0, 2, 1, 3, 5, 4]]
 
     def _note_lost(self) -> None:
         """Note cells and data that are not used."""

@@ -45,6 +45,7 @@ class Action:
     component : scalar variable, such as ``DISPLACEMENT_X``.
     factors : the value is their product, each a number or an expression; empty to leave it as it is.
     interval : when it acts.
+    steps : in which steps that is; step 0 is the start, before the first solution.
     on_conditions : set conditions, not nodes.
     fixed : hold the component in the steps in which it acts.
     """
@@ -54,13 +55,9 @@ class Action:
     component: str
     factors: tuple[Value, ...]
     interval: Interval
+    steps: list[int]
     on_conditions: bool = False
     fixed: bool = False
-
-    def active(self, times: Sequence[float]) -> list[int]:
-        """Return the steps in which it acts; step 0 is the start, before the first solution."""
-        first = 1 if self.on_conditions or not self.factors else 0
-        return [k for k in range(first, len(times)) if times[k] in self.interval]
 
     def mentions(self, names: str) -> bool:
         """Return whether an expression uses one of these names of one letter."""
@@ -171,11 +168,15 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     rows, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
     found = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
-    return [
-        Action(settings, rows, component, factors, interval, process.on_conditions, fix)
-        for component, factors, fix in found
-        if factors or (fix and factors is not None)
-    ]
+    steps = [step for step, time in enumerate(context.times) if time in interval]
+    later = [step for step in steps if step]
+    actions = []
+    for component, factors, fix in found:
+        if factors or (fix and factors is not None):
+            acting = steps if factors and not process.on_conditions else later
+            conditions = process.on_conditions
+            actions.append(Action(settings, rows, component, factors, interval, acting, conditions, fix))
+    return actions
 
 
 def refuse_local_axes(settings: Settings) -> None:
@@ -208,27 +209,26 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
 
 def run(actions: Sequence[Action], context: RunContext, values: Variables) -> list[str]:
     """Bring the values and supports to what they are at the last step; return notes."""
-    times = context.times
-    steps = [action.active(times) for action in actions]
-    set_values(actions, steps, times, values)
-    _hold(actions, steps, len(times) - 1, values)
-    return notes_of(actions, steps, context)
+    set_values(actions, context.times, values)
+    _hold(actions, len(context.times) - 1, values)
+    return notes_of(actions, context)
 
 
-def notes_of(actions: Sequence[Action], steps: Sequence[list[int]], context: RunContext) -> list[str]:
+def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
     """Return notes on actions that never act, and on those that Kratos evaluates on a moved mesh."""
-    times, notes = context.times, []
-    for action, active in zip(actions, steps, strict=True):
+    notes = []
+    for action in actions:
         where = action.settings.path.removesuffix(".Parameters")
-        if not active or not len(action.rows):
-            why = "its interval holds no step" if not active else "its part has none to act on"
+        if not action.steps or not len(action.rows):
+            why = "its part has none to act on" if action.steps else "its interval holds no step"
             notes.append(f"{where}: {action.component} is never set: {why}")
-        elif context.moved and active[-1] > 1 and action.mentions("xyz"):
+        elif context.moved and action.steps[-1] > 1 and action.mentions("xyz"):
             # Before the first step nothing has moved yet.
             cure = '"move_mesh_flag": false' if action.on_conditions else "write X, Y, Z"
+            time = context.times[action.steps[-1]]
             notes.append(
-                f"{where}: Kratos evaluates x, y, z at time {times[active[-1]]:g} s on the mesh as the steps "
-                f"before moved it, kratos_lite on the undeformed one; {cure} to mean the same"
+                f"{where}: Kratos evaluates x, y, z at time {time:g} s on the mesh as the steps before moved "
+                f"it, kratos_lite on the undeformed one; {cure} to mean the same"
             )
         if action.on_conditions and action.mentions("XYZ"):
             notes.append(f"{where}: X, Y, Z are 0 on conditions, as in Kratos; write x, y, z")
@@ -241,32 +241,29 @@ def places_of(mesh: Mesh) -> tuple[Array, Array]:
     return mesh.points, np.concatenate([np.zeros((0, 3)), *centers])
 
 
-def set_values(
-    actions: Sequence[Action], steps: Sequence[list[int]], times: Sequence[float], values: Variables
-) -> None:
-    """Set what actions set, each at its last active step."""
+def set_values(actions: Sequence[Action], times: Sequence[float], values: Variables) -> None:
+    """Set what actions set, each at its last step."""
     places = places_of(values.mesh)
-    order = sorted((active[-1], i) for i, active in enumerate(steps) if active and actions[i].factors)
-    for k, i in order:
-        actions[i].put(values, places, times[k])
+    for action in sorted((a for a in actions if a.steps and a.factors), key=lambda a: a.steps[-1]):
+        action.put(values, places, times[action.steps[-1]])
 
 
-def _hold(actions: Sequence[Action], steps: Sequence[list[int]], last: int, values: Variables) -> None:
+def _hold(actions: Sequence[Action], last: int, values: Variables) -> None:
     """Fix what is fixed in the last step; a support of an earlier step is taken back after it."""
-    supports = [(a, active) for a, active in zip(actions, steps, strict=True) if a.fixed and active]
-    for action, active in supports:
-        if active[0] < last:
+    supports = [action for action in actions if action.fixed and action.steps]
+    for action in supports:
+        if action.steps[0] < last:
             values.fix(action.component, action.rows, False)
-    for action, active in supports:
+    for action in supports:
         # What is fixed at the start, before the first step, stays so through that step.
-        if active[-1] == last or (active == [0] and last == 1):
-            _check_history(action, active, last)
+        if action.steps[-1] == last or (action.steps == [0] and last == 1):
+            _check_history(action, last)
             values.fix(action.component, action.rows)
 
 
-def _check_history(action: Action, active: list[int], last: int) -> None:
+def _check_history(action: Action, last: int) -> None:
     """Refuse a support whose value is the solution of an earlier step."""
-    is_later = not action.factors and len(active) < last and action.component.startswith("DISPLACEMENT")
+    is_later = not action.factors and len(action.steps) < last and action.component.startswith("DISPLACEMENT")
     text = (
         f"{action.component} is held only from a later step on, at the value solved before; "
         'kratos_lite solves one step: use the interval [0.0, "End"] or assign a value'

@@ -16,7 +16,7 @@ from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
-from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, march_in_kratos
+from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, time_integration_of
 from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.readers.motion import add_motion
@@ -87,7 +87,7 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
         return Case(model, expected=checks, files=settings.files)
     model.notes = [note for note in model.notes if STATIC_ONLY not in note]
     in_time.finish(model)
-    return Case(model, march_in_kratos(settings, in_time), expected=checks, files=settings.files)
+    return Case(model, time_integration_of(settings, in_time), expected=checks, files=settings.files)
 
 
 def _check_root(settings: Settings) -> list[str]:

@@ -41,10 +41,8 @@ class ProcessesInTime:
 
     def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
         self.context = context
-        self.steps = [action.active(context.times) for action in actions]
-        self.notes = notes_of(actions, self.steps, context)
-        self.actions = [a for a, steps in zip(actions, self.steps, strict=True) if steps and len(a.rows)]
-        self.steps = [a.active(context.times) for a in self.actions]
+        self.notes = notes_of(actions, context)
+        self.actions = [action for action in actions if action.steps and len(action.rows)]
         self.displacement: Array | None = None
         self.velocity: Array | None = None
         self._later: list[Load] = []
@@ -60,8 +58,8 @@ class ProcessesInTime:
         """
         self._check(values)
         self._begin(values)
-        base, times = values.copy(), self.context.times
-        set_values(self.actions, self.steps, times, values)
+        base = values.copy()
+        set_values(self.actions, self.context.times, values)
         for action in self.actions:
             if action.fixed:
                 values.fix(action.component, action.rows)
@@ -69,8 +67,8 @@ class ProcessesInTime:
             if action.component.startswith("DISPLACEMENT") and action.factors:
                 self._move(i, action, values)
         for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
-            mine = [i for i, action in enumerate(self.actions) if action.component in group]
-            if all(self._is_steady(i) for i in mine):
+            mine = [action for action in self.actions if action.component in group]
+            if all(self._acts_always(action) and not action.mentions("t") for action in mine):
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
@@ -81,8 +79,8 @@ class ProcessesInTime:
         """Give a model the loads and supports that change, and let all loads begin with the first step."""
         loads: list[Load] = [ScaledLoad(load, _begun) for load in model.loads]
         model.loads[:] = [*loads, *self._later]
-        for rows, axis, course in self._moving:
-            model.fix(rows, axis, course, override=True)
+        for rows, axis, motion in self._moving:
+            model.fix(rows, axis, motion, override=True)
         if model.loads:
             model.notes.append("as in Kratos, the acceleration at the start is 0: loads act after t = 0")
         if self._moving:
@@ -91,19 +89,18 @@ class ProcessesInTime:
             )
         model.notes += self.notes
 
-    def at(self, i: int, time: float) -> float | None:
+    def at(self, action: Action, time: float) -> float | None:
         """Return the last time, up to the one given, at which an action acts; None if there is none."""
-        action, times = self.actions[i], self.context.times
         if float(time) in action.interval:
             return float(time)
-        step = bisect_right(times, time) - 1
-        count = bisect_right(self.steps[i], step)
-        return times[self.steps[i][count - 1]] if count else None
+        times = self.context.times
+        count = bisect_right(action.steps, bisect_right(times, time) - 1)
+        return times[action.steps[count - 1]] if count else None
 
     # ---- supports and start ----------------------------------------------------------------------------
 
     def _check(self, values: Variables) -> None:
-        for i, action in enumerate(self.actions):
+        for action in self.actions:
             name, expect = action.component, action.settings.expect
             if action.fixed:
                 text = (
@@ -115,7 +112,7 @@ class ProcessesInTime:
                     f"{name} is held in a part of the run only; hold it from start to end, "
                     '"interval": [0.0, "End"], or give "constrained": false for an initial value'
                 )
-                expect(not name.startswith("DISPLACEMENT") or self._acts_always(i), "interval", text)
+                expect(not name.startswith("DISPLACEMENT") or self._acts_always(action), "interval", text)
         for name, fixed in values.fixed.items():
             if name.startswith(HELD) and fixed.any():
                 raise InputError(f"{values.mesh.source}: {name} is fixed; only DISPLACEMENT can be")
@@ -123,9 +120,9 @@ class ProcessesInTime:
     def _begin(self, values: Variables) -> None:
         """Find displacement and velocity at the start."""
         start, points = values.copy(), values.mesh.points
-        for action, steps in zip(self.actions, self.steps, strict=True):
+        for action in self.actions:
             name = action.component
-            if steps[0] == 0 and action.factors:
+            if action.steps[0] == 0 and action.factors:
                 value = action.value(points[action.rows], self.context.times[0])
                 start.nodal.put(name, action.rows, value)
                 is_still = not name.startswith("ACCELERATION") or not np.any(value)
@@ -144,14 +141,14 @@ class ProcessesInTime:
         name, expect = action.component, action.settings.expect
         fixed = values.fixed.get(name, np.zeros(values.mesh.n_nodes, dtype=bool))
         rows = action.rows[fixed[action.rows]]
-        if not len(rows) or self._acts(i) == 0:
+        if not len(rows) or self._acts(action) == 0:
             return
         text = (
             f"{name} of a support changes in a part of the run only; give it as one function of t with the "
         )
-        expect(self._acts_always(i), "interval", text + 'interval [0.0, "End"]')
-        for k, later in enumerate(self.actions[i + 1 :], start=i + 1):
-            if later.component == name and later.factors and self._acts_always(k):
+        expect(self._acts_always(action), "interval", text + 'interval [0.0, "End"]')
+        for later in self.actions[i + 1 :]:
+            if later.component == name and later.factors and self._acts_always(later):
                 rows = np.setdiff1d(rows, later.rows)
         if not action.mentions("t") or not len(rows):
             return
@@ -160,16 +157,12 @@ class ProcessesInTime:
         point = np.zeros((1, 3))
         self._moving.append((rows, name[-1].lower(), lambda t: float(action.value(point, t))))
 
-    def _acts(self, i: int) -> int:
+    def _acts(self, action: Action) -> int:
         """Return the number of steps, without the start, in which an action acts."""
-        return len(self.steps[i]) - (self.steps[i][0] == 0)
+        return len(action.steps) - (action.steps[0] == 0)
 
-    def _acts_always(self, i: int) -> bool:
-        return self._acts(i) == len(self.context.times) - 1
-
-    def _is_steady(self, i: int) -> bool:
-        """Whether an action does the same in all steps."""
-        return not self.actions[i].mentions("t") and self._acts_always(i)
+    def _acts_always(self, action: Action) -> bool:
+        return self._acts(action) == len(self.context.times) - 1
 
 
 def _begun(time: float) -> float:
@@ -182,7 +175,7 @@ class _LoadInTime:
     def __init__(
         self,
         processes: ProcessesInTime,
-        mine: list[int],
+        mine: list[Action],
         base: Variables,
         load_of: Callable[[Variables], Load | None],
     ) -> None:
@@ -192,13 +185,15 @@ class _LoadInTime:
     def __call__(self, time: float) -> Load | None:
         if not time > 0:
             return None
-        p = self.processes
-        found = sorted((when, i) for i in self.mine if (when := p.at(i, time)) is not None)
-        key = [(i, when if p.actions[i].mentions("t") else None) for when, i in found]
+        found = [
+            (when, i) for i, a in enumerate(self.mine) if (when := self.processes.at(a, time)) is not None
+        ]
+        found.sort()
+        key = [(i, when if self.mine[i].mentions("t") else None) for when, i in found]
         if key != self.last[0]:
             values = self.base.copy()
             points = places_of(values.mesh)
             for when, i in found:
-                p.actions[i].put(values, points, when)
+                self.mine[i].put(values, points, when)
             self.last = (key, self.load_of(values))
         return self.last[1]

@@ -1,4 +1,4 @@
-"""How a Kratos run file marches: its scheme, damping, steps and start."""
+"""Time integration of a Kratos run file: integrator, damping, steps and initial state."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ DYNAMIC_KEYS = (
 )  # fmt: skip
 
 
-def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
-    """Return the march of a dynamic run file of Kratos; InputError with the place of what is wrong."""
+def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeIntegration:
+    """Return the time integration of a dynamic run file; InputError with the place of what is wrong."""
     solver, problem = settings.section("solver_settings"), settings.section("problem_data")
     times = times_of(problem, solver)
     text = f"start_time must be 0 for dynamic solutions; got {times[0]:g}: shift the times"
@@ -33,7 +33,7 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> TimeInteg
     return TimeIntegration(
         solver.section("time_stepping").number("time_step"),
         len(times) - 1,
-        integrator=_scheme(solver),
+        integrator=_integrator(solver),
         rayleigh=(rayleigh[0], rayleigh[1]),
         displacement=processes.displacement,
         velocity=processes.velocity,
@@ -41,8 +41,8 @@ def march_in_kratos(settings: Settings, processes: ProcessesInTime) -> TimeInteg
     )
 
 
-def _scheme(solver: Settings) -> Implicit:
-    """Return the scheme that Kratos would take."""
+def _integrator(solver: Settings) -> Implicit:
+    """Return the integrator that Kratos would take."""
     from kratos_lite.analysis import bossak, newmark
 
     method = solver.text("time_integration_method", "implicit")
@@ -50,7 +50,7 @@ def _scheme(solver: Settings) -> Implicit:
         raise solver.error(
             "time_integration_method",
             f"time_integration_method {method!r} is not supported: take 'implicit' with 'newmark'; "
-            "the option --integrator central_difference then marches explicitly",
+            "the option --integrator central_difference then integrates explicitly",
         )
     kind, beta = solver.text("scheme_type", "bossak"), solver.number("newmark_beta", 0.25)
     text = f"newmark_beta must be 0.25, which is stable; got {beta:g}"

@@ -103,12 +103,16 @@ def read_body_file(settings: Settings, *, strict: bool = True) -> Case:
 def _outputs(settings: Settings, folder: Path) -> Outputs:
     section = settings.section("output")
     section.check_keys(OUTPUTS)
-    found = {key: output_of(section, key, folder) for key in section.values}
-    for key, path in found.items():
+    for key in section.values:
         if key != "picture":
-            section.placed(key, check_ending, path, ".npz" if key == "state" else f".{key}")
-    results = [path for key, path in found.items() if key not in ("picture", "state")]
-    return Outputs(results, picture=found.get("picture"), state=found.get("state"))
+            section.placed(key, check_ending, section.text(key), ".npz" if key == "state" else f".{key}")
+    return outputs_of({key: output_of(section, key, folder) for key in section.values})
+
+
+def outputs_of(paths: dict[str, str]) -> Outputs:
+    """Return the outputs of a body from paths by the keys `OUTPUTS`."""
+    results = [path for key, path in paths.items() if key not in ("picture", "state")]
+    return Outputs(results, picture=paths.get("picture"), state=paths.get("state"))
 
 
 # ---- mesh and material -----------------------------------------------------------------------------
@@ -132,9 +136,9 @@ def _mesh(settings: Settings, folder: Path, strict: bool) -> tuple[Mesh, Materia
     make, readers = MESHES[name]
     section = settings.section("mesh").section(name)
     section.check_keys(readers)
-    required = [k for k, p in inspect.signature(make).parameters.items() if p.default is p.empty]
-    for key in required:
-        section.get(key)
+    for key, parameter in inspect.signature(make).parameters.items():
+        if parameter.default is parameter.empty:
+            section.get(key)
     values = {key: readers[key](section, key) for key in section.values}
     return settings.section("mesh").placed(name, make, **values), None
 
@@ -172,9 +176,9 @@ def _body_of(settings: Settings, folder: Path, strict: bool) -> Body:
 
 def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> Body:
     value = settings.get("body")
-    whole = isinstance(value, str)
-    section = Settings(Object(), settings.source, "body") if whole else settings.section("body")
-    owner, key = (settings, "body") if whole else (section, "kind")
+    is_word = isinstance(value, str)
+    section = Settings(Object(), settings.source, "body") if is_word else settings.section("body")
+    owner, key = (settings, "body") if is_word else (section, "kind")
     kind = owner.placed(key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
     names = {"integrator": "scheme"}

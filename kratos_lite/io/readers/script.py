@@ -14,7 +14,7 @@ from kratos_lite.bodies import Body
 from kratos_lite.bodies.batched import together
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
-from kratos_lite.io.readers.body_file import OUTPUTS
+from kratos_lite.io.readers.body_file import OUTPUTS, outputs_of
 
 NEEDED = ("body", "dt", "steps")
 """Names that a script defines."""
@@ -69,9 +69,7 @@ def _outputs(path: Path, output: Any) -> Outputs:
         if key not in OUTPUTS:
             hint = nearest(str(key), OUTPUTS)
             raise InputError(f"{path}: unknown output {key!r}.{hint} There are {', '.join(OUTPUTS)}")
-    found = {key: str(path.parent / name) for key, name in output.items()}
-    single = {key: found.pop(key) for key in ("picture", "state") if key in found}
-    return Outputs(list(found.values()), **single)
+    return outputs_of({key: str(path.parent / name) for key, name in output.items()})
 
 
 def _run(path: Path) -> dict[str, Any]:

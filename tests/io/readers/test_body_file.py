@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.describe import describe_case
 from kratos_lite.io.files import read_case
 from kratos_lite.io.readers.script import is_script
-from kratos_lite.io.run import prepare
+from kratos_lite.io.run import describe_case, prepare
 
 BOX = {
     "mesh": {"box": {"size": [0.4, 0.6, 1.0], "cells": [1, 2, 2]}},
