@@ -23,7 +23,7 @@ PLACES = ("gauss", "element", "node")
 
 
 def peak_memory() -> int:
-    """Return the largest memory of this process so far, in bytes (0 where the system does not tell)."""
+    """Return the largest memory of this process so far, in bytes (0 where the system does not say)."""
     try:
         import resource
         import sys
@@ -97,7 +97,19 @@ def vector(v: Array, size: float = 0.0) -> str:
 
 
 class Result:
-    """Displacements and all that follows from them; strains and stresses are made when asked for."""
+    """Displacements and all that follows from them; strains and stresses are made when asked for.
+
+    Analyses make results.
+
+    Parameters
+    ----------
+    mesh : of n nodes and m elements.
+    groups : the elements with their materials.
+    u : (n, 3) displacements in m.
+    reactions, loads : (n, 3) nodal forces in N.
+    report : what was solved, how, and how well.
+    u0 : (n, 3) displacements in m without stress; none if not given.
+    """
 
     def __init__(
         self,
@@ -123,11 +135,29 @@ class Result:
     # ---- nodal values --------------------------------------------------------------------------
 
     def displacement(self, where: Where | None = None) -> Array:
-        """Return displacements (n, 3) in m, of all nodes or of some."""
+        """Return the displacements of nodes.
+
+        Parameters
+        ----------
+        where : nodes by part, predicate, mask or rows; all if not given.
+
+        Returns
+        -------
+        (n, 3) in m, or (k, 3) of some.
+        """
         return self.u if where is None else self.u[self.mesh.nodes(where)]
 
     def reaction(self, where: Where | None = None) -> Array:
-        """Return reactions (n, 3) in N: forces of the supports on the body; 0 where nothing is fixed."""
+        """Return the reactions of nodes: forces of the supports on the body, 0 where nothing is fixed.
+
+        Parameters
+        ----------
+        where : nodes by part, predicate, mask or rows; all if not given.
+
+        Returns
+        -------
+        (n, 3) in N, or (k, 3) of some.
+        """
         return self.reactions if where is None else self.reactions[self.mesh.nodes(where)]
 
     # ---- element values ------------------------------------------------------------------------
@@ -162,20 +192,50 @@ class Result:
         return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
 
     def stress_at_nodes_and_elements(self) -> tuple[Array, Array]:
-        """Return nodal stresses (n, 6) and element means (m, 6) in Pa from one pass over the elements."""
+        """Return both from one pass over the elements.
+
+        Returns
+        -------
+        Nodal stresses (n, 6) and element means (m, 6) in Pa.
+        """
         means, nodal = self._averages(stress=True)
         return nodal, means
 
     def strain(self, at: str = "gauss") -> Any:
-        """Return strains, Voigt order with engineering shear.
+        """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
 
-        ``at="gauss"``: (m, g, 6), or a list of (g, 6) where elements have different rules;
-        ``"element"``: (m, 6) mean over the volume; ``"node"``: (n, 6) extrapolated and averaged.
+        Parameters
+        ----------
+        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for
+            extrapolated and averaged values.
+
+        Returns
+        -------
+        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6); or (n, 6).
+
+        Raises
+        ------
+        InputError
+            There is no such place.
         """
         return self._field(at, stress=False)
 
     def stress(self, at: str = "gauss") -> Any:
-        """Return stresses in Pa, shaped as `strain`."""
+        """Return stresses in Voigt order xx yy zz xy yz zx.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        In Pa, shaped as by `strain`.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
         if at == "node":
             return self._nodal_stress
         return self._field(at, stress=True)
@@ -185,7 +245,21 @@ class Result:
         return np.asarray(self._field("node", stress=True))
 
     def von_mises(self, at: str = "gauss") -> Any:
-        """Return von Mises stresses in Pa: (m, g), (m,) or (n,)."""
+        """Return von Mises stresses.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        (m, g), (m,) or (n,) in Pa.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
         stress = self.stress(at)
         if isinstance(stress, list):
             return [voigt.von_mises(s) for s in stress]
@@ -199,17 +273,32 @@ class Result:
         return totals(self.mesh.points, self.groups, self._strained)
 
     def totals(self) -> tuple[float, float, int]:
-        """Return strain energy in J, largest von Mises stress at a Gauss point in Pa, its element row."""
+        """Return what one pass over the elements gives.
+
+        Returns
+        -------
+        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element.
+        """
         return self._totals
 
     def energy(self) -> float:
-        """Return the strain energy ½ ∫ ε:C:ε dV in J."""
+        """Return the strain energy ½ ∫ ε:C:ε dV.
+
+        Returns
+        -------
+        In J.
+        """
         return self._totals[0]
 
     # ---- out -----------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary: label and value."""
+        """Return the rows of the summary.
+
+        Returns
+        -------
+        Labels and values.
+        """
         mesh, report = self.mesh, self.report
         length = np.linalg.norm(self.u, axis=1)
         top = int(length.argmax())

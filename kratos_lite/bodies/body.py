@@ -217,14 +217,14 @@ class Body(FreeBody):
 
     # ---- loads and constraints -------------------------------------------------------------------
 
-    def add(self, load: BodyLoad | Load, amplitude: Factor = 1.0) -> None:
+    def add(self, load: BodyLoad | Load, *, amplitude: Factor | None = None) -> None:
         """Let a load act.
 
         Parameters
         ----------
         load : a load of bodies (`Force`, `Torque`, …), or one of models (`Gravity`, `Traction`, `Pressure`,
             …), which acts on the nodes as on the undeformed mesh and keeps its direction in space.
-        amplitude : number, `TimeSeries`, or function of the time in s, by which it is multiplied.
+        amplitude : number, `TimeSeries`, or function of the time in s that multiplies the load.
 
         Raises
         ------

@@ -69,7 +69,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
         body.q = start.copy()
         try:
             iterations = sum(_increment(body, start, k / count, progress) for k in range(1, count + 1))
-            body.set_configuration(body.q)  # Newton may end at a shape that is turned inside out
+            body.set_configuration(body.q)  # Newton may end at an inverted shape
         except (SolveError, InputError, np.linalg.LinAlgError) as error:
             failed = error
             continue

@@ -8,12 +8,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly.element_groups import ElementGroup, element_groups_of
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import check_geometry, checked_material, checked_mesh
+from kratos_lite.model.checks import checked_material
 from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
@@ -28,13 +29,9 @@ def elements_of(mesh: Mesh, material: Material) -> list[ElementGroup]:
     MeshError, ModelError, InputError
         If the mesh is broken or inverted, or elements have no material.
     """
-    check_geometry(checked_mesh(mesh))
-    given = material if isinstance(material, Mapping) else {None: material}
-    material_of = np.full(mesh.n_elements, -1)
-    for number, (where, one) in enumerate(given.items()):
-        checked_material(one)
-        material_of[mesh.elements(where)] = number
-    return element_groups_of(mesh, list(given.values()), material_of)
+    structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
+    structure.check_geometry()
+    return structure.element_groups()
 
 
 def mass_properties_of(mesh: Mesh, material: Material) -> MassProperties:

@@ -9,10 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.typing import Array, Ints, Mask
 
 
 @dataclass
@@ -44,9 +42,9 @@ class Data:
     """
 
     variable: str
-    ids: NDArray[np.int64]
-    fixed: NDArray[np.bool_]
-    values: NDArray[np.float64]
+    ids: Ints
+    fixed: Mask
+    values: Array
     line: int = 0
     source: str = ""
 

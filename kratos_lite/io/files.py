@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
-from kratos_lite.io.kratos import model_from
+from kratos_lite.io.kratos.to_model import model_from
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
@@ -27,6 +27,10 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
         any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
+
+    Returns
+    -------
+    The model, with its loads and supports.
 
     Raises
     ------

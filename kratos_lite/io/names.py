@@ -6,34 +6,9 @@ import re
 from collections.abc import Iterable
 
 from kratos_lite.errors import nearest
-from kratos_lite.shapes import (
-    FACE_SHAPES,
-    Hexahedron8,
-    Hexahedron20,
-    Hexahedron27,
-    Line2,
-    Line3,
-    Point1,
-    Pyramid5,
-    Pyramid13,
-    Shape,
-    Tetrahedron4,
-    Tetrahedron10,
-    Wedge6,
-    Wedge15,
-)
+from kratos_lite.shapes import FACE_SHAPES, SHAPES, Line2, Line3, Point1, Shape
 
-SOLIDS: dict[int, type[Shape]] = {
-    4: Tetrahedron4,
-    5: Pyramid5,
-    6: Wedge6,
-    8: Hexahedron8,
-    10: Tetrahedron10,
-    13: Pyramid13,
-    15: Wedge15,
-    20: Hexahedron20,
-    27: Hexahedron27,
-}
+SOLIDS = {len(shape.nodes): shape for shape in SHAPES.values() if shape.nodes.shape[1] == 3}
 """Solid shapes by their number of nodes."""
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
 CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.document import Note
+from kratos_lite.typing import Ints
 
 MAX_LINE = 1_000_000
 """Longest line that is read, in bytes."""
@@ -122,7 +123,7 @@ class Source:
         self.name, self.data, self.problems, self.notes, self.origin = name, data, problems, notes, origin
 
     @cached_property
-    def _line_ends(self) -> NDArray[np.int64]:
+    def _line_ends(self) -> Ints:
         return np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == ord("\n"))
 
     def lines(self, offsets: ArrayLike) -> NDArray[np.int32]:

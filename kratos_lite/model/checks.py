@@ -139,7 +139,7 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
     where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
     nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
     if (det < 0).all():
-        cure = "the element is inverted; mesh.reoriented() fixes the node order"
+        cure = "the element is inverted; mesh.reoriented() corrects the node order"
     elif (det == 0).all():
         cure = "the element has no volume; two of its nodes may coincide"
     else:

@@ -210,7 +210,7 @@ def length_scaling(element: Element) -> Measured:
         k: difference(element(10.0**k * X).stiffness(C_ISOTROPIC), 10.0**k * K) for k in range(-9, 10, 3)
     }
     error, k = worst(errors)
-    return Measured(error, 1e-13, f"K of the cell scaled by 1e{k} against 1e{k} K")
+    return Measured(error, 1e-13, f"K of a cell with all lengths × 1e{k} against 1e{k} K of the cell")
 
 
 def offset(element: Element) -> Measured:

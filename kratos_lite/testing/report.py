@@ -1,4 +1,4 @@
-"""Findings: what each check measured, and the text that tells a student what to mend."""
+"""Findings: what each check measured, and the text that tells a student what to fix."""
 
 from __future__ import annotations
 
@@ -55,11 +55,12 @@ class Finding:
     def __str__(self) -> str:
         if self.skipped:
             return f"{self.check}: not run: {self.detail}"
-        if self.passed:
-            return f"{self.check}: {self.measured:.3g} ≤ {self.limit:.3g}: {self.claim or self.detail}"
-        if not math.isfinite(self.measured) and self.limit == 0:
-            return f"{self.check}: {self.detail}"
-        return f"{self.check}: {self.measured:.3g} exceeds {self.limit:.3g}: {self.detail}"
+        text = (self.passed and self.claim) or self.detail
+        if self.limit == 0:  # a count of faults, or none at all
+            return f"{self.check}: {text}"
+        return (
+            f"{self.check}: {self.measured:.3g} {'≤' if self.passed else 'exceeds'} {self.limit:.3g}: {text}"
+        )
 
 
 def failures(findings: Iterable[Finding]) -> list[Finding]:
@@ -113,12 +114,12 @@ def run_after(
     """Run checks that only mean something if others passed; after a failure they are not run, and say so.
 
     >>> run_after([Finding("kronecker", False, 1.0, 0.0, "")], [worst], {})[0].detail
-    'mend kronecker first'
+    'fix kronecker first'
     """
     names = [finding.check for finding in failures(causes)]
     if not names:
         return run(checks, subject)
-    return [_not_run(title(check), f"mend {', '.join(names)} first") for check in checks]
+    return [_not_run(title(check), f"fix {', '.join(names)} first") for check in checks]
 
 
 def title(check: Callable[..., object]) -> str:

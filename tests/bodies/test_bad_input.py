@@ -60,7 +60,7 @@ def with_lost_node():
 @each_kind
 @pytest.mark.parametrize("mesh", [inverted, flat], ids=["inverted", "flat"])
 def test_a_mesh_without_positive_volume(kind, mesh):
-    with pytest.raises(kl.KratosLiteError, match=r"(?i)jacobian|inside out|inverted|volume|same place"):
+    with pytest.raises(kl.KratosLiteError, match=r"(?i)jacobian|inverted|volume|same place"):
         kind(mesh(), STEEL)
 
 
@@ -159,7 +159,7 @@ def test_options_that_make_no_sense(options, words):
         (kl.PseudoRigidBody, np.full(12, NAN), "a configuration must be finite"),
         (kl.FiniteElementBody, np.zeros(23), r"shape \(24,\)"),
         (kl.FiniteElementBody, np.full(24, np.inf), "a configuration must be finite"),
-        (kl.FiniteElementBody, -2 * kl.box().points.ravel(), "turn element 1 inside out"),
+        (kl.FiniteElementBody, -2 * kl.box().points.ravel(), "invert element 1"),
         (kl.FiniteElementBody, "far away", "a configuration"),
     ],
 )
@@ -227,11 +227,14 @@ def test_loads_that_are_refused(kind, load, error, words, refused):
     refused(body_of(kind), lambda body: body.add(load()), error, words)
 
 
-@pytest.mark.parametrize("amplitude", [NAN, "big", [1.0, 2.0], None])
+@pytest.mark.parametrize("amplitude", [NAN, "big", [1.0, 2.0]])
 def test_amplitudes_that_are_refused(amplitude, refused):
     body = body_of(kl.RigidBody)
     refused(
-        body, lambda body: body.add(kl.Gravity((0, 0, 1)), amplitude), kl.InputError, "amplitude of a load"
+        body,
+        lambda body: body.add(kl.Gravity((0, 0, 1)), amplitude=amplitude),
+        kl.InputError,
+        "amplitude of a load",
     )
 
 

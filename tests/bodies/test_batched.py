@@ -24,7 +24,7 @@ def herd(kind, scheme, count=5, damping=0.0):
         if i % 2:
             body.add(kl.Gravity((0, 0, -9.81)))
             frame = "convected" if kind is kl.RigidBody else "spatial"  # F stretches a convected one
-            body.add(kl.Force(mesh.points[3], rng.uniform(-9, 9, 3), frame=frame), 2.0)
+            body.add(kl.Force(mesh.points[3], rng.uniform(-9, 9, 3), frame=frame), amplitude=2.0)
         if i == 3:
             body.add(kl.Force(body.center, (1.0, 2, 3)))
         if i == 4 and kind is kl.RigidBody:
@@ -116,7 +116,7 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(scheme):
         (lambda b: setattr(b[1], "time", 3.0), kl.InputError, "need the same time"),
         (lambda b: b[1].constrain(kl.FixPoint(b[1].center)), kl.ModelError, "body 1 has constraints"),
         (
-            lambda b: b[1].add(kl.Gravity((0, 0, 1.0)), kl.TimeSeries([0, 1], [0, 1])),
+            lambda b: b[1].add(kl.Gravity((0, 0, 1.0)), amplitude=kl.TimeSeries([0, 1], [0, 1])),
             kl.ModelError,
             "body 1 has constraints or loads that change",
         ),

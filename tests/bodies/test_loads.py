@@ -107,7 +107,7 @@ def test_a_force_in_space_has_its_moment(kind):
 def test_a_force_in_the_body_turns_with_it(kind):
     body = moved(block(kind))
     X, f = at(0.1, -0.2, 0.4), np.array([1.0, 2.0, -3.0])
-    body.add(kl.Force(X, f, frame="convected"), 2.0)
+    body.add(kl.Force(X, f, frame="convected"), amplitude=2.0)
     force, torque = resultant(body)
     np.testing.assert_allclose(force, 2 * TURN @ f, rtol=1e-12)
     np.testing.assert_allclose(torque, 2 * TURN @ np.cross(X - CENTER, f), rtol=1e-11)
@@ -146,8 +146,8 @@ def test_weight_pulls_at_the_mass_center(kind):
 @each_kind
 def test_weight_that_changes_in_time_accelerates_by_its_integral(kind):
     body = block(kind)
-    body.add(kl.Gravity((0, 0, -10.0)), kl.TimeSeries([0, 0.1, 0.2], [0, 1, 0]))
-    body.add(kl.Gravity((2.0, 0, 0)), lambda t: 3 * t * t)
+    body.add(kl.Gravity((0, 0, -10.0)), amplitude=kl.TimeSeries([0, 0.1, 0.2], [0, 1, 0]))
+    body.add(kl.Gravity((2.0, 0, 0)), amplitude=lambda t: 3 * t * t)
     for _ in kl.march(body, 1e-3, 200, every=200):
         pass
     np.testing.assert_allclose(
@@ -159,8 +159,8 @@ def test_weight_that_changes_in_time_accelerates_by_its_integral(kind):
 def test_loads_add_up_and_an_amplitude_multiplies(kind):
     body, single = moved(block(kind)), moved(block(kind))
     X = at(0.2, 0.3, 0.5)
-    body.add(kl.Force(X, (1.0, 2, 3)), 2.0)
-    body.add(kl.Force(X, (1.0, 2, 3)), lambda t: 1 + t)
+    body.add(kl.Force(X, (1.0, 2, 3)), amplitude=2.0)
+    body.add(kl.Force(X, (1.0, 2, 3)), amplitude=lambda t: 1 + t)
     single.add(kl.Force(X, (1.0, 2, 3)))
     np.testing.assert_allclose(
         body.external_load(time=0.5), 3.5 * single.external_load(), rtol=1e-13, atol=1e-13
@@ -299,7 +299,7 @@ CONSERVATIVE = [
 def test_a_load_is_the_slope_of_its_potential(kind, load):
     body = stirred(kind)
     q, v = body.q.copy(), body.u.copy()
-    body.add(load, 1.5)
+    body.add(load, amplitude=1.5)
     slope = body.external_load() @ v
     potentials = []
     for side in (1, -1):
@@ -311,7 +311,7 @@ def test_a_load_is_the_slope_of_its_potential(kind, load):
 @pytest.mark.parametrize("load", CONSERVATIVE, ids=lambda load: type(load).__name__)
 def test_the_potential_of_a_rigid_body_too(load):
     body = stirred(kl.RigidBody)
-    body.add(load, 1.5)
+    body.add(load, amplitude=1.5)
     slope, q, R = float(body.external_load() @ body.u), body.q.copy(), body.rotation.copy()
     potentials = []
     for t in (1e-5, -1e-5):
@@ -324,7 +324,7 @@ def test_the_potential_of_a_rigid_body_too(load):
 @each_kind
 def test_loads_that_change_have_no_potential(kind):
     body = block(kind)
-    body.add(kl.Gravity((0, 0, -9.81)), kl.TimeSeries([0, 1], [1, 2]))
+    body.add(kl.Gravity((0, 0, -9.81)), amplitude=kl.TimeSeries([0, 1], [1, 2]))
     body.add(kl.FollowerPressure("z+", 5.0))
     body.add(kl.Force(CENTER, (1.0, 2, 3), frame="convected"))
     assert float(body.potential_energy()) == 0
@@ -362,3 +362,13 @@ def test_gravity_on_a_part_of_a_body_without_material_takes_its_mean_density():
     body = kl.RigidBody(mesh, mass_properties=kl.MassProperties(mass=8.0, inertia=np.eye(3)))
     body.add(kl.Gravity((0.0, 0.0, -10.0), where=[0]))  # one of two equal elements
     np.testing.assert_allclose(body.external_load()[3:], [0.0, 0.0, -40.0], atol=1e-12)
+
+
+@each_kind
+def test_a_load_that_a_function_of_time_gives_acts_as_the_one_of_that_time(kind):
+    body, twin = block(kind), block(kind)
+    body.add(kl.TimeDependentLoad(lambda t: kl.Traction("x+", (10.0 * t, 0, 5.0)) if t < 2 else None))
+    twin.add(kl.Traction("x+", (15.0, 0, 5.0)))
+    np.testing.assert_allclose(body.external_load(time=1.5), twin.external_load(), atol=1e-14)
+    assert not body.external_load(time=3.0).any()
+    assert float(body.potential_energy()) == 0

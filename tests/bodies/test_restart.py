@@ -29,7 +29,9 @@ def body_of(brick, kind, scheme, options, loads):
         body.add(kl.Gravity((0, 0, -9.81)))
         body.add(kl.Force((0.2, 0.3, 0.5), (10.0, 0, 5), frame="convected"))
     if loads == "changing":
-        body.add(kl.Force((0.2, 0.3, 0.5), (0, 30.0, 5)), kl.TimeSeries([0, 0.01, 0.02], [0, 1, -1]))
+        body.add(
+            kl.Force((0.2, 0.3, 0.5), (0, 30.0, 5)), amplitude=kl.TimeSeries([0, 0.01, 0.02], [0, 1, -1])
+        )
         body.add(kl.Spring((0.2, -0.3, 0.5), (1, 1, 1), 300.0, damping=2.0, length=0.8))
     if loads == "held":
         body.set_velocity()

@@ -323,7 +323,7 @@ def test_external_work_is_the_gain_of_energy(kind, scheme):
     """Dead loads do their work to the last digit where the scheme keeps the energy by itself."""
     body = cube(kind, scheme)
     body.add(kl.Gravity((0, 0, -G)))
-    body.add(kl.Force((0.1, 0.1, 0.1), (50.0, 0, 20)), kl.TimeSeries([0, 0.02, 0.04], [0, 1, 0]))
+    body.add(kl.Force((0.1, 0.1, 0.1), (50.0, 0, 20)), amplitude=kl.TimeSeries([0, 0.02, 0.04], [0, 1, 0]))
     body.set_velocity((1, 2, 3), (0.5, -1, 2))
     start = float(body.kinetic_energy() + body.internal_energy())
     end(body, 1e-3, 60)
@@ -336,7 +336,7 @@ def test_external_work_is_the_gain_of_energy(kind, scheme):
 def test_the_work_of_a_dead_load_is_what_its_potential_loses(kind):
     body = cube(kind, "ENERGY_MOMENTUM", E=1e7)
     body.add(kl.Gravity((1, 0, -G)))
-    body.add(kl.Force((0.1, 0.1, 0.1), (50.0, 0, 20)), 2.0)
+    body.add(kl.Force((0.1, 0.1, 0.1), (50.0, 0, 20)), amplitude=2.0)
     start, energy = float(body.potential_energy()), float(body.energy())
     end(body, 1e-3, 60)
     assert body.external_work == pytest.approx(start - float(body.potential_energy()), rel=1e-10)

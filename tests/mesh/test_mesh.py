@@ -39,11 +39,11 @@ def test_wrong_arguments_are_mesh_errors(arguments, text):
 
 
 @pytest.mark.parametrize("element", list(kl.ELEMENTS))
-def test_elements_that_are_inside_out_are_turned(element):
+def test_inverted_elements_are_reoriented(element):
     mesh = kl.box((1.0, 2.0, 3.0), (2, 1, 1), element)
     broken = kl.Mesh(mesh.points * [-1, 1, 1], mesh.blocks)
     model = kl.Model(broken, kl.Isotropic3D(1.0, 0.3))
-    with pytest.raises(kl.MeshError, match="inside out"):
+    with pytest.raises(kl.MeshError, match="inverted"):
         model.check_geometry()
     mended = broken.reoriented()
     assert kl.Model(mended, kl.Isotropic3D(1.0, 0.3)).check_geometry() == []

@@ -50,10 +50,10 @@ def test_two_swapped_nodes_are_named(nodes):
 
 
 @pytest.mark.parametrize("nodes", [4, 10])
-def test_a_mirrored_tetrahedron_is_called_inside_out(nodes):
+def test_a_mirrored_tetrahedron_is_called_inverted(nodes):
     mesh = kl.box(element=kind(nodes))
     mesh.points[:, 0] *= -1
-    with pytest.raises(kl.MeshError, match=r"inverted; mesh\.reoriented\(\) fixes") as caught:
+    with pytest.raises(kl.MeshError, match=r"inverted; mesh\.reoriented\(\) corrects") as caught:
         model_of(mesh).solve()
     assert len(str(caught.value).splitlines()) == 6
 

@@ -97,7 +97,7 @@ def test_a_derivative_with_r_where_s_belongs_is_named():
     found = failed(findings)
     assert set(found) == {"derivatives"}
     assert not_run(findings) == dict.fromkeys(
-        ("partition of unity", "reproduction", "bounded"), "mend derivatives first"
+        ("partition of unity", "reproduction", "bounded"), "fix derivatives first"
     )
     assert set(alone(shape)) == {"derivatives", "partition of unity", "reproduction"}
     detail = found["derivatives"].detail
@@ -472,7 +472,7 @@ def test_more_points_or_a_higher_degree_than_any_element_needs_are_refused_at_on
         findings = check_element(element_with(KinematicLinear3D10N, rule=rule, mass_rule=tetrahedron(4)))
         assert set(failed(findings)) == {"rule sizes"}
         assert "are checked up to 1000 points and degree 20" in failed(findings)["rule sizes"].detail
-        assert not_run(findings)["rank"] == "mend rule sizes first"
+        assert not_run(findings)["rank"] == "fix rule sizes first"
 
 
 def test_a_wrong_mass_rule_holds_up_only_the_checks_of_the_mass():
@@ -705,13 +705,13 @@ def test_assert_conforms_reports_every_failure_in_one_error():
 
 def test_a_long_report_is_cut_and_counted():
     text = report("Broken", [Finding(f"check {i}", False, 1.0, 0.0, "no") for i in range(23)])
-    assert text.splitlines()[20:] == ["  check 19: 1 exceeds 0: no", "  … and 3 more"]
+    assert text.splitlines()[20:] == ["  check 19: no", "  … and 3 more"]
 
 
-def test_a_finding_that_passes_says_what_holds_and_not_how_to_mend_it():
+def test_a_finding_that_passes_says_what_holds_and_not_how_to_fix_it():
     texts = [str(finding) for finding in check_element(KinematicLinear3D20N) if finding.passed]
     assert len(texts) == 38
-    assert any(text.startswith("faces: 0 ≤ 0: faces are outward, closed") for text in texts)
+    assert any(text.startswith("faces: faces are outward, closed") for text in texts)
     assert not any("problem" in text or "helps" in text for text in texts)
 
 

@@ -148,7 +148,7 @@ def test_parts_at_rest_are_checked_all_the_same():
     broken = bodies()
     broken.mesh.points = np.where(np.arange(81)[:, None] < 54, 1, [-1, 1, 1]) * broken.mesh.points
     broken.add(kl.Gravity((0, 0, -9.81), "b0"))
-    with pytest.raises(kl.MeshError, match="inside out"):
+    with pytest.raises(kl.MeshError, match="inverted"):
         broken.solve()
 
 

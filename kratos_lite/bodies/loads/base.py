@@ -11,7 +11,8 @@ import numpy as np
 
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.model.loads import Gravity, Load
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.loads import Gravity, Load, TimeDependentLoad
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 
@@ -97,15 +98,17 @@ class BodyLoad(ABC):
         """
 
 
-def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor) -> AppliedLoad:
+def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) -> AppliedLoad:
     """Return a load as it acts on a body, multiplied by an amplitude that may depend on the time."""
-    function = function_of(amplitude, "the amplitude of a load")
+    function = function_of(1.0 if amplitude is None else amplitude, "the amplitude of a load")
     if isinstance(load, BodyLoad):
         applied = load.bind(body)
     elif not isinstance(load, Load):
         raise InputError(f"a load such as Gravity or Force is needed; got {type(load).__name__}")
     elif isinstance(load, Gravity) and load.where is None and load.force.ndim == 1:
         applied = _gravity(load.force, body)
+    elif isinstance(load, TimeDependentLoad):
+        applied = _time_dependent(load, body)
     else:
         applied = _dead(load, body)
     applied.amplitude, applied.steady = function, not callable(amplitude)
@@ -122,12 +125,24 @@ def _gravity(g: Array, body: FreeBody) -> AppliedLoad:
 
 def _dead(load: Load, body: FreeBody) -> AppliedLoad:
     """Return the nodal forces of the undeformed mesh, which keep their direction in space."""
-    mesh = body.mesh
-    if mesh is None:
-        raise ModelError(f"a {type(load).__name__} acts on a mesh; this body has none: use Force or Torque")
+    mesh = _mesh_of(load, body)
     f = load.forces(mesh, body.elements())
     return AppliedLoad(
         lambda q, u, t: body.generalized_nodal_force(f, q),
         spatial=body.generalized_nodal_force(f, body.q) if body.jacobian_is_constant else None,
         potential_energy=lambda q: np.asarray(-(f * body.position(mesh.points, q)).sum(axis=(-2, -1))),
     )
+
+
+def _time_dependent(load: TimeDependentLoad, body: FreeBody) -> AppliedLoad:
+    """Return the nodal forces that a function of time gives; they keep their direction in space."""
+    mesh, elements = _mesh_of(load, body), body.elements()
+    forces = load.history(lambda one: one.forces(mesh, elements))
+    nothing = np.zeros_like(mesh.points)
+    return AppliedLoad(lambda q, u, t: body.generalized_nodal_force(forces(t) + nothing, q))
+
+
+def _mesh_of(load: Load, body: FreeBody) -> Mesh:
+    if body.mesh is None:
+        raise ModelError(f"a {type(load).__name__} acts on a mesh; this body has none: use Force or Torque")
+    return body.mesh

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
@@ -16,7 +15,7 @@ from kratos_lite.io.kratos.context import RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 Comparison: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
@@ -46,7 +45,7 @@ class NodeComparison:
 
     what: str
     component: str
-    rows: NDArray[np.int64]
+    rows: Ints
     expected: Callable[[Result], tuple[Array, Array]]
 
     def __call__(self, result: Result) -> str:
@@ -103,7 +102,7 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
 
 
 def _from_expression(
-    text: str, rows: NDArray[np.int64], time: float, moved: bool, allowed: float, result: Result
+    text: str, rows: Ints, time: float, moved: bool, allowed: float, result: Result
 ) -> tuple[Array, Array]:
     """Return the values of an expression in x, y, z, t, as Python reads it, and the allowed differences."""
     points = result.mesh.points[rows] + (result.displacement()[rows] if moved else 0.0)
@@ -140,7 +139,7 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
 def _from_table(
     data: Settings,
     component: str,
-    rows: NDArray[np.int64],
+    rows: Ints,
     time: float,
     tolerances: tuple[float, float],
     result: Result,

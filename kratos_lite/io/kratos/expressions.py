@@ -15,9 +15,10 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.errors import nearest
+from kratos_lite.typing import Array
 
 MAX_DEPTH = 50
 """Deepest nesting of brackets."""
@@ -43,7 +44,7 @@ ONE_IF = "Kratos takes one 'if' at the outermost level only"
 _CONSTANTS = {"pi": np.pi, "e": np.e}
 
 
-def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False) -> NDArray[np.float64]:
+def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False) -> Array:
     """Return the value of an expression, broadcast over the variables.
 
     Parameters

@@ -14,7 +14,6 @@ from math import hypot
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.io.kratos.context import Interval, RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
@@ -22,7 +21,7 @@ from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 Value = float | str
 Factors = tuple[Value, ...] | None
@@ -51,7 +50,7 @@ class Action:
     """
 
     settings: Settings
-    rows: NDArray[np.int64]
+    rows: Ints
     component: str
     factors: tuple[Value, ...]
     interval: Interval

@@ -10,7 +10,6 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
@@ -18,7 +17,7 @@ from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.processes import Action, notes_of, places_of, set_values
 from kratos_lite.io.kratos.variables import LOADING, Variables
 from kratos_lite.model.loads import Load, ScaledLoad, TimeDependentLoad
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 GRAVITY = frozenset(f"VOLUME_ACCELERATION_{axis}" for axis in "XYZ")
 SURFACE = frozenset(name for name in LOADING - GRAVITY if not name.startswith("DISPLACEMENT"))
@@ -46,7 +45,7 @@ class ProcessesInTime:
         self.displacement: Array | None = None
         self.velocity: Array | None = None
         self._later: list[Load] = []
-        self._moving: list[tuple[NDArray[np.int64], str, Callable[[float], float]]] = []
+        self._moving: list[tuple[Ints, str, Callable[[float], float]]] = []
 
     def prepare(self, values: Variables) -> None:
         """Bring values and supports to what stays in time, and keep what changes for `finish`.

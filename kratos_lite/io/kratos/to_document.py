@@ -39,22 +39,16 @@ def document_from(model: Model) -> Document:
     mesh = model.mesh
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
-    blocks = []
-    for block, rows in with_rows(mesh.blocks):
-        blocks.append(Block(block.name, block.nodes, block.ids, numbers[rows], block.shape))
-    forces = np.zeros_like(mesh.points)
-    for load in others:
-        forces += load.forces(mesh, model.element_groups())
+    blocks = [
+        Block(block.name, block.nodes, block.ids, numbers[rows], block.shape)
+        for block, rows in with_rows(mesh.blocks)
+    ]
+    forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
-    copy = Mesh(
-        mesh.points,
-        blocks,
-        node_ids=mesh.node_ids,
-        conditions=conditions,
-        parts=_parts(mesh),
-        source=mesh.source,
-    )
-    document = Document(copy, properties, nodal_data=[*_fixed(model), *data], constraints=_constraints(model))
+    ids, parts = mesh.node_ids, _parts(mesh)
+    copy = Mesh(mesh.points, blocks, node_ids=ids, conditions=conditions, parts=parts, source=mesh.source)
+    data = [*_fixed(model), *data]
+    document = Document(copy, properties, nodal_data=data, constraints=_constraints(model))
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
@@ -98,13 +92,11 @@ def _values(material: LinearMaterial, gravity: Array) -> dict[str, Any]:
 
 
 def _fixed(model: Model) -> list[Data]:
-    found = []
+    found, supports = [], model.supports
     for axis, letter in enumerate("XYZ"):
-        rows = np.flatnonzero(model.supports.fixed[:, axis])
-        if len(rows):
-            values = model.supports.values[rows, axis]
-            ids = model.mesh.node_ids[rows]
-            found.append(Data(f"DISPLACEMENT_{letter}", ids, np.ones(len(rows), dtype=bool), values))
+        if len(rows := np.flatnonzero(supports.fixed[:, axis])):
+            held, ids = np.ones(len(rows), dtype=bool), model.mesh.node_ids[rows]
+            found.append(Data(f"DISPLACEMENT_{letter}", ids, held, supports.values[rows, axis]))
     return found
 
 
@@ -112,10 +104,8 @@ def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block
     rows = np.flatnonzero((forces != 0).any(axis=1))
     if not len(rows):
         return [], []
-    ids = np.arange(1, len(rows) + 1)
-    block = Block(
-        "PointLoadCondition3D1N", rows[:, None].astype(np.int32), ids, np.full(len(rows), properties), Point1
-    )
+    nodes, ids = rows[:, None].astype(np.int32), np.arange(1, len(rows) + 1)
+    block = Block("PointLoadCondition3D1N", nodes, ids, np.full(len(rows), properties), Point1)
     free = np.zeros(len(rows), dtype=bool)
     names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
     return [block], [Data(n, mesh.node_ids[rows], free, forces[rows, i]) for i, n in enumerate(names)]

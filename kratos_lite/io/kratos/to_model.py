@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import Problems, nearest
@@ -14,6 +11,7 @@ from kratos_lite.io.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
+from kratos_lite.typing import Ints
 
 STATIC_ONLY = "do not matter in linear statics"
 
@@ -123,7 +121,7 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
     return False
 
 
-def _note_overridden(values: Variables, data: Data, rows: NDArray[np.int64], model: Model) -> None:
+def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) -> None:
     """Note fixed values that an earlier block gave otherwise."""
     for name, new in components(data.variable, data.values).items():
         if name in values.fixed:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Container, Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads import SURFACES, ConditionLoads, Gravity
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 LOADS = {
     "point": "POINT_LOAD",
@@ -70,7 +70,7 @@ class Fields(dict[str, Array]):
         other.update((name, values.copy()) for name, values in self.items() if name in names)
         return other
 
-    def loaded(self, variable: str) -> NDArray[np.bool_]:
+    def loaded(self, variable: str) -> Mask:
         """Return where a variable or a component of it is not 0."""
         names = [variable, *(f"{variable}_{axis}" for axis in "XYZ")]
         found = [self[name] != 0 for name in names if name in self]
@@ -89,7 +89,7 @@ class Variables:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self.nodal, self.conditional = Fields(mesh.n_nodes), Fields(mesh.n_conditions)
-        self.fixed: dict[str, NDArray[np.bool_]] = {}
+        self.fixed: dict[str, Mask] = {}
 
     def fix(self, component: str, rows: ArrayLike, fixed: ArrayLike = True) -> None:
         """Fix (or free) a component on node rows."""
@@ -194,7 +194,7 @@ class Variables:
                     where = f"{idle.sum()} {word} (first {rows[idle][0]})"
                     notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
 
-    def _carriers(self, cells: Iterable[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _carriers(self, cells: Iterable[str]) -> tuple[Mask, Mask]:
         """Return which conditions are of these cells, and which nodes they have."""
         nodes, masks = np.zeros(self.mesh.n_nodes, dtype=bool), [np.zeros(0, dtype=bool)]
         for block in self.mesh.conditions:

@@ -64,8 +64,8 @@ OF_MESH: dict[str, Callable[[Settings, str, Mesh | None], Any]] = {"on": part, "
 def add_load(body: Body, section: Settings) -> None:
     """Let the load of an object act on a body."""
     load = _build(section, body.mesh, LOADS, "amplitude")
-    amplitude = number_or_series(section, "amplitude") if "amplitude" in section else 1.0
-    section.placed("type", body.add, load, amplitude)
+    amplitude = number_or_series(section, "amplitude") if "amplitude" in section else None
+    section.placed("type", body.add, load, amplitude=amplitude)
 
 
 def add_constraint(body: Body, section: Settings) -> None:

@@ -110,7 +110,10 @@ def test_every_load_is_that_of_python(scene, name, amplitude):
     more = {} if amplitude is None else {"amplitude": amplitude}
     body = scene(loads=[{"type": name, **values, **more}]).body
     twin = kl.RigidBody(body.mesh, RUBBER)
-    twin.add(load, 1.0 if amplitude is None else 3.0 if amplitude == 3.0 else kl.TimeSeries([0, 1], [0, 2]))
+    twin.add(
+        load,
+        amplitude=1.0 if amplitude is None else 3.0 if amplitude == 3.0 else kl.TimeSeries([0, 1], [0, 2]),
+    )
     found = body.external_load(time=0.25)
     np.testing.assert_array_equal(found, twin.external_load(time=0.25))
     assert np.abs(found).max() > 0

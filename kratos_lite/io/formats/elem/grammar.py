@@ -13,13 +13,12 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.document import Note
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask
 
 INT = rb"\d+(?![\w.+-])"
 REAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?(?![\w.+-])"
@@ -142,7 +141,7 @@ class Source(TextSource):
         self,
         text: bytes,
         starts: Sequence[int] | Ints,
-        doubtful: NDArray[np.bool_],
+        doubtful: Mask,
         read: Callable[[bytes], float],
     ) -> None:
         """Ask the exact reader of single tokens about the doubtful ones."""

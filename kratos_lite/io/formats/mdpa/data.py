@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.io.document import Data
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
@@ -13,7 +12,7 @@ from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at
 from kratos_lite.io.text import integer
 from kratos_lite.mesh import rows_of_ids, without_repeats
-from kratos_lite.typing import Ints
+from kratos_lite.typing import Array, Ints
 
 WORDS = {"NodalData": "node", "ElementalData": "element", "ConditionalData": "condition"}
 IS_FIXED = rb"\s*([^\s\[(]+)"
@@ -46,7 +45,7 @@ def read_data(source: Source, frame: Frame, known: Ints) -> Data:
     return data
 
 
-def _data(source: Source, frame: Frame, rows: Rows, values: NDArray[np.float64]) -> Data:
+def _data(source: Source, frame: Frame, rows: Rows, values: Array) -> Data:
     free = np.zeros(len(rows.ints), dtype=bool)
     return Data(frame.arguments[0], rows.ints[:, 0], free, values, source.line(frame.offset))
 
@@ -55,7 +54,7 @@ def _read_arrays(source: Source, frame: Frame, is_nodal: bool, kind: str | None)
     """Return rows of an id, for nodes a 0, and a vector or matrix."""
     shapes: list[tuple[int, ...]] = []
 
-    def read(at: int, end: int) -> tuple[tuple[int, NDArray[np.float64]], int]:
+    def read(at: int, end: int) -> tuple[tuple[int, Array], int]:
         word = next(source.words((at, end)))
         number = integer(word.group())
         at = _free(source, word.end(), end) if is_nodal else word.end()

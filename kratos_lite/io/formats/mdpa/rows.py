@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from kratos_lite.io.formats.mdpa.scan import SMALL, Source, Span
 from kratos_lite.io.text import integer, real, shown
 from kratos_lite.native import kernels
+from kratos_lite.typing import Array, Ints
 
 TRUTH = {b"1": 1, b"true": 1, b"True": 1, b"0": 0, b"false": 0, b"False": 0}
 """Words for true and false."""
@@ -47,8 +48,8 @@ class Layout:
 class Rows:
     """Columns of a block: ints (m, a), reals (m, b) and the line (m,) of each row."""
 
-    ints: NDArray[np.int64]
-    reals: NDArray[np.float64]
+    ints: Ints
+    reals: Array
     lines: NDArray[np.int32]
 
 

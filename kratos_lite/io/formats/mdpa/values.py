@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.io.formats.cells import already
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, read_rows
@@ -16,6 +15,7 @@ from kratos_lite.io.formats.mdpa.scan import NAME, WORD, Frame, Source, Span
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.text import real, shown
 from kratos_lite.materials import MATERIALS
+from kratos_lite.typing import Array
 
 BRACKET = re.compile(rb"(?:\[([^\]()]*)\]\s*)?\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
 INNER = re.compile(rb"\(([^()]*)\)")
@@ -60,7 +60,7 @@ class Table:
 
     x: str
     y: str
-    rows: NDArray[np.float64]
+    rows: Array
     line: int = 0
 
 
@@ -142,7 +142,7 @@ def value_at(source: Source, at: int, end: int, kind: str | None) -> tuple[Any, 
     return _plain(word.group(), kind), word.end()
 
 
-def _array(match: re.Match[bytes]) -> NDArray[np.float64]:
+def _array(match: re.Match[bytes]) -> Array:
     """Return the vector or matrix of a match; its size must be as stated."""
     size, body = match.groups()
     rows = [_numbers(row) for row in INNER.findall(body)] if b"(" in body else None
