@@ -71,6 +71,17 @@ def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
         assert shares == pytest.approx([1 + 2 / n**2 for n in (1, 2, 4)], abs=1e-3)
 
 
+@pytest.mark.parametrize("page", ["bodies.md", "dynamics.md"])
+def test_command_lines_of_each_page_run(page, tmp_path):
+    pytest.importorskip("matplotlib")
+    text = (EXAMPLES.parent / "docs" / page).read_text().replace("\\\n", "")
+    lines = re.findall(r"^kratos-lite ([^#\n]*)", text, re.M)
+    assert len(lines) >= 3
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    for line in lines:
+        run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
+
+
 def test_elements_of_the_guide_conform(tmp_path):
     script = tmp_path / "guide.py"
     script.write_text("\n".join(python_blocks((EXAMPLES.parent / "docs" / "add-an-element.md").read_text())))
