@@ -152,7 +152,7 @@ class Driver:
 
     def stem(self, run: Run) -> Path:
         """Return the path of the scene without ending; it is written once, large ones by another process."""
-        if run.task == "march":  # a motion makes its bodies itself
+        if run.task == "motion":  # a motion makes its bodies itself
             return self.folder / run.scene
         if run.scene.endswith(".mdpa"):
             return Path(run.scene.removesuffix(".mdpa"))

@@ -18,13 +18,13 @@ MANY = 10_000
 
 @dataclass(frozen=True)
 class Motion:
-    """A body, or many, and how it marches.
+    """A body, or many, and how it moves.
 
     Attributes
     ----------
     what : in words.
     make : gives the body, or a list of bodies, from the library.
-    dt, steps, every : as `march` takes them.
+    dt, steps, every : as `integrate` takes them.
     bodies : number of bodies, by which the time is divided.
     solfec : seconds per step of Solfec-1.0, from and to.
     """
@@ -193,7 +193,7 @@ SLOW = 50
 
 
 def measured(kl: Any, name: str, share: int = 1) -> dict[str, float]:
-    """March a motion; return seconds per step and body, and the relative drift of energy and momentum."""
+    """Integrate a motion; return seconds per step and body, and the relative drift of energy and momentum."""
     motion = MOTIONS[name]
     body = motion.make(kl)
     steps = max(motion.every if share == 1 else 2, motion.steps // share)

@@ -144,7 +144,7 @@ def motion_runs(programs: Sequence[str]) -> list[Run]:
     """Return bodies in motion: seconds per step."""
     chosen = [p for p in FROM_FILES[:2] if p in programs]
     return [
-        Run("motion", program, name, "", 0, "march", (("motion", name),))
+        Run("motion", program, name, "", 0, "motion", (("motion", name),))
         for name in MOTIONS
         for program in chosen
     ]

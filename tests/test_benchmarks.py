@@ -214,7 +214,7 @@ def test_motions_keep_what_they_should(name):
 
 def test_motions_have_rows_beside_solfec():
     rows = [
-        {"group": "motion", "program": program, "scene": name, "kind": "", "n": 0, "task": "march"}
+        {"group": "motion", "program": program, "scene": name, "kind": "", "n": 0, "task": "motion"}
         | {"phases": {"step": 2e-6}, "process": 1.0, "drift": {"energy": 1e-9, "momentum": float("nan")}}
         for name in ("rigid", "many_rigid")
         for program in ("kratos_lite", "kratos_lite NumPy")

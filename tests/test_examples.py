@@ -168,7 +168,7 @@ def test_the_pendulum_is_back_after_its_period(tmp_path):
     assert abs(number(r"energy drift +(\S+)", out)) < 1e-12
 
 
-def test_a_scene_in_python_is_marched(tmp_path):
+def test_a_scene_in_python_is_integrated(tmp_path):
     solve = (sys.executable, "-m", "kratos_lite", "solve", BODIES / "thrown_box.py", "-o", "out/box.csv")
     out = run(*solve, cwd=tmp_path)
     rows = [

@@ -20,7 +20,7 @@ def work(job: Job) -> Array | None:
             import pyamg  # noqa: F401
             import scipy.sparse.linalg  # noqa: F401
     job.answer["version"] = kl.__version__
-    if job.task == "march":
+    if job.task == "motion":
         from benchmarks.motion import SLOW, measured
         from kratos_lite.native import kernels
 

@@ -176,7 +176,7 @@ def contact(wheels, mesh, turned=0.0):
 
 
 def lagrangian(model, angle, rate, acceleration, load, h, steps):
-    """March the same body in axes that turn with it, M w'' + 2 rate M A w' + … by the trapezoidal rule.
+    """Move the same body in axes that turn with it, M w'' + 2 rate M A w' + … by the trapezoidal rule.
 
     Returns w (n, 3): the displacement in those axes of the material that starts at each node.
     """
@@ -286,7 +286,7 @@ STEP = 2.0**-12
 
 
 def graded(wheels, **options):
-    """Return a wheel at 80 rad/s in march, whose mesh is no mirror image of itself."""
+    """Return a wheel at 80 rad/s in motion, whose mesh is no mirror image of itself."""
     model = wheels.disk("8N", 2, 32)
     points = model.mesh.points.copy()
     r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
@@ -302,17 +302,17 @@ def graded(wheels, **options):
 
 
 def test_energy_is_constant_on_a_graded_mesh(wheels):
-    march = graded(wheels)
-    start = march.energy()
-    energies = [march.energy() for _ in kl.integrate(march, STEP, 20_000, every=1000)]
+    transient = graded(wheels)
+    start = transient.energy()
+    energies = [transient.energy() for _ in kl.integrate(transient, STEP, 20_000, every=1000)]
     assert np.abs(np.array(energies) / start - 1).max() < 1e-12
 
 
 def test_energy_grows_without_the_skew_form(wheels):
-    march = graded(wheels, skew=False)
-    start = march.energy()
-    *_, _ = kl.integrate(march, STEP, 6000, every=6000)
-    assert march.energy() > 1.05 * start
+    transient = graded(wheels, skew=False)
+    start = transient.energy()
+    *_, _ = kl.integrate(transient, STEP, 6000, every=6000)
+    assert transient.energy() > 1.05 * start
 
 
 def test_free_rotor_grows_unless_stiffened(wheels):
@@ -324,8 +324,8 @@ def test_free_rotor_grows_unless_stiffened(wheels):
         e = EquationsOfMotion(model)
         model.add(kl.NodalForces(-e.system.scatter(e.inertia_load(0.0))))
         start = 1e-6 * model.mesh.points @ A.T
-        march = model.transient(displacement=start)
-        ends[stiffening] = [np.abs(m.u).max() for m in kl.integrate(march, 1e-3, 600, every=100)]
+        transient = model.transient(displacement=start)
+        ends[stiffening] = [np.abs(m.u).max() for m in kl.integrate(transient, 1e-3, 600, every=100)]
     growth = np.log(ends[False][-1] / ends[False][-2]) / 0.1
     assert growth == pytest.approx(29.5, rel=0.03)
     assert max(ends[True]) < 5e-6
@@ -383,9 +383,9 @@ def test_pulse_through_absorbing_ends(element, n, steps, spin, tolerances, wheel
     model.add(Translation("x", rate=rate, acceleration=spin, boundaries="absorbing"))
     u, v = np.zeros_like(model.mesh.points), np.zeros_like(model.mesh.points)
     u[:, 0], v[:, 0] = pulse(x), -start * x / 0.64 * pulse(x)
-    march = model.transient(displacement=u, velocity=v)
+    transient = model.transient(displacement=u, velocity=v)
     wanted = iter(tolerances)
-    for moment in kl.integrate(march, 0.16 / steps, steps, every=steps // 4):
+    for moment in kl.integrate(transient, 0.16 / steps, steps, every=steps // 4):
         z = start * moment.time + spin * moment.time**2 / 2
         exact = (pulse(x + z - c * moment.time) + pulse(x + z + c * moment.time)) / 2
         if round(moment.time, 6) != 0.12:

@@ -42,8 +42,8 @@ def shape(model: kl.Model) -> np.ndarray:
     return out
 
 
-def last(march, dt: float, steps: int) -> State:
-    *_, moment = kl.integrate(march, dt, steps, every=steps)
+def last(transient, dt: float, steps: int) -> State:
+    *_, moment = kl.integrate(transient, dt, steps, every=steps)
     return moment
 
 
@@ -57,8 +57,8 @@ def test_order_two(name):
     omega, mode = wave(4, lumped=name == "central"), shape(bar())
     errors = []
     for steps in (64, 128, 256):
-        march = model.transient(integrator=integrator, displacement=mode, velocity=0.5 * omega * mode)
-        end = last(march, 1.3 / omega / steps * 4, steps)
+        transient = model.transient(integrator=integrator, displacement=mode, velocity=0.5 * omega * mode)
+        end = last(transient, 1.3 / omega / steps * 4, steps)
         t = omega * end.time
         u = (np.cos(t) + 0.5 * np.sin(t)) * mode
         v = omega * (-np.sin(t) + 0.5 * np.cos(t)) * mode
@@ -73,8 +73,8 @@ def test_trapezoidal_rule_step_by_step(share):
     """A mode is turned by 2 atan(ωh/2) each step, at any step, without loss."""
     model, omega = bar(), wave(4, lumped=False)
     mode = shape(model)
-    march = model.transient(displacement=mode)
-    for k, moment in enumerate(kl.integrate(march, share / omega, 10), start=1):
+    transient = model.transient(displacement=mode)
+    for k, moment in enumerate(kl.integrate(transient, share / omega, 10), start=1):
         turned = np.cos(2 * k * np.arctan(share / 2))
         np.testing.assert_allclose(moment.u, turned * mode, atol=1e-12)
 
@@ -85,12 +85,12 @@ def amplification(integrator, omega: float, h: float) -> np.ndarray:
     mode = shape(model)
     columns = []
     for start in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):
-        march = model.transient(integrator=integrator)
-        march.u, march.v, march.a = (
-            march.equations.system.gather(x * s).copy()
+        transient = model.transient(integrator=integrator)
+        transient.u, transient.v, transient.a = (
+            transient.equations.system.gather(x * s).copy()
             for x, s in zip((mode, mode * omega, mode * omega**2), start, strict=True)
         )
-        end = last(march, h, 1)
+        end = last(transient, h, 1)
         top = np.argmax(mode[:, 2])
         columns.append([end.u[top, 2], end.v[top, 2] / omega, end.a[top, 2] / omega**2])
     return np.abs(np.linalg.eigvals(np.array(columns).T)).max()
@@ -119,9 +119,9 @@ def test_central_difference_turns_by_its_own_angle():
     """cos(θ) = 1 - (ωh)²/2 each step."""
     model, omega = bar(), wave(4, lumped=True)
     mode, h = shape(bar()), 0.2 / wave(4, lumped=True)
-    march = model.transient(integrator=CentralDifference(), displacement=mode)
+    transient = model.transient(integrator=CentralDifference(), displacement=mode)
     theta = np.arccos(1 - (omega * h) ** 2 / 2)
-    for k, moment in enumerate(kl.integrate(march, h, 20), start=1):
+    for k, moment in enumerate(kl.integrate(transient, h, 20), start=1):
         np.testing.assert_allclose(moment.u, np.cos(k * theta) * mode, atol=1e-12)
 
 
@@ -129,9 +129,9 @@ def test_critical_step():
     model = kl.Model(kl.box((1, 1, 1), (2, 2, 2)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
     model.fix("z-")
     omega = model.modes(54, lumped=True)[0].max()
-    march = model.transient(integrator=CentralDifference())
+    transient = model.transient(integrator=CentralDifference())
     with pytest.raises(InputError, match=r"not stable with steps of .* critical step is [\d.e-]+ s"):
-        kl.integrate(march, 2 / omega * 1.3, 10)
+        kl.integrate(transient, 2 / omega * 1.3, 10)
     v = np.random.default_rng(0).standard_normal(model.mesh.points.shape)
     safe = model.transient(integrator=CentralDifference(), velocity=v)
     assert np.abs(last(safe, 0.5 / omega, 2000).u).max() < 1.0
@@ -144,9 +144,9 @@ def test_energy_of_the_trapezoidal_rule():
     model = kl.Model(kl.box((1, 1, 2), (2, 2, 4)), kl.Isotropic3D(E=E, nu=0.3, density=RHO))
     model.fix("z-")
     x, y, z = model.mesh.points.T
-    march = model.transient(velocity=np.column_stack([z * z, x * z, y * z]))
-    start = march.energy()
-    energies = [march.energy() for _ in kl.integrate(march, 2.0**-9, 1000, every=100)]
+    transient = model.transient(velocity=np.column_stack([z * z, x * z, y * z]))
+    start = transient.energy()
+    energies = [transient.energy() for _ in kl.integrate(transient, 2.0**-9, 1000, every=100)]
     assert np.abs(np.array(energies) / start - 1).max() < 1e-12
 
 
@@ -158,12 +158,12 @@ def test_rayleigh_damping(alpha, beta, name):
     omega, mode = wave(4, lumped=name == "central"), shape(model)
     xi = alpha / (2 * omega) + beta * omega / 2
     damped = omega * np.sqrt(1 - xi * xi)
-    march = model.transient(
+    transient = model.transient(
         integrator=INTEGRATORS[name], displacement=mode, velocity=-xi * omega * mode, rayleigh=(alpha, beta)
     )
     period = 2 * np.pi / damped
     n = 400 if name == "trapezoidal" else 2000
-    end = last(march, 2 * period / n, n)
+    end = last(transient, 2 * period / n, n)
     exact = np.exp(-xi * omega * 2 * period)
     np.testing.assert_allclose(
         end.u, exact * mode, atol=2e-3 * exact if name == "trapezoidal" else 1e-2 * exact
@@ -293,7 +293,7 @@ def test_first_acceleration():
     assert np.abs(residual[~held]).max() < 1e-9
 
 
-# ---- marches that go on --------------------------------------------------------------------------------
+# ---- transients that go on --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
@@ -370,7 +370,7 @@ def test_wrong_options(options, text):
         ({"dt": "1 ms", "steps": 2}, "a step must be made of real numbers; got '1 ms'"),
     ],
 )
-def test_wrong_marches(options, text):
+def test_wrong_arguments_of_integrate(options, text):
     with pytest.raises(InputError, match=text):
         kl.integrate(bar().transient(), **options)
 

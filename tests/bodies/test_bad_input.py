@@ -377,7 +377,7 @@ def test_constraints_that_contradict_each_other(kind, refused):
     refused(body, lambda body: list(kl.integrate(body, 1e-3, 2)), kl.SolveError, "they contradict each other")
 
 
-# ---- march -----------------------------------------------------------------------------------------
+# ---- integrate -----------------------------------------------------------------------------------------
 
 
 @each_kind
@@ -399,7 +399,7 @@ def test_constraints_that_contradict_each_other(kind, refused):
         ({"substeps": 2.5}, "substeps must be a whole number ≥ 1, or 'auto'"),
     ],
 )
-def test_marches_that_are_refused(kind, arguments, words, refused):
+def test_arguments_of_integrate_that_are_refused(kind, arguments, words, refused):
     arguments = {"dt": 1e-3, "steps": 3, **arguments}
     refused(body_of(kind), lambda body: kl.integrate(body, **arguments), kl.InputError, words)
 

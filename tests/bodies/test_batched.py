@@ -54,7 +54,7 @@ def test_each_moves_as_if_it_were_alone(kind, integrator, damping):
 
 
 @each
-def test_they_march_again_together_or_alone(kind, integrator):
+def test_they_advance_again_together_or_alone(kind, integrator):
     bodies, alone = herd(kind, integrator), herd(kind, integrator)
     for _ in kl.integrate(bodies, 2e-3, 5):
         pass

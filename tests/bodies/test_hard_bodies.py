@@ -18,7 +18,7 @@ RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 each_kind = pytest.mark.parametrize("kind", KINDS)
 
 
-def march(body, dt, steps, **options):
+def advance(body, dt, steps, **options):
     """Return the last state."""
     *_, last = kl.integrate(body, dt, steps, every=steps, **options)
     return last
@@ -33,7 +33,7 @@ def test_automatic_steps_are_stable_with_damping(kind, options, damping):
     body = kind(kl.box(), RUBBER, integrator="DEF_EXP", damping=damping, **options)
     body.u += 1e-3 * np.random.default_rng(0).normal(size=body.u.shape)
     start = body.energy()
-    march(body, 0.1, 10, substeps="auto")
+    advance(body, 0.1, 10, substeps="auto")
     assert body.energy() < start
 
 
@@ -62,9 +62,9 @@ def test_the_critical_step_with_damping_is_sharp():
 @pytest.mark.parametrize("kind", KINDS[:2])
 def test_bodies_that_advanced_together_have_clocks_of_their_own(kind):
     one, two = (kind(kl.box(), RUBBER) for _ in range(2))
-    march([one, two], 0.1, 3)
+    advance([one, two], 0.1, 3)
     assert (one.step, two.step) == (3, 3)
-    march(one, 0.1, 2)
+    advance(one, 0.1, 2)
     assert (one.step, two.step) == (5, 3)
     assert two.time == pytest.approx(0.3)
     kl.State.of(one).restore(two)
@@ -74,8 +74,8 @@ def test_bodies_that_advanced_together_have_clocks_of_their_own(kind):
 
 def test_part_of_a_group_may_go_on():
     bodies = [kl.RigidBody(kl.box(), RUBBER) for _ in range(3)]
-    march(bodies, 0.1, 3)
-    march(bodies[:2], 0.1, 2)
+    advance(bodies, 0.1, 3)
+    advance(bodies[:2], 0.1, 2)
     assert [body.step for body in bodies] == [5, 5, 3]
 
 
@@ -102,7 +102,7 @@ def test_a_damper_is_of_second_order(kind, integrator):
         d = float(body.mass)
         body.set_velocity((1, 0, 0))
         body.add(kl.Spring(body.center, (-9, 0.1, 0.1), stiffness=0, damping=d))
-        march(body, 1 / steps, steps)
+        advance(body, 1 / steps, steps)
         errors.append(abs(body.mass_center()[0] - 0.1 - (1 - np.exp(-1))))
     assert errors[1] < 1e-6
     assert errors[0] / errors[1] == pytest.approx(4, abs=0.2)
@@ -148,7 +148,7 @@ def test_a_callback_that_returns_no_numbers_is_told(value):
     body = kl.RigidBody(kl.box(), RUBBER)
     body.add(kl.Callback(lambda q, u, t: value))
     with pytest.raises(InputError, match=r"what a callback returns at t = 0\.05 s must be"):
-        march(body, 0.1, 1)
+        advance(body, 0.1, 1)
 
 
 @pytest.mark.parametrize("modes", [6.5, "many", True])
@@ -174,7 +174,7 @@ def test_each_of_many_bodies_may_have_its_own_force_and_torque():
     force = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
     many.add(kl.Force((0, 0, 0), force))
     many.add(kl.Torque(force))
-    march(many, 0.5, 2)
+    advance(many, 0.5, 2)
     np.testing.assert_allclose(many.linear_momentum(), force, atol=1e-14)
     np.testing.assert_allclose(many.angular_momentum(), force, atol=1e-14)
 

@@ -103,7 +103,7 @@ def test_states_come_after_every_so_many_steps_and_at_the_end(brick):
     assert [state.step for state in more] == [8, 9]
 
 
-def test_a_march_ends_where_it_is_told_to(brick):
+def test_an_integration_ends_where_it_is_told_to(brick):
     body = brick(kl.RigidBody)
     body.set_velocity((1, 0, 0))
     states = list(kl.integrate(body, 0.1, 100, until=lambda state: state.q[9] > 0.45))
@@ -111,7 +111,7 @@ def test_a_march_ends_where_it_is_told_to(brick):
     assert body.time == states[-1].time
 
 
-def test_a_march_that_is_left_has_moved_the_body_so_far(brick):
+def test_an_integration_that_is_left_has_moved_the_body_so_far(brick):
     body = brick(kl.RigidBody)
     body.set_velocity((1, 0, 0))
     for state in kl.integrate(body, 0.1, 100):

@@ -1,4 +1,4 @@
-"""How a march starts where constraints are."""
+"""How time integration starts where constraints are."""
 
 import logging
 

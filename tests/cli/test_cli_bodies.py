@@ -68,7 +68,7 @@ def test_with_damping_the_loss_is_no_drift(run, folder):
     assert "energy drift" not in rows
 
 
-def test_missing_folders_are_made_by_a_march_alone(run, folder):
+def test_missing_folders_are_made_by_a_run_alone(run, folder):
     words = ("box.json", "-o", "a/b/o.csv", "--state", "c/end.npz", "-q")
     write(output={"csv": "x/o.csv"})
     assert run("check", "box.json").code == 0
@@ -134,7 +134,7 @@ def test_an_explicit_step_that_is_too_long_is_refused_before_any_output(run, fol
     assert run("solve", "box.json", "-q").code == 0
 
 
-def test_what_exists_is_kept_when_a_march_fails(run, folder):
+def test_what_exists_is_kept_when_a_run_fails(run, folder):
     with open("fails.py", "w") as file:
         file.write(
             "import numpy as np\nimport kratos_lite as kl\n"
@@ -236,7 +236,7 @@ def test_many_bodies_of_a_script(run, folder):
     assert run("solve", "many.py", "-o", "a.csv").refuses("a.csv: only a single body")
 
 
-def test_bad_targets_are_refused_before_the_march(run, folder):
+def test_bad_targets_are_refused_before_the_run(run, folder):
     write(time={"step": 1e-9, "steps": 10**9})
     assert run("solve", "box.json", "-o", "box.json/o.pvd").refuses("the folder box.json does not exist")
     assert run("solve", "box.json", "-o", "none/o.txt").refuses("none/o.txt: states in time are written")

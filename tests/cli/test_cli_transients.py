@@ -1,4 +1,4 @@
-"""Marches of models from run files and options: bit by bit those of Python, and what goes wrong."""
+"""Transients of models from run files and options: bit by bit those of Python, and what goes wrong."""
 
 import json
 import os
@@ -50,7 +50,7 @@ def tower(load=None):
     return model
 
 
-def marched(model, **options):
+def integrated(model, **options):
     transient = model.transient(**options)
     return [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
 
@@ -77,8 +77,8 @@ def assert_same(path, moments):
         ("generalized_alpha:0.5", {"generalized_alpha": 0.5}, kl.GeneralizedAlpha(0.5)),
     ],
 )
-def test_words_file_and_python_march_alike(run, folder, word, value, integrator):
-    expected = marched(tower(), integrator=integrator, rayleigh=(0.5, 1e-5), lumped=True)
+def test_words_file_and_python_agree(run, folder, word, value, integrator):
+    expected = integrated(tower(), integrator=integrator, rayleigh=(0.5, 1e-5), lumped=True)
     options = ("--integrator", word, "--rayleigh", "0.5,1e-5", "--lumped")
     done = run("solve", "tower.mdpa", *WORDS, "--time", "1e-3:20:5", *options, "-o", "words.npz")
     assert (done.code, done.err) == (0, "")
@@ -166,7 +166,7 @@ def test_the_case_gives_the_transient(folder):
     case = read_case("run.json")
     assert str(case.time) == "20 steps of 0.001 s by hht(-0.05)"
     *_, end = prepare(case)[1]
-    assert np.array_equal(end.u, marched(tower(), integrator=kl.HHT())[-1].u)
+    assert np.array_equal(end.u, integrated(tower(), integrator=kl.HHT())[-1].u)
     write(time=None)
     with pytest.raises(kl.ModelError, match="not in time; give its file a section 'time'"):
         prepare(read_case("run.json"))
@@ -202,7 +202,7 @@ def test_a_summary_with_the_numbers(run, folder):
     assert run("solve", "run.json", "-q").out == ""
 
 
-def test_a_still_march_is_told(run, folder):
+def test_a_still_run_is_told(run, folder):
     write(traction=None)
     assert "nothing moves" in run("solve", "run.json").rows["warning"]
 
@@ -221,7 +221,7 @@ def test_frames_table_and_picture(run, folder):
     assert [float(line.split(",")[0]) for line in lines[1:]] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
 
 
-def test_info_and_check_know_the_march(run, folder):
+def test_info_and_check_know_the_steps(run, folder):
     write(time={**TIME, "integrator": "bossak"})
     assert "time        20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out
     done = run("check", "run.json")
@@ -368,7 +368,7 @@ def test_wrong_options_are_explained(run, folder, words, fragments):
     assert [path.name for path in folder.iterdir()] == ["tower.mdpa"]
 
 
-def test_modes_of_a_file_that_marches_are_those_of_its_model(run, folder):
+def test_modes_of_a_file_in_time_are_those_of_its_model(run, folder):
     write()
     told = run("solve", "run.json", "--modes", "2")
     omega, _ = tower().modes(2)

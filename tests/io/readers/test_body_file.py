@@ -37,8 +37,8 @@ def written(folder, **changes):
     return path
 
 
-def last(march):
-    *_, state = march
+def last(states):
+    *_, state = states
     return state
 
 
@@ -58,7 +58,7 @@ def test_one_word_is_the_kind(scene, word, kind):
     np.testing.assert_allclose(found.body.velocity([0.4, 0.3, 0.5]) - [1, 2, 3], [0.0, 0.2, 0.0], atol=1e-12)
 
 
-def test_a_march_is_that_of_python(scene):
+def test_a_run_is_that_of_python(scene):
     found = scene(
         body={
             "kind": "finite-element",
