@@ -27,6 +27,10 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`, or its word such as ``"rigid"``.
     options : further arguments of the kind, such as ``formulation="corotational"``.
 
+    Returns
+    -------
+    A new body.
+
     Raises
     ------
     InputError, ModelError

@@ -132,7 +132,13 @@ class FiniteElementBody(Deformable):
         return np.asarray(self._in_mesh(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
 
     def set_configuration(self, q: ArrayLike) -> None:
-        """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`."""
+        """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`.
+
+        Raises
+        ------
+        InputError
+            It has another shape, is not finite, or inverts an element.
+        """
         q = finite(q, "a configuration")
         if q.shape not in ((self.dofs,), self.points.shape):
             raise InputError(f"a configuration of this body has shape ({self.dofs},); got {q.shape}")
@@ -243,9 +249,16 @@ class FiniteElementBody(Deformable):
         return self.formulation.load(self.q if q is None else q)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load over an increment dq, whose work is the change of strain energy.
+        """Return the load over an increment, whose work is the change of strain energy.
 
-        `damping` is the ratio η/h, which adds the viscous stress.
+        Parameters
+        ----------
+        q, dq : (3n,) configuration and increment in m.
+        damping : the ratio η/h, which adds the viscous stress.
+
+        Returns
+        -------
+        (3n,) in N.
         """
         return self.formulation.load_over(q, dq, damping)
 
@@ -258,7 +271,16 @@ class FiniteElementBody(Deformable):
         return self.formulation.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u, the viscous load for η = 1."""
+        """Return K(q) u, the viscous load for η = 1.
+
+        Parameters
+        ----------
+        q, u : (3n,) configuration in m and velocity in m/s.
+
+        Returns
+        -------
+        (3n,) in N/s.
+        """
         return self.formulation.damping_load(q, u)
 
     def mass_solver(self) -> Solve:
@@ -270,7 +292,18 @@ class FiniteElementBody(Deformable):
         return self.formulation.solver(q, c)
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
+        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq.
+
+        Parameters
+        ----------
+        q, dq : (3n,) configuration and increment in m.
+        damping : the ratio η/h.
+        c : s².
+
+        Returns
+        -------
+        A function of b.
+        """
         return self.formulation.increment_solver(q, dq, damping, c)
 
     def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
@@ -287,6 +320,10 @@ class FiniteElementBody(Deformable):
 
     def modes(self, count: int = 12) -> tuple[Array, Array]:
         """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
+
+        Parameters
+        ----------
+        count : number of frequencies.
 
         Returns
         -------
