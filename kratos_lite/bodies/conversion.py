@@ -27,10 +27,16 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     kind : `RigidBody`, `PseudoRigidBody` or `FiniteElementBody`, or its word such as ``"rigid"``.
     options : further arguments of the kind, such as ``formulation="corotational"``.
 
+    Returns
+    -------
+    a body of that kind, at the same time.
+
     Raises
     ------
-    InputError, ModelError
-        The kind is unknown, or the body has no mesh.
+    InputError
+        The kind is unknown, or none that a body becomes.
+    ModelError
+        The body is an obstacle, or many, or has no mesh or material.
 
     Examples
     --------

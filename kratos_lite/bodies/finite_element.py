@@ -50,11 +50,12 @@ class FiniteElementBody(Deformable):
     scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``total_lagrangian`` and ``DEF_LIM`` for the others
         if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        If the mesh is inverted, nodes belong to no element, or there is no mass.
+        The mesh is inverted, nodes belong to no element, or there is no mass.
 
     Examples
     --------
@@ -132,7 +133,13 @@ class FiniteElementBody(Deformable):
         return np.asarray(self._in_mesh(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
 
     def set_configuration(self, q: ArrayLike) -> None:
-        """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`."""
+        """Set the displacements (3n,) or (n, 3) in m; see `Body.set_configuration`.
+
+        Raises
+        ------
+        InputError
+            The shape is wrong, or an element is inverted.
+        """
         q = finite(q, "a configuration")
         if q.shape not in ((self.dofs,), self.points.shape):
             raise InputError(f"a configuration of this body has shape ({self.dofs},); got {q.shape}")
@@ -243,9 +250,16 @@ class FiniteElementBody(Deformable):
         return self.formulation.load(self.q if q is None else q)
 
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
-        """Return the load over an increment dq, whose work is the change of strain energy.
+        """Return the load over an increment, whose work is the change of strain energy.
 
-        `damping` is the ratio η/h, which adds the viscous stress.
+        Parameters
+        ----------
+        q, dq : (3n,) m, displacements at its start and increment.
+        damping : η/h, which adds the viscous stress.
+
+        Returns
+        -------
+        (3n,) float, N.
         """
         return self.formulation.load_over(q, dq, damping)
 
@@ -258,7 +272,16 @@ class FiniteElementBody(Deformable):
         return self.formulation.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u, the viscous load for η = 1."""
+        """Return K(q) u, the viscous load for η = 1 s.
+
+        Parameters
+        ----------
+        q, u : (3n,), displacements in m and velocities in m/s.
+
+        Returns
+        -------
+        (3n,) float, N/s.
+        """
         return self.formulation.damping_load(q, u)
 
     def mass_solver(self) -> Solve:
@@ -270,7 +293,17 @@ class FiniteElementBody(Deformable):
         return self.formulation.solver(q, c)
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
-        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq."""
+        """Return what solves (M + c D) x = b, D the derivative of `load_over` with respect to dq.
+
+        Parameters
+        ----------
+        q, dq, damping : see `load_over`.
+        c : s².
+
+        Returns
+        -------
+        function of columns b (3n, k) or (3n,) that returns x.
+        """
         return self.formulation.increment_solver(q, dq, damping, c)
 
     def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
@@ -288,10 +321,15 @@ class FiniteElementBody(Deformable):
     def modes(self, count: int = 12) -> tuple[Array, Array]:
         """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
 
+        A body that nothing holds has its six rigid motions first.
+
+        Parameters
+        ----------
+        count : number of modes.
+
         Returns
         -------
-        frequencies (count,) in rad/s, ascending; shapes (3n, count) with φ^T M φ = 1.  A body that nothing
-        holds has its six rigid motions first.
+        frequencies (count,) in rad/s, ascending, and shapes (3n, count) with φ^T M φ = 1.
         """
         K, M = self.formulation.K0.scipy().tocsr(), self._mass.matrix()
         held = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]

@@ -40,11 +40,12 @@ class PseudoRigidBody(AffineBody, Deformable):
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        If the mesh is inverted, there is no mass, or no body has such an Euler tensor.
+        The mesh is inverted, there is no mass, or no body has such an Euler tensor.
 
     Examples
     --------
@@ -176,7 +177,12 @@ class PseudoRigidBody(AffineBody, Deformable):
         return np.asarray(V * (stress + np.swapaxes(B, -1, -2) @ self.C @ B))
 
     def mass_matrix(self) -> Array:
-        """Return the mass of Ḟ, diag(E0, E0, E0) (..., 9, 9) in kg m²."""
+        """Return the mass of Ḟ, diag(E0, E0, E0).
+
+        Returns
+        -------
+        (..., 9, 9) float, kg m².
+        """
         return by_rows(self.mass_properties.euler)
 
     def solver(self, q: Array, c: float) -> Solve:
@@ -189,7 +195,13 @@ class PseudoRigidBody(AffineBody, Deformable):
         return self.solver(self.q, 0.0)
 
     def step_free(self, h: float, count: int) -> None:
-        """Take steps of h s under constant loads alone, all at once."""
+        """Take steps under constant loads alone, all at once.
+
+        Parameters
+        ----------
+        h : length of a step in s.
+        count : number of steps.
+        """
         acceleration, spatial, _ = self.constant_loads()
         constant = (*self.step_constants(), acceleration, spatial)
         steps.pseudo_steps(
@@ -197,12 +209,22 @@ class PseudoRigidBody(AffineBody, Deformable):
         )
 
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
-        """Return Euler tensor, mass, volume, C and damping, as `steps` take them."""
+        """Return what a step needs of the body.
+
+        Returns
+        -------
+        Euler tensor (..., 3, 3), mass (...), volume (...), C (6, 6) and damping.
+        """
         c = self.mass_properties
         return c.euler, c.mass, c.volume, self.C, self.damping
 
     def frequencies(self) -> Array:
-        """Return the angular frequencies (..., 9) at the configuration in rad/s, ascending; 0 if ω² < 0."""
+        """Return the angular frequencies at the configuration, ascending; 0 if ω² < 0.
+
+        Returns
+        -------
+        (..., 9) float, rad/s.
+        """
         L = np.linalg.inv(np.linalg.cholesky(self.mass_matrix()))
         K = self.stiffness()
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))

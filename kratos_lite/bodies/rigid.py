@@ -38,11 +38,12 @@ class RigidBody(AffineBody):
         many bodies at once.
     scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
         ``RIG_IMP`` (momentum exact, symmetric in time).
+    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        If the mesh is inverted or has no volume, or there is no mass.
+        The mesh is inverted or has no volume, or there is no mass.
 
     Examples
     --------
@@ -155,14 +156,25 @@ class RigidBody(AffineBody):
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
     def step_free(self, h: float, count: int) -> None:
-        """Take steps of h s under constant loads alone, all at once."""
+        """Take steps under constant loads alone, all at once.
+
+        Parameters
+        ----------
+        h : length of a step in s.
+        count : number of steps.
+        """
         constant = (*self.step_constants(), *self.constant_loads())
         steps.rigid_steps(
             self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
         )
 
     def step_constants(self) -> tuple[Array, Array, Array]:
-        """Return inertia, its inverse and mass, as `steps` take them."""
+        """Return what a step needs of the body.
+
+        Returns
+        -------
+        inertia (..., 3, 3), its inverse and mass (...).
+        """
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Solve:
@@ -170,7 +182,16 @@ class RigidBody(AffineBody):
         return self.apart
 
     def apart(self, b: Array) -> Array:
-        """Return M^-1 b of columns (6, k): torques and forces answer apart."""
+        """Return M^-1 b: torques and forces answer apart.
+
+        Parameters
+        ----------
+        b : (6,) or columns (6, k).
+
+        Returns
+        -------
+        float, shaped as b.
+        """
         return np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
 
     @cached_property
@@ -186,6 +207,11 @@ class Obstacle(RigidBody):
     """A body that nothing pushes: it stands, or moves as `set_velocity` says.
 
     Its vectors are those of a rigid body; it carries neither mass nor energy, and takes no loads.
+
+    Parameters
+    ----------
+    mesh : the shape.
+    material : only kept.
 
     Examples
     --------
@@ -220,11 +246,23 @@ class Obstacle(RigidBody):
         return np.zeros_like(v)
 
     def add(self, load: object, *, amplitude: object = None) -> None:
-        """Raise ModelError: nothing pushes an obstacle."""
+        """Refuse the load.
+
+        Raises
+        ------
+        ModelError
+            Always: nothing pushes an obstacle.
+        """
         raise ModelError(
             "nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody"
         )
 
     def constrain(self, constraint: object) -> None:
-        """Raise ModelError: an obstacle needs no support."""
+        """Refuse the constraint.
+
+        Raises
+        ------
+        ModelError
+            Always: an obstacle needs no support.
+        """
         raise ModelError("an obstacle needs no constraint: it stands, or moves as set_velocity says")

@@ -23,6 +23,11 @@ class Callback(BodyLoad):
     of_velocity : whether it depends on u; then each step is taken twice, with the old velocity and with the
         mean of old and new.
 
+    Raises
+    ------
+    InputError
+        It is no function.
+
     Examples
     --------
     >>> import numpy as np

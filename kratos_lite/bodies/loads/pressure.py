@@ -25,6 +25,11 @@ class FollowerPressure(BodyLoad):
     ----------
     where : part; its conditions if it has any, otherwise the boundary faces among its nodes.
     pressure : Pa.
+
+    Raises
+    ------
+    InputError
+        The pressure is not one number.
     """
 
     def __init__(self, where: Where, pressure: float) -> None:
@@ -34,7 +39,13 @@ class FollowerPressure(BodyLoad):
         self.where, self.pressure = where, float(value)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
-        """Return the load on a body; ModelError if there are no such faces."""
+        """Return the load on a body; see `BodyLoad.bind`.
+
+        Raises
+        ------
+        ModelError
+            The body has no mesh, or there are no such faces.
+        """
         mesh = body.mesh
         if mesh is None:
             raise ModelError("a pressure acts on the faces of a mesh; this body has none")
@@ -51,7 +62,7 @@ class FollowerPressure(BodyLoad):
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
-                raise ModelError("a following pressure acts on single bodies; march them one by one")
+                raise ModelError("a following pressure acts on single bodies; advance them one by one")
             return body.generalized_nodal_force(nodal(body.position(mesh.points, q)), q)
 
         return AppliedLoad(generalized)
