@@ -206,8 +206,8 @@ class Result:
 
         Parameters
         ----------
-        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for extrapolated and
-            averaged values.
+        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for
+            extrapolated and averaged values.
 
         Returns
         -------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -13,14 +14,15 @@ from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
+from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
 from kratos_lite.validation import whole_number
 
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
 OF_MODELS = (
     *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
-    *("rotation", "translation", "damping", "integrator", "rayleigh", "lumped"),
+    *("rotation", "translation", "center", "stiffening", "boundaries", "damping"),
+    *("integrator", "rayleigh", "lumped"),
 )
 """Options that bodies do not have."""
 
@@ -147,6 +149,13 @@ def vector(text: str, option: str) -> list[float]:
     return [number(word, option) for word in words]
 
 
+LOADS: dict[str, tuple[Callable[[str, Any], Load], Callable[[str, str], Any], str]] = {
+    "traction": (Traction, vector, "PART:X,Y,Z"),
+    "pressure": (Pressure, number, "PART:P"),
+    "point_load": (PointLoad, vector, "PART:X,Y,Z"),
+}
+
+
 def split_part(text: str, option: str, example: str) -> tuple[str, str]:
     """Split ``PART:rest`` at the last colon."""
     part, colon, rest = text.rpartition(":")
@@ -251,14 +260,10 @@ def apply(model: Model, options: Namespace, materials: list[tuple[str | None, Li
         model.notes.append("--gravity is added to the gravity of the file")
     for text in options.gravity:
         model.add(Gravity(vector(text, "--gravity")))
-    for text in options.traction:
-        part, rest = split_part(text, "--traction", "PART:X,Y,Z")
-        model.add(Traction(part, vector(rest, "--traction")))
-    for text in options.pressure:
-        part, rest = split_part(text, "--pressure", "PART:P")
-        model.add(Pressure(part, number(rest, "--pressure")))
-    for text in options.point_load:
-        part, rest = split_part(text, "--point-load", "PART:X,Y,Z")
-        model.add(PointLoad(part, vector(rest, "--point-load")))
+    for name, (load, read, example) in LOADS.items():
+        option = f"--{name.replace('_', '-')}"
+        for text in getattr(options, name):
+            part, rest = split_part(text, option, example)
+            model.add(load(part, read(rest, option)))
     if (given_motion := motion(model, options)) is not None:
         model.add(given_motion)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kratos_lite.errors import ModelError
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import flag, positive_step, whole_number
 
@@ -135,7 +136,7 @@ class Case:
     @property
     def is_of_model(self) -> bool:
         """Whether the subject is a model, not a body."""
-        return hasattr(self.subject, "supports")
+        return isinstance(self.subject, Structure)
 
     @property
     def model(self) -> Model:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +13,7 @@ import numpy as np
 from kratos_lite.io.document import Note
 from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
 from kratos_lite.io.formats.elem.files import ElemFiles
-from kratos_lite.io.formats.elem.grammar import Run
+from kratos_lite.io.formats.elem.grammar import Run, Source
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
@@ -23,20 +23,11 @@ Numbers = TypeVar("Numbers", Ints, Array)
 NO_NODES = np.zeros((0, 0), dtype=np.int32)
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Elements or conditions: what to call one, its file, and how to know its shape."""
-
-    word: str
-    ending: str
-    shape_of: Callable[[str], type[Shape] | None]
-
-
 def read_mesh(files: ElemFiles) -> Mesh:
     """Return the mesh of the set; problems and notes go to `files`."""
     mesh = _nodes(files)
-    mesh.blocks = _cells(files, mesh, Kind("element", ".elem", element_shape))
-    mesh.conditions = _cells(files, mesh, Kind("condition", ".cond", condition_shape))
+    mesh.blocks = _cells(files, mesh, "element", ".elem", element_shape)
+    mesh.conditions = _cells(files, mesh, "condition", ".cond", condition_shape)
     _note_unused(files, mesh)
     return mesh
 
@@ -62,72 +53,60 @@ def _nodes(files: ElemFiles) -> Mesh:
     return Mesh(points[keep], node_ids=ids[keep], source=name)
 
 
-def _cells(files: ElemFiles, mesh: Mesh, kind: Kind) -> list[Block]:
+def _cells(
+    files: ElemFiles, mesh: Mesh, word: str, ending: str, shape_of: Callable[[str], type[Shape] | None]
+) -> list[Block]:
     """Return one block per run of equal names."""
-    runs = [run for run in files.runs[kind.ending] if "<ids>" in run.form.text]
+    runs = [run for run in files.runs[ending] if "<ids>" in run.form.text]
     if not runs:
         return []
     for run in runs:
         if run.head:
             run.columns.insert(1, run.head * len(run.starts))
-    source = files.sources[kind.ending]
-    starts, names = _starts(runs), [name for run in runs for name in run.columns[1]]
+    source = files.sources[ending]
+    starts, names = _starts(runs), [name.decode("ascii") for run in runs for name in run.columns[1]]
     ids = _joined(runs, 0, source.integers)
     properties = _joined(runs, 3, lambda tokens, at: source.integers(tokens, at, least=0))
-    bodies = [body for run in runs for body in run.columns[2]]
-    counts = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
-    lines = source.lines(starts)
+    bodies, lines = [body for run in runs for body in run.columns[2]], source.lines(starts)
     for row, first in repeated(ids):
-        source.problem(already(f"{kind.word} {ids[row]}", lines[first]), starts[row])
+        source.problem(already(f"{word} {ids[row]}", lines[first]), starts[row])
     blocks, end = [], 0
     for name, group in groupby(names):
         rows = slice(end, end := end + len(list(group)))
-        text = name.decode("ascii")
-        block = Block(text, NO_NODES, ids[rows], properties[rows], kind.shape_of(text), lines[rows])
-        _connect(block, counts[rows], bodies[rows], starts[rows], (files, mesh, kind))
+        block = Block(name, NO_NODES, ids[rows], properties[rows], shape_of(name), lines[rows])
+        for cell, message in _connect(files, mesh, block, source, (bodies[rows], starts[rows])):
+            source.problem(f"{word} {block.ids[cell]} ({name}){message}", starts[rows.start + cell])
         blocks.append(block)
     return blocks
 
 
 def _connect(
-    block: Block,
-    widths: Ints,
-    bodies: Sequence[bytes],
-    starts: Sequence[int],
-    at: tuple[ElemFiles, Mesh, Kind],
-) -> None:
-    """Fill ``block.nodes`` with the node rows of the `widths` ids that each of the texts `bodies` names."""
-    files, mesh, kind = at
-    source = files.sources[kind.ending]
-
-    def problem(cell: int, message: str) -> None:
-        source.problem(f"{kind.word} {block.ids[cell]} ({block.name}){message}", starts[cell])
-
+    files: ElemFiles, mesh: Mesh, block: Block, source: Source, texts: tuple[list[bytes], list[int]]
+) -> Iterator[tuple[int, str]]:
+    """Fill ``block.nodes`` with the rows of the nodes that each text lists; yield cells and what is wrong."""
+    bodies, starts = texts
+    widths = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
     width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
-    for i in np.flatnonzero(widths != width).tolist():
-        problem(i, f" has {widths[i]} nodes; expected {width}")
-    if (widths != width).any():
-        return
+    wrong = np.flatnonzero(widths != width).tolist()
+    yield from ((cell, f" has {widths[cell]} nodes; expected {width}") for cell in wrong)
     before = files.problems.count
-    nodes = source.integers(bodies, np.repeat(starts, width)).reshape(-1, width)
-    if files.problems.count > before:
+    if wrong:
         return
-    block.nodes = mesh.node_rows(nodes).astype(np.int32)
-    for i, message in wrong_nodes(nodes, block.nodes) if files.nodes_known else ():
-        problem(i, message)
+    nodes = source.integers(bodies, np.repeat(starts, width)).reshape(-1, width)
+    if files.problems.count == before:
+        block.nodes = mesh.node_rows(nodes).astype(np.int32)
+        yield from wrong_nodes(nodes, block.nodes) if files.nodes_known else ()
 
 
 def _note_unused(files: ElemFiles, mesh: Mesh) -> None:
     if not mesh.blocks:
         files.notes.append(Note(0, f"{mesh.source}: there are no elements"))
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for block in mesh.conditions:
-        if block.shape is None:
-            counts[block.name] = counts.get(block.name, 0) + len(block)
-    for name, count in counts.items():
-        files.notes.append(
-            Note(0, f"{count} conditions {name} are kept without use", Path(files.stem).name + ".cond")
-        )
+        counts[block.name] += len(block) if block.shape is None else 0
+    for name, count in (+counts).items():
+        text = f"{count} conditions {name} are kept without use"
+        files.notes.append(Note(0, text, Path(files.stem).name + ".cond"))
 
 
 def _joined(runs: Sequence[Run], column: int, read: Callable[[Any, list[int]], Numbers]) -> Numbers:

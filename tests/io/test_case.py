@@ -1,0 +1,137 @@
+"""Cases: every input becomes one, a file is parsed once, and one function runs them all."""
+
+import json
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.io.run import ANALYSES, prepare
+
+MATERIAL = {"E": 1e6, "nu": 0.3, "density": 1000.0}
+BODY = {
+    "mesh": {"box": {"size": [1, 1, 1]}},
+    "material": MATERIAL,
+    "body": "rigid",
+    "time": {"step": 0.1, "steps": 4, "every": 2},
+}
+RUN = {"model": "box.mdpa", "material": MATERIAL, "fix": {"z-": "xyz"}, "gravity": [0, 0, -10]}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mesh = kl.box()
+    mesh.parts = {}
+    kl.write("box.mdpa", mesh)
+    return tmp_path
+
+
+def written(name="run.json", **content):
+    with open(name, "w") as file:
+        json.dump(content, file)
+    return name
+
+
+def held():
+    model = kl.Model(kl.box(), kl.Isotropic3D(**MATERIAL))
+    model.fix("z-")
+    model.add(kl.Gravity((0, 0, -10)))
+    return model
+
+
+def test_every_input_is_a_case_with_its_analysis(folder):
+    (folder / "spin.py").write_text(
+        "import kratos_lite as kl\n"
+        "body = kl.RigidBody(kl.box(), kl.Isotropic3D(1e6, 0.3, 1000.0))\ndt, steps = 0.1, 4\n"
+    )
+    window = {"translation": {"direction": "x", "rate": 1.0}}
+    inputs = {
+        "box.mdpa": "static",
+        written("static.json", **RUN): "static",
+        written("steady.json", **RUN, ale=window): "steady",
+        written("time.json", **RUN, time={"step": 0.1, "steps": 3}): "transient",
+        written("body.json", **BODY): "bodies",
+        "spin.py": "bodies",
+    }
+    cases = {name: kl.read_case(name) for name in inputs}
+    assert {name: case.analysis for name, case in cases.items()} == inputs
+    assert {str(case.files[0]) for case in cases.values()} == set(inputs)
+    assert [path.name for path in cases["static.json"].files] == ["static.json", "box.mdpa"]
+    assert {kl.Case(held(), modes=2).analysis, *inputs.values()} == set(ANALYSES)
+
+
+@pytest.mark.parametrize("content", [RUN, {**RUN, "time": {"step": 0.1, "steps": 2}}, BODY])
+def test_a_file_is_parsed_once(run, folder, monkeypatch, content):
+    from kratos_lite.io import settings
+
+    read, parsed = settings.read_json, []
+    monkeypatch.setattr(settings, "read_json", lambda path: parsed.append(path) or read(path))
+    assert run("solve", written(**content)).code == 0
+    assert len(parsed) == 1
+
+
+def test_a_case_of_python_is_run_and_written(folder):
+    case = kl.Case(held(), outputs=kl.Outputs(["a.vtu"], json="a.json"))
+    outcome = kl.run(case)
+    assert not list(folder.glob("a.*"))
+    assert outcome.write() == ["a.vtu", "a.json"]
+    np.testing.assert_array_equal(outcome.result.u, held().solve().u)
+    found = json.loads((folder / "a.json").read_text())["largest_displacement"]["value"]
+    assert f"largest displacement  {found:.6e} m" in str(outcome)
+
+
+def test_what_a_solution_did_without_is_behind_verbose(run, folder):
+    outcome = kl.run(kl.Case(held()))
+    assert not any(line.startswith("skipped") for line in outcome.summary())
+    assert any(line.startswith("skipped") for line in outcome.summary(verbose=True))
+    assert "skipped" not in run("solve", written(**RUN)).rows
+    assert "prescribed" in run("solve", "run.json", "--verbose").rows["skipped"]
+
+
+def test_expected_values_are_compared_with_the_end(folder):
+    case = kl.Case(held(), kl.TimeIntegration(1e-3, 4, every=4))
+    case.expected.append(lambda result: f"check top passed ({result.u[-1, 2]:.3e})")
+    outcome = kl.run(case)
+    assert outcome.compare() == [f"check top passed ({outcome.result.u[-1, 2]:.3e})"]
+    assert kl.run(kl.Case(held(), modes=1)).compare() == []
+
+
+def test_states_of_a_case_come_without_files(folder):
+    body, states = prepare(kl.read_case(written(**BODY, output={"csv": "a.csv"})))
+    assert [state.step for state in states] == [2, 4]
+    assert body.step == 4
+    assert [path.name for path in folder.iterdir() if path.suffix == ".csv"] == []
+    with pytest.raises(kl.ModelError, match="this case is not in time"):
+        prepare(kl.Case(held()))
+
+
+def test_a_case_is_of_a_model_or_of_a_body(folder):
+    with pytest.raises(kl.ModelError, match="it has no body"):
+        kl.Case(held()).body  # noqa: B018
+    with pytest.raises(kl.ModelError, match="it has no model"):
+        kl.read_case(written(**BODY)).model  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"step": 0.0, "steps": 1}, "a step must be one number"),
+        ({"step": 1.0, "steps": 0}, "steps must be a whole number"),
+        ({"step": 1.0, "steps": 1, "every": 0.5}, "every must be a whole number"),
+        ({"step": 1.0, "steps": 1, "lumped": 1}, "lumped must be True or False"),
+    ],
+)
+def test_wrong_time_integration_is_refused(numbers, message):
+    with pytest.raises(kl.InputError, match=message):
+        kl.TimeIntegration(**numbers)
+
+
+def test_outputs_are_checked_before_any_work(folder):
+    case = kl.Case(held(), outputs=kl.Outputs(["a.csv"]))
+    with pytest.raises(kl.InputError, match=r"a\.csv: \.csv holds states in time"):
+        kl.run(case)
+    case.time = kl.TimeIntegration(1e-3, 1)
+    case.outputs.state = "a.csv"
+    with pytest.raises(kl.InputError, match=r"a\.csv: is an input or another output"):
+        kl.run(case)
