@@ -10,10 +10,13 @@ import kratos_lite as kl
 
 INCOMPLETE = {
     "CentralDifference",
+    "FiniteElementBody",
     "Model.static",
     "Model.transient",
     "Moment.load",
     "Moment.save",
+    "PseudoRigidBody",
+    "RigidBody",
     "State.load",
     "State.of",
     "State.put_into",

@@ -29,14 +29,12 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
 
     Returns
     -------
-    a body of that kind, at the same time.
+    A new body.
 
     Raises
     ------
-    InputError
-        The kind is unknown, or none that a body becomes.
-    ModelError
-        The body is an obstacle, or many, or has no mesh or material.
+    InputError, ModelError
+        The kind is unknown, or the body has no mesh.
 
     Examples
     --------

@@ -50,12 +50,11 @@ class FiniteElementBody(Deformable):
     scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``total_lagrangian`` and ``DEF_LIM`` for the others
         if not given.
     damping : η in s.
-    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        The mesh is inverted, nodes belong to no element, or there is no mass.
+        If the mesh is inverted, nodes belong to no element, or there is no mass.
 
     Examples
     --------
@@ -133,12 +132,12 @@ class FiniteElementBody(Deformable):
         return np.asarray(self._in_mesh(np.atleast_2d(points)).interpolate(nodal).reshape(points.shape))
 
     def set_configuration(self, q: ArrayLike) -> None:
-        """Set the displacements (3n,) or (n, 3) in m; see `Body.set_configuration`.
+        """Set the displacements (3n,) or (n, 3); see `Body.set_configuration`.
 
         Raises
         ------
         InputError
-            The shape is wrong, or an element is inverted.
+            It has another shape, is not finite, or inverts an element.
         """
         q = finite(q, "a configuration")
         if q.shape not in ((self.dofs,), self.points.shape):
@@ -254,12 +253,12 @@ class FiniteElementBody(Deformable):
 
         Parameters
         ----------
-        q, dq : (3n,) m, displacements at its start and increment.
-        damping : η/h, which adds the viscous stress.
+        q, dq : (3n,) configuration and increment in m.
+        damping : the ratio η/h, which adds the viscous stress.
 
         Returns
         -------
-        (3n,) float, N.
+        (3n,) in N.
         """
         return self.formulation.load_over(q, dq, damping)
 
@@ -272,15 +271,15 @@ class FiniteElementBody(Deformable):
         return self.formulation.stiffness(self.q if q is None else q)
 
     def damping_load(self, q: Array, u: Array) -> Array:
-        """Return K(q) u, the viscous load for η = 1 s.
+        """Return K(q) u, the viscous load for η = 1.
 
         Parameters
         ----------
-        q, u : (3n,), displacements in m and velocities in m/s.
+        q, u : (3n,) configuration in m and velocity in m/s.
 
         Returns
         -------
-        (3n,) float, N/s.
+        (3n,) in N/s.
         """
         return self.formulation.damping_load(q, u)
 
@@ -297,12 +296,13 @@ class FiniteElementBody(Deformable):
 
         Parameters
         ----------
-        q, dq, damping : see `load_over`.
+        q, dq : (3n,) configuration and increment in m.
+        damping : the ratio η/h.
         c : s².
 
         Returns
         -------
-        function of columns b (3n, k) or (3n,) that returns x.
+        A function of b.
         """
         return self.formulation.increment_solver(q, dq, damping, c)
 
@@ -321,15 +321,14 @@ class FiniteElementBody(Deformable):
     def modes(self, count: int = 12) -> tuple[Array, Array]:
         """Return the lowest natural frequencies of the undeformed body as its constraints hold it.
 
-        A body that nothing holds has its six rigid motions first.
-
         Parameters
         ----------
-        count : number of modes.
+        count : number of frequencies.
 
         Returns
         -------
-        frequencies (count,) in rad/s, ascending, and shapes (3n, count) with φ^T M φ = 1.
+        frequencies (count,) in rad/s, ascending; shapes (3n, count) with φ^T M φ = 1.  A body that nothing
+        holds has its six rigid motions first.
         """
         K, M = self.formulation.K0.scipy().tocsr(), self._mass.matrix()
         held = [c.jacobian(self, np.zeros(self.dofs)) for c in self.constraints]

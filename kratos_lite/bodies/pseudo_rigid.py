@@ -40,12 +40,11 @@ class PseudoRigidBody(AffineBody, Deformable):
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
     damping : η in s.
-    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        The mesh is inverted, there is no mass, or no body has such an Euler tensor.
+        If the mesh is inverted, there is no mass, or no body has such an Euler tensor.
 
     Examples
     --------
@@ -181,7 +180,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
         Returns
         -------
-        (..., 9, 9) float, kg m².
+        (..., 9, 9) in kg m².
         """
         return by_rows(self.mass_properties.euler)
 
@@ -209,21 +208,21 @@ class PseudoRigidBody(AffineBody, Deformable):
         )
 
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
-        """Return what a step needs of the body.
+        """Return what steps take.
 
         Returns
         -------
-        Euler tensor (..., 3, 3), mass (...), volume (...), C (6, 6) and damping.
+        Euler tensor, mass, volume, C and damping.
         """
         c = self.mass_properties
         return c.euler, c.mass, c.volume, self.C, self.damping
 
     def frequencies(self) -> Array:
-        """Return the angular frequencies at the configuration, ascending; 0 if ω² < 0.
+        """Return the angular frequencies at the configuration.
 
         Returns
         -------
-        (..., 9) float, rad/s.
+        (..., 9) in rad/s, ascending; 0 if ω² < 0.
         """
         L = np.linalg.inv(np.linalg.cholesky(self.mass_matrix()))
         K = self.stiffness()

@@ -38,12 +38,11 @@ class RigidBody(AffineBody):
         many bodies at once.
     scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
         ``RIG_IMP`` (momentum exact, symmetric in time).
-    tolerance : relative size of the last Newton step of an implicit scheme.
 
     Raises
     ------
     MeshError, ModelError, InputError
-        The mesh is inverted or has no volume, or there is no mass.
+        If the mesh is inverted or has no volume, or there is no mass.
 
     Examples
     --------
@@ -169,11 +168,11 @@ class RigidBody(AffineBody):
         )
 
     def step_constants(self) -> tuple[Array, Array, Array]:
-        """Return what a step needs of the body.
+        """Return what steps take.
 
         Returns
         -------
-        inertia (..., 3, 3), its inverse and mass (...).
+        Inertia, its inverse and mass.
         """
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
@@ -186,11 +185,11 @@ class RigidBody(AffineBody):
 
         Parameters
         ----------
-        b : (6,) or columns (6, k).
+        b : (6, k) columns.
 
         Returns
         -------
-        float, shaped as b.
+        (6, k).
         """
         return np.concatenate([self._inverse @ b[:3], b[3:] / self.mass])
 
@@ -211,7 +210,7 @@ class Obstacle(RigidBody):
     Parameters
     ----------
     mesh : the shape.
-    material : only kept.
+    material : is not needed.
 
     Examples
     --------
@@ -246,7 +245,7 @@ class Obstacle(RigidBody):
         return np.zeros_like(v)
 
     def add(self, load: object, *, amplitude: object = None) -> None:
-        """Refuse the load.
+        """Refuse a load.
 
         Raises
         ------
@@ -258,7 +257,7 @@ class Obstacle(RigidBody):
         )
 
     def constrain(self, constraint: object) -> None:
-        """Refuse the constraint.
+        """Refuse a constraint.
 
         Raises
         ------

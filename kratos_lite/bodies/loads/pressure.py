@@ -39,12 +39,12 @@ class FollowerPressure(BodyLoad):
         self.where, self.pressure = where, float(value)
 
     def bind(self, body: FreeBody) -> AppliedLoad:
-        """Return the load on a body; see `BodyLoad.bind`.
+        """Return the load on a body.
 
         Raises
         ------
         ModelError
-            The body has no mesh, or there are no such faces.
+            The body is many bodies or has no mesh, or there are no such faces.
         """
         mesh = body.mesh
         if mesh is None:
