@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.documents import ELEM_SET, ending, read_document
-from kratos_lite.io.kratos import model_from
+from kratos_lite.io.kratos.to_model import model_from
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model

@@ -1,6 +1,7 @@
-"""What Kratos data mean for a model (`to_model`), and the way back (`to_document`)."""
+"""Kratos run files, and what the data of Kratos mean.
 
-from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.io.kratos.variables import Variables
-
-__all__ = ["Variables", "model_from"]
+A run file is read by `run_file`; its processes are rows of `processes.PROCESSES`, its expected values rows of
+`expected_values.COMPARISONS`, its materials are read by `materials`.  `to_model` makes a model of a document:
+`variables` says which variable is which load or support, `properties` which is which constant of a material;
+the names of Kratos' laws are aliases of our materials.  `to_document` is the way back.
+"""

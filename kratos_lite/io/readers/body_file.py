@@ -17,8 +17,8 @@ from kratos_lite.errors import Problems
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.documents import read_document
 from kratos_lite.io.json_file import Object
-from kratos_lite.io.kratos import model_from
 from kratos_lite.io.kratos.properties import material_from
+from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.readers.body_loads import add_constraint, add_load
 from kratos_lite.io.readers.run_file import mesh_file_of, output_of
 from kratos_lite.io.readers.time import read_time_of_body, restart_of
