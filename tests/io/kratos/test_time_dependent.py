@@ -84,7 +84,7 @@ def by_hand(load=None, **options):
     model.fix("Bottom")
     if load is not None:
         model.add(load)
-    return list(model.transient(**options).march(dt=0.01, steps=20))
+    return list(kl.integrate(model.transient(**options), dt=0.01, steps=20))
 
 
 def test_integrator_damping_and_steps(write):
@@ -124,7 +124,7 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     assert forces[2] is not forces[1]
     assert forces[4] is forces[3]
     ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
-    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), scheme=kl.bossak())
+    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), integrator=kl.Bossak())
     for one, other in zip(moments(scene), expected, strict=True):
         same(one, other)
 
@@ -142,7 +142,7 @@ def test_supports_that_move_with_t(write):
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom", "x", lambda t: 0.01 * t * t)
     model.fix("Bottom", "yz")
-    expected = list(model.transient(scheme=kl.bossak()).march(dt=0.01, steps=20))
+    expected = list(kl.integrate(model.transient(integrator=kl.Bossak()), dt=0.01, steps=20))
     same(moments(scene)[-1], expected[-1])
     assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
 
@@ -204,7 +204,7 @@ def test_options_change_a_dynamic_run_file(write, run):
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom")
     model.add(kl.Traction("Top", (1e5, 0.0, 0.0)), amplitude=lambda t: t)
-    *_, last = model.transient().march(dt=5e-3, steps=40)
+    *_, last = kl.integrate(model.transient(), dt=5e-3, steps=40)
     with np.load("end.npz") as file:
         np.testing.assert_allclose(file["u"][-1], last.u, rtol=0, atol=1e-10 * np.abs(last.u).max())
     assert "time        20 steps of 0.01 s by bossak(-0.3)" in run("info", "run.json").out
