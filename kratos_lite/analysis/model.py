@@ -74,7 +74,11 @@ class Model(Structure):
     ) -> StaticAnalysis:
         """Check the model and return its static analysis, ready for many sets of loads.
 
-        Matrix, factors or multigrid are made once.  Parameters and errors as for `solve`.
+        Matrix, factors or multigrid are made once.
+
+        Parameters
+        ----------
+        solver, tolerance, progress : as for `solve`.
 
         Returns
         -------
@@ -125,7 +129,11 @@ class Model(Structure):
         return StaticAnalysis(self, solver, tolerance, progress).solve_cases(cases)
 
     def transient(self, **options: Any) -> TransientAnalysis:
-        """Return the transient analysis of the model; options and errors as for `TransientAnalysis`.
+        """Return the transient analysis of the model.
+
+        Parameters
+        ----------
+        options : those of `TransientAnalysis`, with the same errors.
 
         Returns
         -------

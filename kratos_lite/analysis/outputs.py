@@ -77,10 +77,10 @@ def reaction_resultant(
 
 
 def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0.0) -> Array:
-    """Return the velocity of the material in space where nothing changes with the time: (n, 3) in m/s.
+    """Return the velocity of the material in space where nothing changes with the time.
 
     It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
-    window has no first term: its body is at rest but for its waves.  That of a
+    moving frame has no first term: its body is at rest but for its waves.  That of a
     `TransientAnalysis` adds u'.
 
     Parameters
@@ -88,6 +88,10 @@ def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0
     model : with a motion of the material.
     displacement : (n, 3) m, such as `Result.u`.
     time : s, of a rate that changes.
+
+    Returns
+    -------
+    (n, 3) in m/s.
 
     Raises
     ------

@@ -50,6 +50,7 @@ class FiniteElementBody(Deformable):
     integrator : one of `Deformable.integrators`; ``energy_momentum`` for ``total_lagrangian`` and
         ``linearly_implicit`` for the others if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------

@@ -39,6 +39,7 @@ class PseudoRigidBody(AffineBody, Deformable):
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
     integrator : one of `Deformable.integrators`; ``energy_momentum`` if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------

@@ -39,6 +39,7 @@ class RigidBody(AffineBody):
     integrator : ``momentum_conserving`` (explicit, spatial angular momentum exact, energy decays; if not
         given), ``explicit`` (energy grows) or ``implicit`` (momentum exact, symmetric in time); Solfec's
         RIG_NEG, RIG_POS and RIG_IMP name them, too.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------

@@ -87,7 +87,7 @@ def by_hand(load=None, **options):
     return list(kl.integrate(model.transient(**options), dt=0.01, steps=20))
 
 
-def test_the_scheme_damping_and_steps(write):
+def test_integrator_damping_and_steps(write):
     scene = read_case(write(*CLAMP, rayleigh_alpha=0.5, rayleigh_beta=1e-4))
     assert str(scene.time) == "20 steps of 0.01 s by bossak(-0.3)"
     assert scene.time.rayleigh == (0.5, 1e-4)
@@ -171,7 +171,7 @@ def test_a_support_that_changes_for_a_while_is_refused(write, value):
         read_case(path)
 
 
-def test_a_kratos_file_with_the_key_of_ours_is_no_run_in_time(write, run):
+def test_a_kratos_file_with_the_key_time_of_ours_stays_at_rest(write, run):
     path = write(*CLAMP)
     content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
     content["solver_settings"]["solver_type"] = "static"
@@ -212,7 +212,7 @@ def test_options_change_a_dynamic_run_file(write, run):
 
 
 @pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
-def test_checks_compare_the_end_of_the_run(write, run, value, word, code):
+def test_expected_values_are_compared_at_the_end_of_the_run(write, run, value, word, code):
     push = ("Top", "SURFACE_LOAD_X", "1e5*t")
     end = moments(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh
