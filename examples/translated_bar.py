@@ -1,7 +1,7 @@
 # %% [markdown]
-# # A pulse in a moving window
+# # A pulse in a moving frame
 #
-# A window of 20 m moves with 0.4 c along an endless bar.  A bump of 1 mm that is let go splits into two
+# A frame of 20 m moves with 0.4 c along an endless bar.  A bump of 1 mm that is let go splits into two
 # waves: seen from the frame one is slow, the other fast.  Both leave through absorbing boundaries.
 
 # %%

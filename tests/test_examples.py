@@ -257,7 +257,7 @@ def test_the_wheel_gives_way_to_its_contact_as_a_spectral_solution_says(tmp_path
     sides = [number(rf"{word} (\S+) ", out) for word in ("side:", "and")]
     assert sides == pytest.approx([0.01354089404349, 0.01952175037520], rel=2e-2)
     # c_R / 1 m, and the contact is ∫ p cos(angle) dA
-    assert number(r"of waves about (\S+) rad/s", out) == pytest.approx(95.4813, abs=0.05)
+    assert number(r"about (\S+) rad/s by wave speeds", out) == pytest.approx(95.4813, abs=0.05)
     contact = 4e3 * 0.25 * 0.15 * (2 * 3.141592653589793) ** 0.5 * 2.718281828459045 ** (-(0.15**2) / 2)
     assert number(r"the hub carries (\S+) kN", out) == pytest.approx(-contact, rel=1e-4)
     assert (tmp_path / "wheel.png").stat().st_size > 10_000

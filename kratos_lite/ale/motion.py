@@ -20,28 +20,22 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.ale.boundaries import cut_nodes, dashpots, leak, periodic_pairs
+from kratos_lite.ale.boundaries import leak
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.tables import lame_constants
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Attachment, Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
 from kratos_lite.typing import Array, Ints
-from kratos_lite.validation import choice, finite, flag, number
+from kratos_lite.validation import finite, number
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-BOUNDARIES = ("absorbing", "periodic", "fixed", "natural")
-"""What the two cut faces of a moving frame do."""
 LEAK = 1e-2
 """Share of the velocity that may pass through the boundary before a warning is given."""
 TOO_LEAKY = 0.2
 """Share from which a body is not one of revolution, or not straight, at all."""
-FREE_BOUNDARIES = 0.7
-"""Share of the speed of Rayleigh waves at which frames with free or absorbing boundaries become critical."""
 
 
 class Motion(Attachment):
@@ -226,179 +220,6 @@ class Motion(Attachment):
         """
         share = self.leak(structure.mesh)
         return [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []
-
-
-class Rotation(Motion):
-    """A body of revolution that rotates about its axis while its mesh stands still.
-
-    Geometry, density and material must be axisymmetric.  A positive rate turns clockwise about the axis, as
-    seen from its tip: c = (X - X0) × e.
-
-    Parameters
-    ----------
-    axis : ``"x"``, ``"y"``, ``"z"`` or (3,).
-    rate : rad/s; number, `TimeSeries` or function of time.
-    acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A
-        number or `TimeSeries` changes a rate that is a number as time goes on.
-    center : (3,) m, a point of the axis.
-    skew : take the skew part of G, which keeps the energy on every mesh.
-    stiffening : add the stiffness that the centrifugal stress gives; a rotor that may rotate freely needs it.
-    damping : α in 1/s.
-
-    Raises
-    ------
-    InputError
-        An argument is not what it must be.
-
-    Examples
-    --------
-    >>> Rotation("z", rate=30.0).field(np.array([1.0, 0.0, 5.0]))
-    array([ 0., -1.,  0.])
-    """
-
-    kind, unit, is_open = "rotation", "rad/s", False
-    alike = "one of revolution about", "about its axis"
-    cure = "give the axis of the body and a point of it, center=…"
-    leak_cure = "through the polygonal rim; take more cells around the axis, or quadratic ones"
-
-    def __init__(
-        self,
-        axis: ArrayLike | str = "z",
-        rate: Factor = 0.0,
-        acceleration: Factor | None = None,
-        *,
-        center: ArrayLike = (0.0, 0.0, 0.0),
-        skew: bool = True,
-        stiffening: bool = False,
-        damping: float = 0.0,
-    ) -> None:
-        super().__init__(axis, rate, acceleration, damping)
-        self.center = finite(center, "the center of a rotation", (3,))
-        self.skew, self.stiffening = flag(skew, "skew"), flag(stiffening, "stiffening")
-        self.A = np.cross(np.eye(3), self.direction).T
-
-    def field(self, X: Array) -> Array:
-        """Return A (X - X0) = (X - X0) × e."""
-        return np.asarray((X - self.center) @ self.A.T)
-
-    def wave_directions(self) -> Array:
-        """Return the directions x, y and z (3, 3)."""
-        return np.eye(3)
-
-    def critical_rate(self, wave_speed: float, points: Array) -> float:
-        """Return the rate in rad/s at which the rim is as fast as waves of a speed in m/s."""
-        return wave_speed / float(np.linalg.norm(self.field(points), axis=1).max())
-
-    def phase(self, X: Array, points: Array) -> tuple[Array, NDArray[np.complex128]]:
-        """Return the distance r from the axis and e^{i φ} of the angle about it."""
-        c, all_c = self.field(X), self.field(points)
-        first = all_c[int(np.argmax((all_c * all_c).sum(axis=1)))]
-        first = first / np.linalg.norm(first)
-        r = np.linalg.norm(c, axis=-1)
-        wave = (c @ first + 1j * (c @ np.cross(self.direction, first))) / np.where(r > 0, r, 1.0)
-        return r, wave
-
-    def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what is doubtful about the motion of a structure, but for its rate."""
-        found = super().warnings(structure, groups)
-        if any(lame_constants(group.material.C) is None for group in groups):
-            found.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
-        c = self.field(structure.mesh.points)
-        is_held = np.abs(c[structure.supports.fixed]).max(initial=0.0) > 1e-9 * np.abs(c).max()
-        if not self.stiffening and not is_held:
-            found.append(
-                "nothing holds the rotation about the axis: in the linear theory a free rotor is unstable at "
-                "any rate; fix the hub, or take stiffening=True"
-            )
-        return found
-
-
-class Translation(Motion):
-    """A frame that moves along a long body, whose material passes through its mesh.
-
-    Parameters
-    ----------
-    direction : ``"x"``, ``"y"``, ``"z"`` or (3,): where the frame moves at a positive rate.
-    rate : m/s; number, `TimeSeries` or function of time.
-    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A number
-        or `TimeSeries` changes a rate that is a number as time goes on.
-    boundaries : what the two cut faces across the direction do: ``absorbing`` lets waves out (Lysmer's
-        dashpots), ``periodic`` ties them, ``fixed`` holds them, ``natural`` leaves them to the supports.
-    damping : α in 1/s.
-
-    Raises
-    ------
-    InputError
-        An argument is not what it must be.
-
-    Examples
-    --------
-    >>> Translation("x", rate=20.0, boundaries="periodic").field(np.zeros(3)).tolist()
-    [-1.0, -0.0, -0.0]
-    """
-
-    kind, unit, is_open = "translation", "m/s", True
-    alike = "straight along", "along the moving frame"
-    cure = "give the direction of the body, and cut its two ends across it"
-    leak_cure = "through the sides of the body; its sections must be alike"
-
-    def __init__(
-        self,
-        direction: ArrayLike | str = "x",
-        rate: Factor = 0.0,
-        acceleration: Factor | None = None,
-        *,
-        boundaries: str = "absorbing",
-        damping: float = 0.0,
-    ) -> None:
-        super().__init__(direction, rate, acceleration, damping)
-        self.boundaries = choice(boundaries, "boundaries", BOUNDARIES)
-        self.A, self.center = np.zeros((3, 3)), np.zeros(3)
-
-    def field(self, X: Array) -> Array:
-        """Return -e."""
-        return np.broadcast_to(-self.direction, X.shape)
-
-    def wave_directions(self) -> Array:
-        """Return the direction of the frame, (1, 3)."""
-        return self.direction[None]
-
-    def critical_rate(self, wave_speed: float, points: Array) -> float:
-        """Return the rate in m/s at which the frame is as fast as waves of a speed in m/s."""
-        return wave_speed * (FREE_BOUNDARIES if self.boundaries in ("absorbing", "natural") else 1.0)
-
-    def phase(self, X: Array, points: Array) -> tuple[Array, NDArray[np.complex128]]:
-        """Return 1 and e^{i φ} of points X (..., 3), φ from 0 to 2 π along the frame."""
-        x, along = X @ self.direction, points @ self.direction
-        return np.ones_like(x), np.exp(2j * np.pi * (x - along.min()) / np.ptp(along))
-
-    def open_faces(self, mesh: Mesh) -> tuple[Ints, ...]:
-        """Return the nodes of the two cut faces."""
-        return cut_nodes(mesh, self.direction)
-
-    def boundary_damping(self, mesh: Mesh, system: ConstrainedSystem) -> BlockMatrix | None:
-        """Return the damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
-        return dashpots(mesh, self.direction, system) if self.boundaries == "absorbing" else None
-
-    def attach(self, structure: Structure) -> None:
-        """Become the motion of a structure, and tie or fix its boundaries.
-
-        Raises
-        ------
-        ModelError
-            It has a motion already, is not straight, or its boundaries cannot be tied.
-        """
-        super().attach(structure)
-        if self.boundaries == "fixed":
-            for nodes in self.open_faces(structure.mesh):
-                structure.supports.fix(nodes, "xyz")
-        elif self.boundaries == "periodic":
-            slaves, masters = periodic_pairs(structure.mesh, self.direction)
-            structure.supports.constraints += tuple(
-                MultiPointConstraint(3 * a + axis, (3 * b + axis,), (1.0,), symmetric=True)
-                for a, b in zip(slaves.tolist(), masters.tolist(), strict=True)
-                for axis in range(3)
-            )
 
 
 def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:

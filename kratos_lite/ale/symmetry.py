@@ -1,4 +1,4 @@
-"""Symmetry: what moves through a mesh at rest must be alike all along its way, in density and stiffness."""
+"""Symmetry: density and stiffness must be the same wherever material that moves through a mesh comes."""
 
 from __future__ import annotations
 

@@ -274,7 +274,7 @@ class EquationsOfMotion:
         try:
             check_supports(self.model.mesh, self.model.supports)
         except ModelError as error:
-            return str(error).removeprefix("the supports leave rigid motions free: ")
+            return str(error).removeprefix("the supports leave rigid-body modes free: ")
         return ""
 
     def is_symmetric(self, time: float, c: float) -> bool:

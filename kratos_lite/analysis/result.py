@@ -78,20 +78,20 @@ class Report:
         unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
         force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
         spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
-        rows = [
+        return [
             (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
             (
                 "critical rate",
-                (f"{m['critical_rate']:.4g} {unit}, " if m["critical_rate"] else "")
-                + f"of waves about {m['critical_rate_of_waves']:.4g} {unit}, margin {m['margin']:.1%}",
+                (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")
+                + f"about {m['critical_rate_of_waves']:.4g} {unit} by wave speeds, margin {m['margin']:.1%}",
             ),
             ("force of supports", f"{force} N"),
+            ("moment of supports", f"{moment} N m"),
         ]
-        return rows + ([("moment of supports", f"{moment} N m")] if m["kind"] == "rotation" else [])
 
 
 def vector(v: Array, size: float = 0.0) -> str:
-    """Return a vector for a summary; what is left of forces that cancel is shown as the 0 it stands for."""
+    """Return a vector for a summary; components that are rounding beside `size` are shown as 0."""
     small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
     return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"
 

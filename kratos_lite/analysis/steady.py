@@ -73,9 +73,12 @@ def _way(e: EquationsOfMotion, solver: str, symmetric: bool) -> tuple[str, str]:
     """Return how the equations are solved, and why so."""
     if not symmetric:
         return "direct", "the matrix of a motion with damping is not symmetric"
-    if solver != "amg" and (solver == "direct" or len(e.system.reduced.free) <= DIRECT_MAX):
-        return "direct", "one of few unknowns"
-    return "amg", "many unknowns"
+    n = len(e.system.reduced.free)
+    if solver in ("direct", "amg"):
+        return solver, "asked for"
+    if n <= DIRECT_MAX:
+        return "direct", f"{n} unknowns ≤ {DIRECT_MAX}: the factors give critical rates, too"
+    return "amg", f"{n} unknowns > {DIRECT_MAX}: multigrid takes least memory"
 
 
 def _critical_rate(e: EquationsOfMotion, factors: Factorization | None) -> float:

@@ -212,7 +212,7 @@ def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
 
 
 def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
-    """Warn where the numbers themselves cost accuracy: far from the origin, or very unlike stiffnesses."""
+    """Warn where the numbers themselves cost accuracy: far from the origin, or a large stiffness contrast."""
     warnings = []
     extent = max(float(np.ptp(x)) for x in mesh.points.T)
     spacing = extent / max(1.0, mesh.n_elements ** (1 / 3))
@@ -270,7 +270,7 @@ def check_rounding(
         return []
     text = (
         f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
-        "look for nearly free parts, spurious modes or very unlike stiffnesses"
+        "look for nearly free parts, spurious modes or a large stiffness contrast"
     )
     if noise > 1e-2 * size:
         raise SolveError(text)

@@ -1,7 +1,7 @@
-"""Mobility: which rigid motions the supports leave free, part by part, hinges included.
+"""Rigid-body modes: which of them the supports leave free, part by part, hinges included.
 
 Elements that share faces form a body.  Bodies that share single nodes or an edge only are joined
-there, and can turn about the joint: each is given its six rigid modes, and supports, constraints
+there, and can turn about the joint: each is given its six rigid-body modes, and supports, constraints
 and joints are the equations that these must meet.
 """
 
@@ -23,7 +23,7 @@ MAX_HINGED = 300
 FREE = 1e-7
 """Singular value, as a share of the largest, up to which a rigid mode is free."""
 SAMPLE = 48
-"""Equations for each body that are looked at first: a few of very many show that nothing is free."""
+"""_Constraints for each body that are looked at first: a few of very many show that nothing is free."""
 
 
 def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
@@ -40,13 +40,13 @@ def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
         a, b = sorted(mesh.element_ids[faces.element[[one[0], other[0]]]].tolist())
         warnings.append(
             f"{len(one)} pairs of elements ({a} and {b}) share the corners of a face but not its further "
-            "nodes: the face can gape; use the same order on both sides"
+            "nodes: the mesh is non-conforming there; use elements of the same order on both sides"
         )
     halves = _halved_squares(mesh)
     if len(halves):
         warnings.append(
             f"{len(halves)} four-sided faces (the first of element {mesh.element_ids[halves[0]]}) meet "
-            "triangles: the faces can gape; put a pyramid or a wedge between"
+            "triangles: the mesh is non-conforming there; put pyramids or wedges between"
         )
     return warnings
 
@@ -158,25 +158,25 @@ def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) 
         problems += _name_modes(mesh, found, group, _free_modes(mesh, frames, group, mine))
     if problems:
         shown = "; ".join(problems[:MAX_PROBLEMS])
-        raise ModelError(f"the supports leave rigid motions free: {shown}. Fix more nodes or components")
+        raise ModelError(f"the supports leave rigid-body modes free: {shown}. Fix more nodes or components")
     return np.where(found.part >= 0, group_of[found.part], -1)
 
 
 @dataclass(frozen=True)
-class Equations:
-    """What the rigid motions must meet, entry by entry: equation, degree of freedom, body, weight."""
+class _Constraints:
+    """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight."""
 
     row: Ints
     dof: Ints
     body: Ints
     weight: Array
 
-    def take(self, rows: Ints) -> Equations:
+    def take(self, rows: Ints) -> _Constraints:
         """Return some of the entries."""
-        return Equations(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
+        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
 
 
-def _equations(found: Bodies, supports: Supports) -> Equations:
+def _equations(found: Bodies, supports: Supports) -> _Constraints:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
     part, (node, second) = found.part, found.joints
     row, dof, weight = supports.constraint_rows()
@@ -189,10 +189,10 @@ def _equations(found: Bodies, supports: Supports) -> Equations:
     body = np.concatenate([body, part[joint // 3], np.repeat(second, 3)])
     weight = np.concatenate([weight, ones, -ones])
     known = body >= 0
-    return Equations(row[known], dof[known], body[known], weight[known])
+    return _Constraints(row[known], dof[known], body[known], weight[known])
 
 
-def _groups(n_bodies: int, equations: Equations) -> Ints:
+def _groups(n_bodies: int, equations: _Constraints) -> Ints:
     """Return for each body (b,) the number of its group: bodies that equations tie together."""
     if n_bodies == 1:
         return np.zeros(1, dtype=np.int64)
@@ -203,7 +203,7 @@ def _groups(n_bodies: int, equations: Equations) -> Ints:
     return (np.cumsum(label == np.arange(n_bodies)) - 1)[label]
 
 
-def _by_group(group_of: Ints, equations: Equations) -> tuple[list[list[int]], list[Equations]]:
+def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[list[int]], list[_Constraints]]:
     """Return the bodies of each group, and its equations."""
     numbers = np.arange(1, int(group_of.max()) + 1)
     members = np.argsort(group_of, kind="stable")
@@ -215,7 +215,7 @@ def _by_group(group_of: Ints, equations: Equations) -> tuple[list[list[int]], li
 
 
 def _free_modes(
-    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: Equations
+    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: _Constraints
 ) -> list[Array]:
     """Return the free modes (6, k) of each body of a group under its equations.
 
@@ -239,7 +239,7 @@ def _free_modes(
 
 
 def _spectrum(
-    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: Equations, row: Ints
+    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: _Constraints, row: Ints
 ) -> tuple[Array, Array]:
     """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
     dof, body, weight = equations.dof, equations.body, equations.weight

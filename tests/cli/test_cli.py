@@ -313,7 +313,9 @@ def test_check_tells_warnings_and_what_is_missing(run, folder):
     done = run("check", "loose.mdpa")
     assert (done.code, done.err) == (0, "")
     assert "note     1 nodes belong to no element and carry no equations: 999" in done.out
-    assert "to solve the supports leave rigid motions free: the body (125 nodes) can still move: " in done.out
+    assert (
+        "to solve the supports leave rigid-body modes free: the body (125 nodes) can still move: " in done.out
+    )
     assert "translation x, y, z; rotation about x, y, z" in done.out
 
 

@@ -373,7 +373,7 @@ def test_a_run_without_supports_and_with_unknown_settings_is_read_and_refused_wh
     del content["processes"]
     project = read_case(write(folder, content))
     assert "key 'rve_settings' is not used" in project.model.notes
-    with pytest.raises(ModelError, match="rigid motions"):
+    with pytest.raises(ModelError, match="rigid-body modes"):
         project.model.solve()
 
 
@@ -392,7 +392,7 @@ def test_eigenvalue_run_is_refused(shared):
 def test_run_without_supports_is_read_and_refused_when_solved(shared):
     project = read_case(shared / "cases" / "rve_4N_pressure" / "smallest_rve_test_parameters.json")
     assert "key 'rve_settings' is not used" in project.model.notes
-    with pytest.raises(ModelError, match="rigid motions"):
+    with pytest.raises(ModelError, match="rigid-body modes"):
         project.model.solve()
 
 

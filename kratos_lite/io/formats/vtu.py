@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import threads
+from kratos_lite.typing import Numbers
 
 _HEAD = """<?xml version="1.0"?>
 <VTKFile type="{}" version="1.0" byte_order="LittleEndian" header_type="UInt64">
@@ -30,16 +30,15 @@ MODES = ("binary", "compressed", "ascii")
 BLOCK = 1 << 20
 """Bytes that are compressed together."""
 
-Array = NDArray[Any]
 Buffer: TypeAlias = "bytes | memoryview"
-Named = list[tuple[str, Array]]
+Named: TypeAlias = "list[tuple[str, Numbers]]"
 
 
 def write_vtu(
     path: str | Path,
     mesh: Mesh,
-    point_data: Mapping[str, Array] | None = None,
-    cell_data: Mapping[str, Array] | None = None,
+    point_data: Mapping[str, Numbers] | None = None,
+    cell_data: Mapping[str, Numbers] | None = None,
     mode: str = "binary",
 ) -> None:
     """Write a mesh and its results for ParaView, VTK or meshio, as a whole or not at all.
@@ -90,9 +89,8 @@ def write_vtu(
     # in the header that has the one it looks for, which must not be an array it has moved already.
     ends = accumulate((sum(map(len, pieces)) for pieces in reversed(stored)), initial=0)
     offsets = iter([*ends][-2::-1])
-    places = (
-        _text(a) if mode == "ascii" else f' format="appended" offset="{next(offsets)}"/>' for a in arrays
-    )
+    appended = ' format="appended" offset="{}"/>'
+    places = (_text(array) if mode == "ascii" else appended.format(next(offsets)) for array in arrays)
     head = _header(groups, mesh.n_nodes, sum(map(len, blocks)), mode, places)
     tail = "</VTKFile>\n" if mode == "ascii" else "\n</AppendedData>\n</VTKFile>\n"
 
@@ -111,16 +109,16 @@ def check_mode(mode: str) -> None:
         raise InputError(f"a .vtu file is written as {', '.join(MODES)}; got {mode!r}")
 
 
-def _raw(array: Array) -> list[Buffer]:
+def _raw(array: Numbers) -> list[Buffer]:
     """Return the size in bytes and the numbers."""
     return [array.nbytes.to_bytes(8, "little"), _bytes(array)]
 
 
-def _bytes(array: Array) -> Buffer:
+def _bytes(array: Numbers) -> Buffer:
     return array.data.cast("B") if array.size else b""
 
 
-def _compressed(array: Array) -> list[Buffer]:
+def _compressed(array: Numbers) -> list[Buffer]:
     """Return the numbers in blocks that zlib has compressed, behind the sizes by which they are found."""
     import zlib
     from concurrent.futures import ThreadPoolExecutor
@@ -133,7 +131,7 @@ def _compressed(array: Array) -> list[Buffer]:
     return [np.array(sizes, dtype="<u8").tobytes(), *packed]
 
 
-def _text(array: Array) -> str:
+def _text(array: Numbers) -> str:
     """Return the numbers as text that gives the same numbers when it is read, one row a line."""
     rows = array.reshape(len(array), -1).tolist() if array.size else []
     return ' format="ascii">\n' + "\n".join(" ".join(map(repr, row)) for row in rows) + "\n</DataArray>"
@@ -163,7 +161,7 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
     write_whole(path, text.encode())
 
 
-def _checked(data: Mapping[str, Array], rows: int, place: str) -> Named:
+def _checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
     """Return arrays of (rows, …) little-endian numbers of one of the types of the file."""
     checked = []
     for name, values in data.items():
@@ -215,7 +213,7 @@ def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, pl
     return text if mode == "ascii" else text + '<AppendedData encoding="raw">\n_'
 
 
-def _describe(name: str, array: Array) -> str:
+def _describe(name: str, array: Numbers) -> str:
     """Return type, name and, for more than one number per row, the components as XML attributes."""
     text = f'type="{_TYPES[array.dtype.str]}" Name="{_escaped(name)}"'
     if array.ndim > 1:

@@ -1,0 +1,110 @@
+"""Translation: a frame that moves along a long body, whose material passes through its mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kratos_lite.ale.boundaries import cut_nodes, dashpots, periodic_pairs
+from kratos_lite.ale.motion import Motion
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.structure import Structure
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.time_series import Factor
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import choice
+
+BOUNDARIES = ("absorbing", "periodic", "fixed", "natural")
+"""What the two cut faces of a moving frame do."""
+FREE_BOUNDARIES = 0.7
+"""Share of the speed of Rayleigh waves at which frames with free or absorbing boundaries become critical."""
+
+
+class Translation(Motion):
+    """A frame that moves along a long body, whose material passes through its mesh.
+
+    Parameters
+    ----------
+    direction : ``"x"``, ``"y"``, ``"z"`` or (3,): where the frame moves at a positive rate.
+    rate : m/s; number, `TimeSeries` or function of time.
+    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A number
+        or `TimeSeries` changes a rate that is a number as time goes on.
+    boundaries : what the two cut faces across the direction do: ``absorbing`` lets waves out (Lysmer's
+        dashpots), ``periodic`` ties them, ``fixed`` holds them, ``natural`` leaves them to the supports.
+    damping : α in 1/s.
+
+    Raises
+    ------
+    InputError
+        An argument is not what it must be.
+
+    Examples
+    --------
+    >>> Translation("x", rate=20.0, boundaries="periodic").field(np.zeros(3)).tolist()
+    [-1.0, -0.0, -0.0]
+    """
+
+    kind, unit, is_open = "translation", "m/s", True
+    alike = "straight along", "along the moving frame"
+    cure = "give the direction of the body, and cut its two ends across it"
+    leak_cure = "through the sides of the body; its sections must be alike"
+
+    def __init__(
+        self,
+        direction: ArrayLike | str = "x",
+        rate: Factor = 0.0,
+        acceleration: Factor | None = None,
+        *,
+        boundaries: str = "absorbing",
+        damping: float = 0.0,
+    ) -> None:
+        super().__init__(direction, rate, acceleration, damping)
+        self.boundaries = choice(boundaries, "boundaries", BOUNDARIES)
+        self.A, self.center = np.zeros((3, 3)), np.zeros(3)
+
+    def field(self, X: Array) -> Array:
+        """Return -e."""
+        return np.broadcast_to(-self.direction, X.shape)
+
+    def wave_directions(self) -> Array:
+        """Return the direction of the frame, (1, 3)."""
+        return self.direction[None]
+
+    def critical_rate(self, wave_speed: float, points: Array) -> float:
+        """Return the rate in m/s at which the frame is as fast as waves of a speed in m/s."""
+        return wave_speed * (FREE_BOUNDARIES if self.boundaries in ("absorbing", "natural") else 1.0)
+
+    def phase(self, X: Array, points: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Return 1 and e^{i φ} of points X (..., 3), φ from 0 to 2 π along the frame."""
+        x, along = X @ self.direction, points @ self.direction
+        return np.ones_like(x), np.exp(2j * np.pi * (x - along.min()) / np.ptp(along))
+
+    def open_faces(self, mesh: Mesh) -> tuple[Ints, ...]:
+        """Return the nodes of the two cut faces."""
+        return cut_nodes(mesh, self.direction)
+
+    def boundary_damping(self, mesh: Mesh, system: ConstrainedSystem) -> BlockMatrix | None:
+        """Return the damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
+        return dashpots(mesh, self.direction, system) if self.boundaries == "absorbing" else None
+
+    def attach(self, structure: Structure) -> None:
+        """Become the motion of a structure, and tie or fix its boundaries.
+
+        Raises
+        ------
+        ModelError
+            It has a motion already, is not straight, or its boundaries cannot be tied.
+        """
+        super().attach(structure)
+        if self.boundaries == "fixed":
+            for nodes in self.open_faces(structure.mesh):
+                structure.supports.fix(nodes, "xyz")
+        elif self.boundaries == "periodic":
+            slaves, masters = periodic_pairs(structure.mesh, self.direction)
+            structure.supports.constraints += tuple(
+                MultiPointConstraint(3 * a + axis, (3 * b + axis,), (1.0,), symmetric=True)
+                for a, b in zip(slaves.tolist(), masters.tolist(), strict=True)
+                for axis in range(3)
+            )
