@@ -45,12 +45,12 @@ def top(kl: Any) -> Any:
     return body
 
 
-def heavy_top(scheme: str) -> Callable[[Any], Any]:
+def heavy_top(integrator: str) -> Callable[[Any], Any]:
     """Return the heavy top, its torque a Python function."""
 
     def make(kl: Any) -> Any:
         top = kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0]))
-        body = kl.RigidBody(mass_properties=top, scheme=scheme)
+        body = kl.RigidBody(mass_properties=top, integrator=integrator)
         body.u[:3] = 0.0, 0.0, 50.0
         body.rotate([[1, 0, 0], [0, np.cos(0.05), -np.sin(0.05)], [0, np.sin(0.05), np.cos(0.05)]])
         torque = kl.Callback(
@@ -62,26 +62,28 @@ def heavy_top(scheme: str) -> Callable[[Any], Any]:
     return make
 
 
-def soft_box(scheme: str) -> Callable[[Any], Any]:
+def soft_box(integrator: str) -> Callable[[Any], Any]:
     """Return the spinning pseudo-rigid box."""
 
     def make(kl: Any) -> Any:
         box = kl.MassProperties.box((0.4, 0.6, 1.0), 1000.0)
         soft = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
-        body = kl.PseudoRigidBody(mass_properties=box, material=soft, scheme=scheme)
+        body = kl.PseudoRigidBody(mass_properties=box, material=soft, integrator=integrator)
         body.set_velocity(angular=(0.05, 10.0, 0.05))
         return body
 
     return make
 
 
-def bar(formulation: str, scheme: str, lumped: bool = True) -> Callable[[Any], Any]:
+def bar(formulation: str, integrator: str, lumped: bool = True) -> Callable[[Any], Any]:
     """Return the rotating bar of 2 x 2 x 20 hexahedra, 567 degrees of freedom."""
 
     def make(kl: Any) -> Any:
         rubber = kl.Isotropic3D(E=2e6, nu=0.26, density=7800.0)
         mesh = kl.box((0.1, 0.1, 1.0), (2, 2, 20))
-        body = kl.FiniteElementBody(mesh, rubber, formulation=formulation, scheme=scheme, lumped=lumped)
+        body = kl.FiniteElementBody(
+            mesh, rubber, formulation=formulation, integrator=integrator, lumped=lumped
+        )
         body.set_velocity(angular=(1.0, 0.0, 0.0))
         return body
 
@@ -195,12 +197,12 @@ def measured(kl: Any, name: str, share: int = 1) -> dict[str, float]:
     motion = MOTIONS[name]
     body = motion.make(kl)
     steps = max(motion.every if share == 1 else 2, motion.steps // share)
-    for _ in kl.march(body, motion.dt, 2):  # whatever is made once is made here
+    for _ in kl.integrate(body, motion.dt, 2):  # whatever is made once is made here
         pass
     one = body[0] if isinstance(body, list) else body
     energy, momentum = own_energy(one), one.angular_momentum()
     start = perf_counter()
-    for _ in kl.march(body, motion.dt, steps, every=min(motion.every, steps)):
+    for _ in kl.integrate(body, motion.dt, steps, every=min(motion.every, steps)):
         pass
     seconds = (perf_counter() - start) / steps / motion.bodies
     turned = np.linalg.norm(one.angular_momentum() - momentum) / np.linalg.norm(momentum)

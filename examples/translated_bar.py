@@ -35,7 +35,7 @@ fastest = np.abs(transient.material_velocity()).max()
 print(f"u' at first {np.abs(v).max() * 1e3:.1f} mm/s, of the material {fastest * 1e3:.2f} mm/s")
 
 # %%
-moments = [transient.moment(), *transient.march(dt=0.0004, steps=400, every=50)]
+moments = [transient.state(), *kl.integrate(transient, dt=0.0004, steps=400, every=50)]
 for moment in moments[::2]:
     place = x + rate * moment.time  # along the bar
     exact = (bump(place - c * moment.time) + bump(place + c * moment.time)) / 2

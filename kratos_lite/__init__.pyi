@@ -1,15 +1,16 @@
 """The public names, one a line; ``import kratos_lite`` reads them here."""
 
 from kratos_lite import ale as ale
+from kratos_lite.analysis import HHT as HHT
+from kratos_lite.analysis import Bossak as Bossak
 from kratos_lite.analysis import CentralDifference as CentralDifference
-from kratos_lite.analysis import Moment as Moment
-from kratos_lite.analysis import Transient as Transient
-from kratos_lite.analysis import bossak as bossak
+from kratos_lite.analysis import GeneralizedAlpha as GeneralizedAlpha
+from kratos_lite.analysis import Newmark as Newmark
+from kratos_lite.analysis import State as State
+from kratos_lite.analysis import TransientAnalysis as TransientAnalysis
 from kratos_lite.analysis import critical_rate as critical_rate
-from kratos_lite.analysis import generalized_alpha as generalized_alpha
-from kratos_lite.analysis import hht as hht
+from kratos_lite.analysis import integrate as integrate
 from kratos_lite.analysis import material_velocity as material_velocity
-from kratos_lite.analysis import newmark as newmark
 from kratos_lite.analysis import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.model import Model as Model
 from kratos_lite.analysis.result import Result as Result
@@ -29,12 +30,10 @@ from kratos_lite.bodies import PseudoRigidBody as PseudoRigidBody
 from kratos_lite.bodies import RigidBody as RigidBody
 from kratos_lite.bodies import RigidLink as RigidLink
 from kratos_lite.bodies import Spring as Spring
-from kratos_lite.bodies import State as State
 from kratos_lite.bodies import TimeSeries as TimeSeries
 from kratos_lite.bodies import Torque as Torque
 from kratos_lite.bodies import convert as convert
 from kratos_lite.bodies import find_equilibrium as find_equilibrium
-from kratos_lite.bodies import march as march
 from kratos_lite.elements import ELEMENTS as ELEMENTS
 from kratos_lite.elements import KinematicLinear as KinematicLinear
 from kratos_lite.elements import KinematicLinear3D4N as KinematicLinear3D4N
@@ -63,6 +62,7 @@ from kratos_lite.io.runners.outcome import Outcome as Outcome
 from kratos_lite.io.writers.pictures import draw as draw
 from kratos_lite.io.writers.pictures import draw_element as draw_element
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
+from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.io.writers.trajectory import draw_trajectory as draw_trajectory
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import Isotropic3D as Isotropic3D

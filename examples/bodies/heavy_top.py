@@ -22,14 +22,14 @@ def weight(q, u, t):
 
 mesh = kl.box((0.5, 0.5, 2.0), origin=(-0.25, -0.25, -1.0))  # only to be drawn
 top = kl.RigidBody(
-    mesh, mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])), scheme="RIG_IMP"
+    mesh, mass_properties=kl.MassProperties(mass=1.0, inertia=np.diag([5.0, 5.0, 1.0])), integrator="RIG_IMP"
 )
 top.rotate(exp(np.array([0.5, 0.0, 0.0])))
 top.u[:3] = 0.0, 0.0, 25.0  # referential angular velocity, rad/s
 top.add(kl.Callback(weight))
 
 # %%
-states = [kl.State.of(top), *kl.march(top, dt=1e-3, steps=3600)]
+states = [kl.State.of(top), *kl.integrate(top, dt=1e-3, steps=3600)]
 times = np.array([state.time for state in states])
 tilt = np.array([np.arccos(state.q[8]) for state in states])
 low = 1 + np.flatnonzero((tilt[1:-1] < tilt[:-2]) & (tilt[1:-1] < tilt[2:]))

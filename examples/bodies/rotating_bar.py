@@ -19,10 +19,10 @@ soft = kl.Isotropic3D(E=2e6, nu=0.26, density=7.8e3)
 ends = np.array([[0.05, 0.05, 0.0], [0.05, 0.05, 1.0]])
 
 for formulation in ("total_lagrangian", "corotational"):
-    bar = kl.FiniteElementBody(mesh, soft, formulation=formulation, scheme="DEF_LIM", lumped=True)
+    bar = kl.FiniteElementBody(mesh, soft, formulation=formulation, integrator="DEF_LIM", lumped=True)
     bar.set_velocity(angular=(1.0, 0.0, 0.0))
     start, clock = bar.energy(), perf_counter()
-    states = [kl.State.of(bar), *kl.march(bar, dt=1 / 64, steps=128)]
+    states = [kl.State.of(bar), *kl.integrate(bar, dt=1 / 64, steps=128)]
     seconds = (perf_counter() - clock) / 128
     x = [bar.position(ends, state.q) for state in states[:65]]
     stretch = max(np.linalg.norm(b - a) - 1.0 for a, b in x)

@@ -20,7 +20,7 @@ def drag(q, u, t):
 body = kl.RigidBody(
     kl.box((0.4, 0.6, 1.0), cells=(2, 3, 5)),
     kl.Isotropic3D(E=1e6, nu=0.3, density=100.0),  # 24 kg
-    scheme="RIG_IMP",
+    integrator="RIG_IMP",
 )
 body.set_velocity(linear=(6.0, 0.0, 4.905), angular=(0.05, 10.0, 0.05))  # m/s, rad/s
 body.add(kl.Gravity((0.0, 0.0, -9.81)))  # m/s²

@@ -24,7 +24,7 @@ body.add(kl.Gravity((0.0, 0.0, -9.81)))  # m/s²
 
 # %%
 energy, start = body.energy(), kl.State.of(body)
-states = [start, *kl.march(body, dt=0.002, steps=500, every=10)]
+states = [start, *kl.integrate(body, dt=0.002, steps=500, every=10)]
 print(body)
 print("mass center moved by", (body.mass_center() - mesh.points.mean(axis=0)).round(9), "m")
 print("angular momentum", body.angular_momentum().round(9), "kg m²/s")

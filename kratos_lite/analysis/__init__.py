@@ -1,22 +1,24 @@
-"""Dynamics of models: transients, natural frequencies, and steady motion of the material through the mesh."""
+"""Analyses: statics, transients, natural frequencies, steady motion; and the one loop through time."""
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.integrators import HHT, Bossak, CentralDifference, GeneralizedAlpha, Newmark
 from kratos_lite.analysis.modal import critical_rate
-from kratos_lite.analysis.moment import Moment
 from kratos_lite.analysis.outputs import material_velocity, reaction_resultant
-from kratos_lite.analysis.schemes import CentralDifference, bossak, generalized_alpha, hht, newmark
-from kratos_lite.analysis.transient import Transient
+from kratos_lite.analysis.state import State
+from kratos_lite.analysis.stepping import integrate
+from kratos_lite.analysis.transient import TransientAnalysis
 
 __all__ = [
+    "HHT",
+    "Bossak",
     "CentralDifference",
     "EquationsOfMotion",
-    "Moment",
-    "Transient",
-    "bossak",
+    "GeneralizedAlpha",
+    "Newmark",
+    "State",
+    "TransientAnalysis",
     "critical_rate",
-    "generalized_alpha",
-    "hht",
+    "integrate",
     "material_velocity",
-    "newmark",
     "reaction_resultant",
 ]

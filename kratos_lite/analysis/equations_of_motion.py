@@ -160,7 +160,7 @@ class EquationsOfMotion:
     def damping_terms(self, time: float) -> Array | None:
         """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
         alpha = self.rayleigh[0] + (self.terms.motion.damping if self.terms else 0.0)
-        out: Array | None = alpha * self.mass_data if alpha else None
+        out: Array | None = alpha * self.mass.data if alpha else None
         if self.terms is not None and (rate := self.terms.motion.rate(time)):
             gyroscopic = 2 * rate * self.terms.gyroscopic
             out = gyroscopic if out is None else out + gyroscopic
@@ -180,20 +180,6 @@ class EquationsOfMotion:
         at_zero = np.zeros_like(reduced.c)
         u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, prescribed=at_zero).x
         return self.terms.stiffening(u0.reshape(-1, 3))
-
-    @cached_property
-    def mass_data(self) -> Array:
-        """Mass matrix as data (nnz,) on the pattern in kg."""
-        from scipy.sparse import csr_array
-
-        if not self.mass.lumped:
-            return np.asarray(self.mass.scalar.data)
-        pattern = self.system.pattern
-        data = np.zeros(len(pattern.indices))
-        empty = csr_array((data, pattern.indices, pattern.indptr), shape=self.mass.scalar.shape)
-        rows = np.repeat(np.arange(pattern.n_nodes), np.diff(pattern.indptr))
-        empty.data[rows == pattern.indices] = self.mass.nodal
-        return np.asarray(empty.data)
 
     @cached_property
     def dashpots(self) -> BlockMatrix | None:
@@ -239,7 +225,7 @@ class EquationsOfMotion:
         """Return m M + c C + k K at a time, (3a, 3a)."""
         K = self.K
         A = BlockMatrix((k + c * self.rayleigh[1]) * K.data, K.indices, K.indptr)
-        scalar = m * self.mass_data
+        scalar = m * self.mass.data
         for factor, made in ((c, self.damping_terms), (k, self.stiffness_terms)):
             if factor and (terms := made(time)) is not None:
                 scalar = scalar + factor * terms

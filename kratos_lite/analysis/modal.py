@@ -73,9 +73,25 @@ def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Comple
 
 
 def critical_rate(model: Structure, count: int = 1) -> Array:
-    """Return the lowest rates (count,) at which K - rate² H is singular, in rad/s or m/s.
+    """Return the lowest rates at which K - rate² H is singular.
 
     They are those of the mesh, and fall with ever finer ones.
+
+    Parameters
+    ----------
+    model : with a motion of the material.
+    count : number of rates.
+
+    Returns
+    -------
+    (count,) in rad/s or m/s.
+
+    Raises
+    ------
+    InputError
+        The model has no motion, or not so many rates.
+    ModelError
+        The supports leave rigid-body modes free.
     """
     count = whole_number(count, "count")
     e = EquationsOfMotion(model, free=False)

@@ -9,7 +9,7 @@ from kratos_lite.analysis import modal
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.analysis.steady import solve_steady
-from kratos_lite.analysis.transient import Transient
+from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
@@ -74,7 +74,11 @@ class Model(Structure):
     ) -> StaticAnalysis:
         """Check the model and return its static analysis, ready for many sets of loads.
 
-        Matrix, factors or multigrid are made once.  Parameters and errors as for `solve`.
+        Matrix, factors or multigrid are made once.
+
+        Parameters
+        ----------
+        solver, tolerance, progress : as for `solve`.
 
         Returns
         -------
@@ -124,12 +128,16 @@ class Model(Structure):
         """
         return StaticAnalysis(self, solver, tolerance, progress).solve_cases(cases)
 
-    def transient(self, **options: Any) -> Transient:
-        """Return the transient analysis of the model; options and errors as for `kratos_lite.Transient`.
+    def transient(self, **options: Any) -> TransientAnalysis:
+        """Return the transient analysis of the model.
+
+        Parameters
+        ----------
+        options : those of `TransientAnalysis`, with the same errors.
 
         Returns
         -------
-        Transient
+        TransientAnalysis
 
         Examples
         --------
@@ -137,11 +145,11 @@ class Model(Structure):
         >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
         >>> bar.fix("z-")
         >>> bar.add(kl.Gravity((0, 0, -9.81)))
-        >>> moments = list(bar.transient().march(dt=1e-3, steps=10, every=5))
-        >>> [round(moment.time, 6) for moment in moments]
+        >>> states = list(kl.integrate(bar.transient(), dt=1e-3, steps=10, every=5))
+        >>> [round(state.time, 6) for state in states]
         [0.005, 0.01]
         """
-        return Transient(self, **options)
+        return TransientAnalysis(self, **options)
 
     def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
         """Return natural frequencies and mode shapes.

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.moment import Moment
 from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
 from kratos_lite.model.structure import Structure
@@ -19,7 +19,7 @@ from kratos_lite.validation import finite
 
 
 class Reacting(Protocol):
-    """A result or a moment."""
+    """A result or a state."""
 
     @property
     def reactions(self) -> Array:
@@ -36,7 +36,7 @@ def reaction_resultant(
     Parameters
     ----------
     model : the model.
-    of : its result, or a moment of it.
+    of : its result, or a state of it.
     where : nodes whose reactions count; all if not given.
     center : (3,) m; the center of the rotation of the model, otherwise the origin, if not given.
 
@@ -62,7 +62,7 @@ def reaction_resultant(
     -2.000000 N, 2.000000 N m
     """
     if not hasattr(of, "reactions"):
-        raise InputError(f"a Result or a Moment is needed; got {type(of).__name__}")
+        raise InputError(f"a Result or a State is needed; got {type(of).__name__}")
     if of.reactions.shape != model.mesh.points.shape:
         raise InputError(f"reactions of {len(of.reactions)} nodes; the model has {model.mesh.n_nodes}")
     rows = np.arange(model.mesh.n_nodes) if where is None else model.mesh.nodes(where)
@@ -77,16 +77,20 @@ def reaction_resultant(
 
 
 def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0.0) -> Array:
-    """Return the velocity of the material in space where nothing changes with the time: (n, 3) in m/s.
+    """Return the velocity of the material in space where nothing changes with the time.
 
     It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
-    window has no first term: its body is at rest but for its waves.  `Transient.material_velocity` adds u'.
+    moving frame has no first term: its body is at rest but for its waves.  That of a `TransientAnalysis` adds u'.
 
     Parameters
     ----------
     model : with a motion of the material.
     displacement : (n, 3) m, such as `Result.u`.
     time : s, of a rate that changes.
+
+    Returns
+    -------
+    (n, 3) in m/s.
 
     Raises
     ------
@@ -147,15 +151,15 @@ def motion_summary(
 
 
 def result_of(
-    e: EquationsOfMotion, at: Moment, scheme: str, left: float | None, critical: float | None
+    e: EquationsOfMotion, at: State, integrator: str, left: float | None, critical: float | None
 ) -> Result:
-    """Return a moment as a result; `left` is what its balance misses, where that is known."""
+    """Return a state as a result; `left` is what its balance misses, where that is known."""
     model, loads = e.model, e.system.scatter(e.load(at.time)).copy()
     report = Report(
         unknowns=len(e.system.reduced.free),
         total_load=loads.sum(axis=0),
         total_reaction=at.reactions.sum(axis=0),
-        solver=scheme,
+        solver=integrator,
         reason=f"step {at.step}, t = {at.time:g} s",
         iterations=0,
         backward_error=left,

@@ -1,4 +1,4 @@
-"""Movement: displacement, velocity and acceleration of what is prescribed, over the steps of a march.
+"""Prescribed motion: displacement, velocity and acceleration of supports over the steps in time.
 
 Newmark's formulas would take velocity and acceleration of a support from its displacements and ring for ever
 with what they get wrong in one step.  Differences over steps do not, have order 2, and keep the whole impulse
@@ -7,13 +7,14 @@ of a table's kinks.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.schemes import Implicit
 from kratos_lite.typing import Array
 
-Course = tuple[Array, Array, Array]
+Kinematics: TypeAlias = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration (3a,)."""
 
 
@@ -29,8 +30,8 @@ def with_prescribed(e: EquationsOfMotion, x: Array, prescribed: Array) -> Array:
     return np.asarray(reduced.transform(x[reduced.free]) + prescribed)
 
 
-def at_start(e: EquationsOfMotion, h: float = np.inf) -> Course:
-    """Return the course at the time 0, by one-sided differences of order 2 over steps no longer than h."""
+def at_start(e: EquationsOfMotion, h: float = np.inf) -> Kinematics:
+    """Return what is prescribed at the time 0, by one-sided differences of order 2 over steps up to h."""
     g, zero = e.prescribed(0.0), np.zeros(e.size)
     if not e.model.supports.motions:
         return g, zero, zero
@@ -40,17 +41,7 @@ def at_start(e: EquationsOfMotion, h: float = np.inf) -> Course:
     return g, velocity, (2 * g - 5 * later[0] + 4 * later[1] - later[2]) / long**2
 
 
-def at_end(e: EquationsOfMotion, time: float, h: float) -> Course:
-    """Return the course at the end of a step, time ≥ h, by central differences over steps h."""
+def at_end(e: EquationsOfMotion, time: float, h: float) -> Kinematics:
+    """Return what is prescribed at the end of a step, time ≥ h, by central differences over steps h."""
     before, now, after = (e.prescribed(time + k * h) for k in (-1, 0, 1))
     return now, (after - before) / (2 * h), (after - 2 * now + before) / h**2
-
-
-def beyond_newmark(s: Implicit, h: float, start: Course, end: Course) -> tuple[Array, Array]:
-    """Return what velocity and acceleration at the end of a step have beyond Newmark's formulas, (3a,)."""
-    (g, v, a), (g_end, v_end, a_end) = start, end
-    change = g_end - g
-    v_newmark = s.gamma / (s.beta * h) * change + (1 - s.gamma / s.beta) * v
-    v_newmark += h * (1 - s.gamma / (2 * s.beta)) * a
-    a_newmark = change / (s.beta * h * h) - v / (s.beta * h) - (1 / (2 * s.beta) - 1) * a
-    return v_end - v_newmark, a_end - a_newmark

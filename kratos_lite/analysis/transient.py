@@ -1,9 +1,8 @@
-"""Transient: a model in time."""
+"""Transient analysis: a model in time."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,51 +10,60 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
+from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.moment import Moment
 from kratos_lite.analysis.outputs import result_of, velocity_of_material
-from kratos_lite.analysis.prescribed_motion import Course, at_start, prescribed_part, with_prescribed
+from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.schemes import CentralDifference, Implicit, newmark
-from kratos_lite.analysis.steps import explicit_step, implicit_step, is_trapezoidal
-from kratos_lite.assembly.finite_strain import highest_frequency
-from kratos_lite.errors import InputError, ModelError, SolveError
+from kratos_lite.analysis.state import State
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
-from kratos_lite.validation import finite, flag, function_or_none, number, positive_step, whole_number
+from kratos_lite.validation import finite, flag, function_or_none, number
 
 _log = logging.getLogger("kratos_lite")
-ABSURD = 1e9
+DIVERGED = 1e9
 """Displacements by the size of the model beyond which a motion has lost its stability."""
 OFF_SUPPORT = 1e-6
-"""Share of the largest displacement by which a moment may miss its supports."""
+"""Share of the largest displacement by which a state may miss its supports."""
 OFF_BALANCE = 1e-4
-"""Share of the largest force by which the accelerations of a moment may miss the balance."""
+"""Share of the largest force by which the accelerations of a state may miss the balance."""
 
 
 def _version(model: Structure) -> list[Any]:
-    """Return what must stay as it is while a transient of a model goes on; equal as long as it does."""
+    """Return what must stay as it is while a model moves in time; equal as long as it does."""
     return [model.version, model.supports.value_version, model.motion, *model.loads]
 
 
-class Transient:
+class TransientAnalysis:
     """A model that moves in time; made by `Model.transient`.
 
     Parameters
     ----------
     model : elements with density, supports, loads, and its motion if it has one.
-    scheme : `newmark()`, `hht()`, `bossak()`, `generalized_alpha()` or `CentralDifference()`.
-    displacement, velocity : (n, 3) at the time 0; at rest if not given, and as the supports say where they
-        hold.
+    integrator : such as `Newmark()` (if not given), `HHT()`, `Bossak()`, `GeneralizedAlpha()` or
+        `CentralDifference()`, or its name such as ``"hht"``.
+    displacement, velocity : (n, 3) in m and m/s at the time 0; at rest if not given, and as the supports say
+        where they hold.
     lumped : whether the mass stands in the nodes; central differences always lump it.
     rayleigh : α in 1/s and β in s of the damping α M + β K.
+    progress : called with the phase and the share done, 0 … 1, while the equations are made.
 
     Attributes
     ----------
     equations : the equations of motion.
+    integrator : the integrator.
     time, step : s, and number of steps taken.
     u, v, a : (3a,) of the nodes that elements use.
+
+    Raises
+    ------
+    InputError
+        An argument is wrong, or the displacement does not fit the supports.
+    MeshError, ModelError
+        The model is broken, or has what the integrator does not take.
 
     Examples
     --------
@@ -63,7 +71,7 @@ class Transient:
     >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
     >>> bar.fix("z-")
     >>> bar.add(kl.Traction("z+", (0, 0, 1e3)))
-    >>> top = [moment.u[:, 2].max() for moment in Transient(bar).march(dt=1e-3, steps=100)]
+    >>> top = [state.u[:, 2].max() for state in kl.integrate(bar.transient(), dt=1e-3, steps=100)]
     >>> print(f"{max(top):.2e} m, twice the static one")
     2.00e-03 m, twice the static one
     """
@@ -72,7 +80,7 @@ class Transient:
         self,
         model: Structure,
         *,
-        scheme: Implicit | CentralDifference | None = None,
+        integrator: ModelIntegrator | str | None = None,
         displacement: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         lumped: bool = False,
@@ -80,37 +88,33 @@ class Transient:
         progress: Progress | None = None,
     ) -> None:
         function_or_none(progress, "progress must be a function of a phase and a share")
-        self.scheme = newmark() if scheme is None else scheme
-        if not isinstance(self.scheme, (Implicit, CentralDifference)):
-            raise InputError(f"a scheme such as newmark() or CentralDifference() is needed; got {scheme!r}")
-        explicit = isinstance(self.scheme, CentralDifference)
-        self.progress = progress
-        self.equations = EquationsOfMotion(
-            model, lumped=flag(lumped, "lumped") or explicit, rayleigh=rayleigh, progress=progress
-        )
-        if explicit and self.equations.terms is not None:
-            raise ModelError("central differences do not take a motion of the material; use newmark()")
-        if explicit and model.supports.constraints:
-            raise ModelError("central differences do not take constraints; use newmark()")
+        chosen = Newmark() if integrator is None else integrator
+        self.integrator = INTEGRATORS[chosen]() if isinstance(chosen, str) else chosen
+        if not isinstance(self.integrator, ModelIntegrator):
+            raise InputError(f"an integrator such as Newmark() or its name is needed; got {integrator!r}")
+        lumped = flag(lumped, "lumped") or self.integrator.lumps_mass
+        e = EquationsOfMotion(model, lumped=lumped, rayleigh=rayleigh, progress=progress)
+        self.equations = e
+        self.integrator.check(e)
         self._version = _version(model)
         self._critical, self._of_mesh = self._critical_rate()
         self._watching = self._critical < np.inf
         self._watch_rate(0.0)
-        self.time, self.step = 0.0, 0
-        rest = np.zeros((self.equations.system.n_nodes, 3))
+        self.time, self.step, self.parts = 0.0, 0, 1
+        rest = np.zeros((e.system.n_nodes, 3))
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
         self.v = self._nodal(rest if velocity is None else velocity, "the initial velocity")
-        self._untouched = True
-        self._imbalance_then: float | None = None  # of a moment that was put and has not gone on yet
-        course = at_start(self.equations)
+        self._restored: State | None = None  # which has not gone on yet
+        self._limit = DIVERGED * float(np.ptp(e.system.points, axis=0).max())
+        held = at_start(e)
         if displacement is not None:
-            self._check_supports(self.u, course[0], "the initial displacement")
-        elif jump := float(np.abs(prescribed_part(self.equations, course[0])).max(initial=0.0)):
-            self.equations.warnings.append(
+            self._check_supports(self.u, held[0], "the initial displacement")
+        elif jump := float(np.abs(prescribed_part(e, held[0])).max(initial=0.0)):
+            e.warnings.append(
                 f"supports are displaced by {jump:g} m at the start of a model at rest, which is struck: "
                 "give the displacement of model.solve(), or let them move from 0"
             )
-        self._start(*course)
+        self._start(*held)
 
     def _start(self, u: Array, v: Array, a: Array) -> None:
         """Take over what is prescribed at the start, and find the first acceleration."""
@@ -141,79 +145,72 @@ class Transient:
         force = e.load(time) - e.times_damping(self.v, time) - e.times_stiffness(self.u, time)
         return e.solver(time, 1.0, 0.0, 0.0)(force, prescribed)
 
-    # ---- marching --------------------------------------------------------------------------------
+    # ---- steps -----------------------------------------------------------------------------------
 
-    def march(
-        self,
-        dt: float,
-        steps: int,
-        *,
-        every: int = 1,
-        until: Callable[[Moment], bool] | None = None,
-    ) -> Iterator[Moment]:
-        """Advance and yield moments.
+    def critical_step(self) -> float:
+        """Return the longest stable step.
+
+        Returns
+        -------
+        float, s; infinite for implicit integrators.
+        """
+        return self.integrator.critical_step(self.equations)
+
+    def prepare(self, h: float, parts: int) -> None:
+        """Make ready for steps; `kratos_lite.integrate` does.
 
         Parameters
         ----------
-        dt : step in s, > 0.
-        steps : number of steps.
-        every : a moment is yielded after so many steps, and after the last.
-        until : function of a moment; the march ends when it is true.
+        h : step in s.
+        parts : substeps into which each is divided.
 
         Raises
         ------
         InputError
-            A number is wrong, or the step is beyond the stability of central differences.
-        SolveError
-            The matrix of a step is singular, or the motion is no longer finite.
+            Parts are longer than the critical step.
+        ModelError
+            The model has changed.
         """
-        function_or_none(until, "until must be a function of a moment")
-        h, steps, every = positive_step(dt), whole_number(steps, "steps"), whole_number(every, "every")
-        if self._version != _version(self.equations.model):
-            raise ModelError("the model has changed since this transient was made; make a new one and put()")
-        if isinstance(self.scheme, CentralDifference):
-            self._check_stable(h)
-        self.equations.step = h
-        if self._untouched and self.equations.model.supports.motions:
-            self._start(*at_start(self.equations, h))
-        elif self._imbalance_then is not None:
-            self._settle()
-        self._untouched = False
-        return self._moments(h, steps, every, until)
+        e = self.equations
+        if self._version != _version(e.model):
+            raise ModelError(
+                "the model has changed since this transient was made; make a new one and restore the state"
+            )
+        check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
+        e.step, self.parts = h / parts, parts
+        if not self.step and e.model.supports.motions:
+            self._start(*at_start(e, e.step))
+        elif self._restored is not None:
+            self._settle(self._restored)
+        self._restored = None
 
-    def _moments(
-        self,
-        h: float,
-        steps: int,
-        every: int,
-        until: Callable[[Moment], bool] | None,
-    ) -> Iterator[Moment]:
-        beyond = ABSURD * float(np.ptp(self.equations.system.points, axis=0).max())
-        for done in range(1, steps + 1):
+    def advance(self, h: float, count: int) -> None:
+        """Take steps; `kratos_lite.integrate` does.
+
+        Parameters
+        ----------
+        h : step in s.
+        count : their number.
+        """
+        part = h / self.parts
+        for _ in range(count):
+            now = self.u, self.v, self.a
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-                self.u, self.v, self.a = self._step((self.u, self.v, self.a), h)
+                for k in range(self.parts):
+                    now = self.integrator.step(self.equations, now, self.time + k * part, part)
             self._watch_rate(self.time + h)
+            self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
-            if done % every and done < steps:
-                continue
-            if not np.abs(self.u).max(initial=0.0) < beyond:  # nor is what is not a number
-                raise SolveError(
-                    f"the motion grows without bound: at t = {self.time:g} s it is beyond {ABSURD:g} times "
-                    "the size of the model; are the step and the rate stable, and all units SI?"
-                )
-            if self.progress:
-                self.progress("march", done / steps)
-            moment = self.moment()
-            yield moment
-            if until and until(moment):
-                return
 
-    def _step(self, now: Course, h: float) -> Course:
-        """Return displacement, velocity and acceleration a step later."""
-        if isinstance(self.scheme, CentralDifference):
-            return explicit_step(self.equations, now, self.time, h)
-        return implicit_step(self.equations, self.scheme, now, self.time, h)
+    def diverged(self) -> bool:
+        """Return whether the motion has lost its stability.
+
+        Returns
+        -------
+        bool : displacements are beyond the divergence limit, or no numbers.
+        """
+        return not np.abs(self.u).max(initial=0.0) < self._limit
 
     def _critical_rate(self) -> tuple[float, bool]:
         """Return the lowest critical rate, and whether it is that of the mesh; infinite without a motion."""
@@ -236,54 +233,51 @@ class Transient:
             if time:
                 _log.warning("%s", e.warnings[-1])
 
-    def _check_stable(self, h: float) -> None:
-        e = self.equations
-        omega = highest_frequency(e.system.points, e.system.groups, lumped=True)
-        alpha, beta = e.rayleigh
-        xi = alpha / (2 * omega) + beta * omega / 2
-        critical = 2 / omega * (np.sqrt(1 + xi * xi) - xi)
-        if h > critical * (1 + 1e-9):
-            raise InputError(
-                f"central differences are not stable with steps of {h:g} s: the critical step is "
-                f"{critical:.4g} s; take a shorter step or newmark()"
-            )
-
     # ---- what is known at the time ---------------------------------------------------------------
 
-    def moment(self) -> Moment:
-        """Return the model as it is now."""
-        system = self.equations.system
-        u, v, a = (system.scatter(x).copy() for x in (self.u, self.v, self.a))
-        left = self._left()
-        reactions = self.equations.model.supports.supported(system.scatter(left))
-        return Moment(self.time, self.step, u, v, a, reactions, self._free_part(left))
+    def state(self) -> State:
+        """Return the model as it is now.
 
-    def put(self, moment: Moment) -> None:
-        """Go on from a moment, such as `Moment.load` gives, of this model or of one that was held otherwise.
+        Returns
+        -------
+        State
+        """
+        left = self._left()
+        values = {name: self._whole(getattr(self, name)).copy() for name in "uva"}
+        values["reactions"] = self.equations.model.supports.supported(self._whole(left))
+        values["imbalance"] = np.array(self._free_part(left))
+        return State("model", str(self.integrator), self.time, self.step, values, self.parts)
+
+    def restore(self, state: State) -> None:
+        """Go on from a state, of this model or of one that was loaded or held otherwise.
+
+        Parameters
+        ----------
+        state : of a model of the same mesh; an acceleration that does not balance is found anew.
 
         Raises
         ------
         InputError
-            It is no moment, has another size, or does not lie where the supports hold the model at its time.
+            It is no state of a model, has another size, or does not lie where the supports hold the model at
+            its time.
         """
-        if not isinstance(moment, Moment):
-            raise InputError(f"a Moment is needed, such as Moment.load gives; got {type(moment).__name__}")
-        u, v, a = (self._nodal(getattr(moment, name), f"{name} of a moment") for name in "uva")
-        time, step = number(moment.time, "the time of a moment"), moment.step
+        if not isinstance(state, State) or state.kind != "model":
+            found = f"that of a {state.kind} body" if isinstance(state, State) else type(state).__name__
+            raise InputError(f"a State of a model is needed, such as kl.read_state gives; got {found}")
+        u, v, a = (self._nodal(getattr(state, name), f"{name} of a state") for name in "uva")
+        time, step = number(state.time, "the time of a state"), state.step
         if time < 0 or isinstance(step, bool) or not isinstance(step, (int, np.integer)) or step < 0:
-            raise InputError(f"a moment has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
-        self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the moment")
+            raise InputError(f"a state has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
+        self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the state")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
-        self._untouched, self._imbalance_then = not step, moment.imbalance
+        self._restored = state
 
-    def _settle(self) -> None:
-        """Balance the acceleration of a moment of another load, or of a scheme that does not balance it."""
+    def _settle(self, state: State) -> None:
+        """Balance the acceleration of a state of another integrator, or of another load."""
         left, largest = self._imbalance(self.u, self.v, self.a, self.time)
-        assert self._imbalance_then is not None
-        other = abs(left - self._imbalance_then) > OFF_BALANCE * largest
-        if other or (is_trapezoidal(self.scheme) and left > OFF_BALANCE * largest):
+        other = abs(left - float(state.values.get("imbalance", np.nan))) > OFF_BALANCE * largest
+        if other or state.integrator != str(self.integrator):
             self.a = self._balanced(prescribed_part(self.equations, self.a))
-        self._imbalance_then = None
 
     def _terms(self, u: Array, v: Array, a: Array, time: float) -> list[Array]:
         """Return M a, C v, K u and -f, (3a,) in N."""
@@ -306,39 +300,70 @@ class Transient:
         """Return the largest free component of forces (3a,)."""
         return float(np.abs(self.equations.system.reduced.reduce(forces)).max(initial=0.0))
 
-    def result(self, moment: Moment | None = None) -> Result:
-        """Return a moment, or now, as a `Result` with strains and stresses; its loads are those of that time.
+    def result(self, state: State | None = None) -> Result:
+        """Return a state as a result with strains and stresses.
 
-        The backward error of its report is what M a + C v + K u - f leaves on free nodes, relative; None for
-        schemes that do not take the balance at the end of a step.
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        Result
+            With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
+            on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, local, left = self.moment() if moment is None else moment, self.equations.system.gather, None
-        if is_trapezoidal(self.scheme):
+        at, local, left = self.state() if state is None else state, self.equations.system.gather, None
+        if self.integrator.balanced:
             free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
             left = free / largest if largest else 0.0
         critical = self._critical if self._of_mesh else None
-        return result_of(self.equations, at, self.scheme.name, left, critical)
+        return result_of(self.equations, at, str(self.integrator), left, critical)
 
     def reactions(self) -> Array:
-        """Return M a + C v + K u - f where supports or constraints act, (n, 3) in N; 0 elsewhere."""
-        return self.equations.model.supports.supported(self.equations.system.scatter(self._left()))
+        """Return the forces of supports and constraints on the model, M a + C v + K u - f.
 
-    def energy(self, moment: Moment | None = None) -> float:
-        """Return ½ v·M v + ½ u·K u in J, K with what the motion adds: constant without loads and damping.
-
-        It is that of now, or of a moment.
+        Returns
+        -------
+        (n, 3) float, N; 0 where nothing acts.
         """
-        e, (u, v, time) = self.equations, self._at(moment)
+        return self.equations.model.supports.supported(self._whole(self._left()))
+
+    def energy(self, state: State | None = None) -> float:
+        """Return ½ v·M v + ½ u·K u, K with what the motion adds: constant without loads and damping.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        float, J.
+        """
+        e, (u, v, time) = self.equations, self._at(state)
         return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
 
-    def material_velocity(self, moment: Moment | None = None) -> Array:
-        """Return the velocity of the material in space, now or at a moment; see `material_velocity`."""
-        e, (u, v, time) = self.equations, self._at(moment)
-        return e.system.scatter(velocity_of_material(e, u, v, time))
+    def material_velocity(self, state: State | None = None) -> Array:
+        """Return the velocity of the material in space; see `kratos_lite.material_velocity`.
 
-    def _at(self, moment: Moment | None) -> tuple[Array, Array, float]:
-        """Return u, v (3a,) and the time, of now or of a moment."""
-        if moment is None:
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        (n, 3) float, m/s.
+        """
+        e, (u, v, time) = self.equations, self._at(state)
+        return self._whole(velocity_of_material(e, u, v, time))
+
+    def _at(self, state: State | None) -> tuple[Array, Array, float]:
+        """Return u, v (3a,) and the time, of now or of a state."""
+        if state is None:
             return self.u, self.v, self.time
         local = self.equations.system.gather
-        return local(moment.u), local(moment.v), moment.time
+        return local(state.u), local(state.v), state.time
+
+    def _whole(self, x: Array) -> Array:
+        """Return vectors (3a,) as (n, 3) of all nodes."""
+        return np.asarray(self.equations.system.scatter(x))

@@ -17,7 +17,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.tables import has_positive_row_sums, tabulate
+from kratos_lite.elements.tables import lumped, tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 
@@ -120,7 +120,4 @@ def _element_masses(points: Array, group: ElementGroup) -> Array:
     if module is None:
         return group.at(points).lumped_mass(density)
     sums, diagonal = module.mass_sums(floats(points), *group.tables(rule))
-    scaled = diagonal * (sums.sum(axis=1) / diagonal.sum(axis=1))[:, None]
-    if has_positive_row_sums(group.element.shape, rule):
-        scaled = np.where((sums > 0).all(axis=1)[:, None], sums, scaled)
-    return density * scaled
+    return density * lumped(sums, diagonal, group.element.shape, rule)

@@ -17,10 +17,8 @@ from kratos_lite.bodies.conversion import convert
 from kratos_lite.bodies.equilibrium import find_equilibrium
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.bodies.loads import Callback, FollowerPressure, Force, Spring, Torque
-from kratos_lite.bodies.marching import march
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
-from kratos_lite.bodies.state import State
 from kratos_lite.time_series import TimeSeries
 
 __all__ = [
@@ -41,10 +39,8 @@ __all__ = [
     "RigidBody",
     "RigidLink",
     "Spring",
-    "State",
     "TimeSeries",
     "Torque",
     "convert",
     "find_equilibrium",
-    "march",
 ]

@@ -25,7 +25,7 @@ class AffineBody(Body):
 
     Parameters
     ----------
-    mesh, material, mass_properties, scheme, damping, tolerance : see `Body`.
+    mesh, material, mass_properties, integrator, damping, tolerance : see `Body`.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class AffineBody(Body):
         mesh: Mesh | None,
         material: Material | None,
         mass_properties: MassProperties,
-        scheme: str | None,
+        integrator: str | None,
         tolerance: float,
         damping: float = 0.0,
     ) -> None:
@@ -43,7 +43,7 @@ class AffineBody(Body):
         q[..., 9:] = mass_properties.center
         self.tolerance = tolerance
         u = np.zeros((*lead, self.dofs))
-        super().__init__(mesh, material, mass_properties, q, u, scheme, damping)
+        super().__init__(mesh, material, mass_properties, q, u, integrator, damping)
 
     @staticmethod
     @abstractmethod

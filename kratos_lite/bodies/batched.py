@@ -20,7 +20,7 @@ def together(bodies: Sequence[Body]) -> Body:
 
     Parameters
     ----------
-    bodies : single rigid, pseudo-rigid bodies or obstacles of one kind, scheme, damping and time, without
+    bodies : single rigid, pseudo-rigid bodies or obstacles of one kind, integrator, damping and time, without
         constraints and with constant loads.
 
     Raises
@@ -50,7 +50,7 @@ def together(bodies: Sequence[Body]) -> Body:
         whole = PseudoRigidBody(
             material=first.material,
             mass_properties=mass_properties,
-            scheme=first.scheme,
+            integrator=first.integrator,
             damping=first.damping,
             tolerance=first.tolerance,
         )
@@ -60,7 +60,7 @@ def together(bodies: Sequence[Body]) -> Body:
         kind = Obstacle if isinstance(first, Obstacle) else RigidBody
         whole = kind.__new__(kind)
         RigidBody.__init__(
-            whole, mass_properties=mass_properties, scheme=first.scheme, tolerance=first.tolerance
+            whole, mass_properties=mass_properties, integrator=first.integrator, tolerance=first.tolerance
         )
     whole.clock = Clock(first.time, first.step)
     whole.external_work = np.array([body.external_work for body in members])
@@ -75,14 +75,14 @@ def together(bodies: Sequence[Body]) -> Body:
 def _alike(members: Sequence[Body]) -> Body:
     """Return the first body; raise unless all others can advance with it."""
     if not members:
-        raise InputError("there is no body to march")
+        raise InputError("there is no body to advance")
     first = members[0]
     for row, body in enumerate(members):
         if not isinstance(body, (RigidBody, PseudoRigidBody)) or body.q.ndim != 1:
             raise ModelError(
                 f"body {row} is {body!r}: only single rigid and pseudo-rigid bodies advance together"
             )
-        for what in ("kind", "scheme", "damping", "time", "step"):
+        for what in ("kind", "integrator", "damping", "time", "step"):
             if getattr(body, what) != getattr(first, what):
                 raise InputError(
                     f"bodies that advance together need the same {what}: "
@@ -93,7 +93,7 @@ def _alike(members: Sequence[Body]) -> Body:
             raise ModelError(
                 f"body {row} has constraints or loads that change with the time, or as it turns, as the "
                 "moment of a spatial force off the mass center does; only bodies with constant loads advance "
-                "together: march it alone"
+                "together: integrate it alone"
             )
     if len({id(body) for body in members}) < len(members):
         raise InputError("a body stands twice among those to advance together")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,14 +39,14 @@ class Body(FreeBody):
     mesh, material : the shape and what it is made of, or None for a body given by its mass properties.
     mass_properties : mass, volume, mass center, Euler and inertia tensor.
     q, u : configuration and velocity at the start; their layout is that of the kind.
-    scheme : name of the time integration scheme, one of `schemes`; the default of the kind if None.
+    integrator : word of the time integrator, one of `integrators`; the first of them if None.
     damping : η ≥ 0 in s, viscous stress η C Ė (stiffness-proportional damping).
 
     Attributes
     ----------
     kind : name of the kind, as in input files.
     time, step : s, and number of steps taken.
-    tolerance : relative size of the last Newton step of an implicit scheme.
+    tolerance : relative size of the last Newton step of an implicit integrator.
     loads, constraints : what acts on the body.
     external_work : work of loads and reactions since the start, J.
     integrated_velocity : u as time integration left it, None before.  Where it is another one, or constraints
@@ -54,10 +55,11 @@ class Body(FreeBody):
     Raises
     ------
     InputError
-        The scheme or the damping is none of this kind.
+        The integrator or the damping is none of this kind.
     """
 
-    schemes: ClassVar[tuple[str, ...]] = ()
+    integrators: ClassVar[Mapping[str, str]] = {}
+    """Words for the time integrators that the kind has, the default first, and their names in Solfec."""
     convertible: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -72,7 +74,7 @@ class Body(FreeBody):
         mass_properties: MassProperties,
         q: Array,
         u: Array,
-        scheme: str | None,
+        integrator: str | None,
         damping: float = 0.0,
     ) -> None:
         super().__init__(mesh, material, mass_properties, q, u)
@@ -83,17 +85,8 @@ class Body(FreeBody):
         self.constraints: list[Constraint] = []
         self.integrated_velocity: Array | None = None
         self._constant: tuple[int, tuple[Array, Array, Array]] | None = None
-        self.scheme = self.default_scheme() if scheme is None else scheme
+        self.integrator = next(iter(self.integrators), "") if integrator is None else integrator
         self.damping = damping
-
-    @abstractmethod
-    def default_scheme(self) -> str:
-        """Return the scheme that is used if none is named.
-
-        Returns
-        -------
-        str
-        """
 
     def warnings(self) -> list[str]:
         """Return what is allowed, but may be a mistake; it is also logged when the body is made.
@@ -180,16 +173,17 @@ class Body(FreeBody):
         return self.center
 
     @property
-    def scheme(self) -> str:
-        """Name of the time integration scheme, one of `schemes`."""
-        return self._scheme
+    def integrator(self) -> str:
+        """Word of the time integrator, one of `integrators`; their names in Solfec are taken, too."""
+        return self._integrator
 
-    @scheme.setter
-    def scheme(self, name: str) -> None:
-        if name not in self.schemes:
-            known = ", ".join(self.schemes) or "none"
-            raise InputError(f"the schemes of a {self.kind} body are {known}; got {name!r}")
-        self._scheme = name
+    @integrator.setter
+    def integrator(self, name: str) -> None:
+        words = [word for word, alias in self.integrators.items() if name in (word, alias or word)]
+        if not words:
+            known = ", ".join(self.integrators) or "none"
+            raise InputError(f"the integrators of a {self.kind} body are {known}; got {name!r}")
+        self._integrator = words[0]
 
     @property
     def damping(self) -> float:
@@ -205,7 +199,7 @@ class Body(FreeBody):
 
     @property
     def tolerance(self) -> float:
-        """Relative size of the last Newton step of an implicit scheme, 0 … 1; 0 stands for round-off."""
+        """Relative size of the last Newton step of an implicit integrator, 0 … 1; 0 stands for round-off."""
         return self._tolerance
 
     @tolerance.setter
@@ -344,4 +338,4 @@ class Body(FreeBody):
 
     def __repr__(self) -> str:
         many = f"{len(self.q)} bodies, " if self.q.ndim > 1 else ""
-        return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.scheme})"
+        return f"{type(self).__name__}({many}{self.dofs} velocities, t = {self.time:g} s, {self.integrator})"

@@ -17,17 +17,18 @@ from kratos_lite.typing import Array
 class Deformable(Body):
     """A body whose configurations form a linear space: q + h u is one again.
 
-    ``DEF_EXP``: explicit, momenta exact, energy bounded, steps up to `critical_step`.
-    ``DEF_LIM``: linearly implicit; linear momentum exact, angular momentum to O(h⁴), not safe for a stiff
-    body that spins.  ``ENERGY_MOMENTUM``: implicit; energy and both momenta exact whatever the step.
+    Its integrators are ``"explicit"``: momenta exact, energy bounded, steps up to `critical_step`;
+    ``"linearly_implicit"``: linear momentum exact, angular momentum to O(h⁴), not safe for a stiff body that
+    spins; ``"energy_momentum"``: implicit, energy and both momenta exact whatever the step.  Solfec's
+    DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, name them, too.
     """
 
     jacobian_is_constant = True
-    schemes: ClassVar[tuple[str, ...]] = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
-
-    def default_scheme(self) -> str:
-        """Return ``ENERGY_MOMENTUM``."""
-        return "ENERGY_MOMENTUM"
+    integrators: ClassVar[Mapping[str, str]] = {
+        "energy_momentum": "ENERGY_MOMENTUM",
+        "linearly_implicit": "DEF_LIM",
+        "explicit": "DEF_EXP",
+    }
 
     def warnings(self) -> list[str]:
         """Return materials whose waves are so slow or quick that their units may be wrong."""
@@ -83,7 +84,7 @@ class Deformable(Body):
         """
 
     def critical_step(self) -> float:
-        """Return the largest step with which ``DEF_EXP`` is stable: 2/ω, and less with damping.
+        """Return the longest stable step of the explicit integrator: 2/ω, and less with damping.
 
         The damping force is that of the old velocity, so that h²ω²/2 + h η ω² must not exceed 2.
 

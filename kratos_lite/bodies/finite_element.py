@@ -47,9 +47,10 @@ class FiniteElementBody(Deformable):
         ``BC`` and ``BC-MODAL`` name them too.
     modes : number of modes for ``modal``.
     lumped : whether the mass stands in the nodes; the consistent mass is exact for rigid motions.
-    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` for ``total_lagrangian`` and ``DEF_LIM`` for the others
-        if not given.
+    integrator : one of `Deformable.integrators`; ``energy_momentum`` for ``total_lagrangian`` and
+        ``linearly_implicit`` for the others if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------
@@ -76,7 +77,7 @@ class FiniteElementBody(Deformable):
         formulation: str = "total_lagrangian",
         modes: int | None = None,
         lumped: bool = False,
-        scheme: str | None = None,
+        integrator: str | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-16,
     ) -> None:
@@ -92,16 +93,14 @@ class FiniteElementBody(Deformable):
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
         self.formulation = FORMULATIONS[formulation](self.points, self.groups, self._mass, modes)
-        self.schemes = self.formulation.schemes  # type: ignore[misc]
+        self.integrators = {  # type: ignore[misc]
+            word: alias for word, alias in self.integrators.items() if word not in self.formulation.without
+        }
         self._located: dict[bytes, Located] = {}
         self._known: dict[bytes, tuple[Ints, Array]] = {}
         super().__init__(
-            mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), scheme, damping
+            mesh, material, mass_properties, np.zeros(self.dofs), np.zeros(self.dofs), integrator, damping
         )
-
-    def default_scheme(self) -> str:
-        """Return the most robust scheme that the formulation has."""
-        return self.formulation.schemes[0]
 
     # ---- motion ----------------------------------------------------------------------------------
 

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.bodies import steps
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, transposed
@@ -38,8 +37,9 @@ class PseudoRigidBody(AffineBody, Deformable):
     mesh : the shape; may be left out where mass_properties are given.
     material : one material (a body of several has no single C).
     mass_properties : mass, volume, center and Euler tensor in place of those of mesh and material.
-    scheme : one of `Deformable`; ``ENERGY_MOMENTUM`` if not given.
+    integrator : one of `Deformable.integrators`; ``energy_momentum`` if not given.
     damping : η in s.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class PseudoRigidBody(AffineBody, Deformable):
         material: Material | None = None,
         *,
         mass_properties: MassProperties | None = None,
-        scheme: str | None = None,
+        integrator: str | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-12,
     ) -> None:
@@ -78,7 +78,7 @@ class PseudoRigidBody(AffineBody, Deformable):
             mass_properties = mass_properties_of(mesh, material)
         mass_properties.check_deformable()
         self.C = material.C
-        super().__init__(mesh, material, mass_properties, scheme, tolerance, damping)
+        super().__init__(mesh, material, mass_properties, integrator, tolerance, damping)
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -192,20 +192,6 @@ class PseudoRigidBody(AffineBody, Deformable):
     def mass_solver(self) -> Solve:
         """Return what solves M x = b; see `Body`."""
         return self.solver(self.q, 0.0)
-
-    def step_free(self, h: float, count: int) -> None:
-        """Take steps under constant loads alone, all at once.
-
-        Parameters
-        ----------
-        h : length of a step in s.
-        count : number of steps.
-        """
-        acceleration, spatial, _ = self.constant_loads()
-        constant = (*self.step_constants(), acceleration, spatial)
-        steps.pseudo_steps(
-            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
-        )
 
     def step_constants(self) -> tuple[Array, Array, Array, Array, float]:
         """Return what steps take.

@@ -5,13 +5,13 @@ Source: Solfec-1.0 theory, rigid bodies.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.bodies import steps
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.linear_algebra import Solve, apply, transposed
 from kratos_lite.bodies.rotations import axial, check_rotation, hat, polar, rotation_of
@@ -36,8 +36,10 @@ class RigidBody(AffineBody):
     material : its density counts.
     mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
         many bodies at once.
-    scheme : ``RIG_NEG`` (spatial angular momentum exact, energy decays), ``RIG_POS`` (energy grows) or
-        ``RIG_IMP`` (momentum exact, symmetric in time).
+    integrator : ``momentum_conserving`` (explicit, spatial angular momentum exact, energy decays; if not
+        given), ``explicit`` (energy grows) or ``implicit`` (momentum exact, symmetric in time); Solfec's
+        RIG_NEG, RIG_POS and RIG_IMP name them, too.
+    tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
     ------
@@ -56,7 +58,11 @@ class RigidBody(AffineBody):
     kind = "rigid"
     dofs = 6
     takes_torques = True
-    schemes: ClassVar[tuple[str, ...]] = ("RIG_NEG", "RIG_POS", "RIG_IMP")
+    integrators: ClassVar[Mapping[str, str]] = {
+        "momentum_conserving": "RIG_NEG",
+        "explicit": "RIG_POS",
+        "implicit": "RIG_IMP",
+    }
 
     def __init__(
         self,
@@ -64,18 +70,14 @@ class RigidBody(AffineBody):
         material: Material | None = None,
         *,
         mass_properties: MassProperties | None = None,
-        scheme: str | None = None,
+        integrator: str | None = None,
         tolerance: float = 1e-14,
     ) -> None:
         if mass_properties is None:
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its mass_properties")
             mass_properties = mass_properties_of(mesh, material)
-        super().__init__(mesh, material, mass_properties, scheme, tolerance)
-
-    def default_scheme(self) -> str:
-        """Return ``RIG_NEG``."""
-        return "RIG_NEG"
+        super().__init__(mesh, material, mass_properties, integrator, tolerance)
 
     # ---- motion ----------------------------------------------------------------------------------
 
@@ -154,19 +156,6 @@ class RigidBody(AffineBody):
         spin = apply(self.mass_properties.inertia, v[..., :3])
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
-    def step_free(self, h: float, count: int) -> None:
-        """Take steps under constant loads alone, all at once.
-
-        Parameters
-        ----------
-        h : length of a step in s.
-        count : number of steps.
-        """
-        constant = (*self.step_constants(), *self.constant_loads())
-        steps.rigid_steps(
-            self.q, self.u, *constant, h, count, self.scheme, self.tolerance, self.external_work
-        )
-
     def step_constants(self) -> tuple[Array, Array, Array]:
         """Return what steps take.
 
@@ -217,13 +206,13 @@ class Obstacle(RigidBody):
     >>> import kratos_lite as kl
     >>> floor = Obstacle(kl.box((10.0, 10.0, 0.1)))
     >>> floor.set_velocity(linear=(0.5, 0, 0))
-    >>> for state in kl.march(floor, dt=0.1, steps=20):
-    ...     pass
+    >>> *_, end = kl.integrate(floor, dt=0.1, steps=20)
     >>> floor.mass_center().round(12).tolist()
     [6.0, 5.0, 0.05]
     """
 
     kind = "obstacle"
+    integrators: ClassVar[Mapping[str, str]] = {"uniform": ""}
     convertible = False
 
     def __init__(self, mesh: Mesh, material: Material | None = None) -> None:
@@ -234,11 +223,6 @@ class Obstacle(RigidBody):
     def mass(self) -> Array:
         """Return 0: an obstacle carries no mass."""
         return np.zeros_like(self.mass_properties.mass)
-
-    def step_free(self, h: float, count: int) -> None:
-        """Move on with the velocity as it is; see `RigidBody.step_free`."""
-        for _ in range(count):
-            self.q[...] = steps.rigid_half(self.q, self.u, 2 * h)
 
     def times_mass(self, v: Array) -> Array:
         """Return zeros."""

@@ -20,8 +20,8 @@ from kratos_lite import voigt
 from kratos_lite.elements.tables import (
     cofactors,
     determinant,
-    has_positive_row_sums,
     lame_constants,
+    lumped,
     reference_products,
     tabulate,
 )
@@ -463,8 +463,5 @@ class KinematicLinear:
         (..., n) float, kg
         """
         m = self.scalar_mass(density)
-        sums, diagonal = m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1)
-        scaled = diagonal * (sums.sum(axis=-1) / diagonal.sum(axis=-1))[..., None]
-        if not has_positive_row_sums(self.shape, self.mass_rule):
-            return scaled
-        return np.where((sums > 0).all(axis=-1)[..., None], sums, scaled)
+        diagonal = np.diagonal(m, axis1=-2, axis2=-1)
+        return lumped(m.sum(axis=-1), diagonal, self.shape, self.mass_rule)

@@ -36,6 +36,17 @@ def has_positive_row_sums(shape: type[Shape], rule: Rule) -> bool:
     return bool((sums > 1e-9 * sums.max()).all())
 
 
+def lumped(sums: Array, diagonal: Array, shape: type[Shape], rule: Rule) -> Array:
+    """Return lumped masses (..., n) of row sums and diagonals (..., n) of mass matrices.
+
+    See `KinematicLinear.lumped_mass`.
+    """
+    scaled = diagonal * (sums.sum(axis=-1) / diagonal.sum(axis=-1))[..., None]
+    if not has_positive_row_sums(shape, rule):
+        return scaled
+    return np.where((sums > 0).all(axis=-1, keepdims=True), sums, scaled)
+
+
 def determinant(J: Array) -> Array:
     """Return det of (..., 3, 3)."""
     a, b, c = np.moveaxis(J, -1, 0)

@@ -22,7 +22,7 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
 
     >>> folder = getfixture("tmp_path")
     >>> write_arrays(folder / "a.npz", {"time": 2.0})
-    >>> float(read_arrays(folder / "a.npz", ["time"], "a moment")["time"])
+    >>> float(read_arrays(folder / "a.npz", ["time"], "a state")["time"])
     2.0
     """
     import zlib  # these two only where they are needed, for a quick start

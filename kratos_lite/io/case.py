@@ -13,10 +13,9 @@ from kratos_lite.typing import Array
 from kratos_lite.validation import flag, positive_step, whole_number
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import CentralDifference
+    from kratos_lite.analysis.integrators import ModelIntegrator
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
-    from kratos_lite.analysis.schemes import Implicit
     from kratos_lite.bodies import Body
 
 
@@ -44,7 +43,7 @@ class TimeIntegration:
     steps: int
     every: int = 1
     substeps: int | str = 1
-    integrator: Implicit | CentralDifference | None = None
+    integrator: ModelIntegrator | None = None
     rayleigh: tuple[float, float] = (0.0, 0.0)
     lumped: bool = False
     displacement: Array | None = None
@@ -60,7 +59,7 @@ class TimeIntegration:
         flag(self.lumped, "lumped")
 
     def __str__(self) -> str:
-        by = f" by {self.integrator.name}" if self.integrator else ""
+        by = f" by {self.integrator}" if self.integrator else ""
         return f"{self.steps} steps of {self.step:g} s{by}"
 
 

@@ -96,13 +96,13 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
-    """Write a result, a model or a mesh by the ending of `path`.
+    """Write a result, a state, a model or a mesh by the ending of `path`.
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk or .json; a model or a mesh to .mdpa, an .elem set, .vtu or a format of
-        meshio.
-    thing : a `Result`, `Model` or `Mesh`.
+    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or
+        a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
+    thing : a `Result`, `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
@@ -117,8 +117,10 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
+    from kratos_lite.analysis.state import State
     from kratos_lite.io.document import Document
     from kratos_lite.io.writers.results import write_result
+    from kratos_lite.io.writers.state import write_state
     from kratos_lite.mesh import Mesh
 
     if isinstance(thing, Result):
@@ -126,6 +128,9 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return []
     if mode is not None:
         raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
+    if isinstance(thing, State):
+        write_state(path, thing)
+        return []
     if isinstance(thing, Model):
         from kratos_lite.io.kratos.to_document import document_from
 
@@ -133,7 +138,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
         return write_document(path, Document(_with_named_sides(thing)) if isinstance(thing, Mesh) else thing)
-    raise InputError(f"a Result, Model or Mesh can be written; got {type(thing).__name__}")
+    raise InputError(f"a Result, State, Model or Mesh can be written; got {type(thing).__name__}")
 
 
 def _with_named_sides(mesh: Mesh) -> Mesh:

@@ -56,7 +56,7 @@ class LinearMaterial:
                     raise MaterialError(f"{self._name(item.name)} must be finite; got {value}")
         if self.density < 0:
             raise MaterialError(
-                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; turn gravity around instead"
+                f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
             )
         self.check()
 

@@ -70,7 +70,7 @@ class Located:
         Raises
         ------
         MeshError
-            One does not; the text says which, how far outside and which element is nearest.
+            If one does not; the text names it, its distance from the mesh and the nearest element.
         """
         outside = np.argwhere(~self.inside)
         if not len(outside):

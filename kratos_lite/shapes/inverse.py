@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import Shape
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 INSIDE = 1e-9
 """How far outside the reference cell a point still counts as inside, in reference coordinates."""
@@ -27,8 +27,8 @@ class Inverse(NamedTuple):
     """
 
     xi: Array
-    inside: NDArray[np.bool_]
-    converged: NDArray[np.bool_]
+    inside: Mask
+    converged: Mask
     iterations: int
 
 
@@ -105,7 +105,7 @@ def inverse_map(
 
 def _newton(
     shape: type[Shape], X: Array, p: Array, start: Array, tolerance: float, max_iterations: int
-) -> tuple[Array, NDArray[np.bool_], int]:
+) -> tuple[Array, Mask, int]:
     """Return xi (m, 3), whether Newton found it (m,), and the steps taken, for X (m, n, 3) and p (m, 3)."""
     small = 4e-15 * np.maximum(np.abs(X).max(axis=(1, 2)), np.abs(p).max(axis=1))
     xi = start.copy()
@@ -129,7 +129,7 @@ def _newton(
     return xi, converged, steps
 
 
-def _inside(shape: type[Shape], X: Array, xi: Array, digits: Array) -> NDArray[np.bool_]:
+def _inside(shape: type[Shape], X: Array, xi: Array, digits: Array) -> Mask:
     """Return whether xi (m, 3) lie in the reference cell, as far as the last digits of X (m, n, 3) tell."""
     outside = outside_by(shape.cell, xi)
     inside = outside <= INSIDE

@@ -13,7 +13,7 @@ from kratos_lite.typing import Array, Progress
 MAX_ITERATIONS = 1000
 """A multigrid that needs more than these does not converge."""
 STALLED = 200
-"""Nor does one that finds no smaller residual in as many iterations."""
+"""A multigrid that finds no smaller residual in as many iterations does not converge either."""
 
 
 PATIENCE, PATIENCE_FROM = 400, 60
@@ -86,7 +86,7 @@ def conjugate_gradients(
 
     It stops when |r| ≤ tolerance |b|, or when |r| reaches what round-off allows,
     2 eps (|A| |x| + |b|); and gives up when `STALLED` iterations bring no new smallest residual, or when
-    `go_on`, told |r| / |b|, says so.
+    `go_on`, called with |r| / |b|, returns False.
     Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
     """
     x, r = np.zeros_like(b), b.copy()

@@ -43,7 +43,7 @@ class Mass:
         lumped: bool,
         rule_of: Callable[[type[KinematicLinear]], Rule] = lambda element: element.mass_rule,
     ) -> None:
-        self._points, self._batches = points, groups
+        self._points, self._groups = points, groups
         self.lumped, self.pattern, self.rule_of = lumped, pattern, rule_of
 
     @cached_property
@@ -53,7 +53,7 @@ class Mass:
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        made = inertia_matrices(self._points, self._batches, self.pattern, "M", self.rule_of)
+        made = inertia_matrices(self._points, self._groups, self.pattern, "M", self.rule_of)
         n = self.pattern.n_nodes
         return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
 
@@ -61,7 +61,7 @@ class Mass:
     def nodal(self) -> Array:
         """Row sums (n,) in kg."""
         if self.lumped:
-            return inertia.lumped_mass(self._points, self._batches)
+            return inertia.lumped_mass(self._points, self._groups)
         return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:
@@ -87,6 +87,15 @@ class Mass:
         """Places of the diagonal blocks in the pattern."""
         rows = np.repeat(np.arange(self.pattern.n_nodes), np.diff(self.pattern.indptr))
         return np.flatnonzero(rows == self.pattern.indices)
+
+    @cached_property
+    def data(self) -> Array:
+        """Mass for each pair of nodes of the pattern, (nnz,) in kg."""
+        if not self.lumped:
+            return np.asarray(self.scalar.data)
+        data = np.zeros(len(self.pattern.indices))
+        data[self._diagonal] = self.nodal
+        return data
 
     def matrix(self) -> csr_array[Any, Any]:
         """Return the mass matrix of all components, (3n, 3n) in kg."""

@@ -29,7 +29,7 @@ DEGREE = 2
 RATIO = 12.0
 """Largest to smallest eigenvalue that a smoother has to damp."""
 STRENGTH = 0.005
-"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means unlike materials: the nodes do not aggregate."""
+"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
 
 
 class Solver(Protocol):
@@ -42,7 +42,7 @@ class Solver(Protocol):
     ) -> tuple[Array, int, bool]:
         """Return x, iterations and success; b and x (3n,) are zero at fixed components.
 
-        After each iteration `go_on` is told the residual, as a share of |b|, and may say stop.
+        After each iteration `go_on` is called with the residual as a share of |b|; False stops.
         """
 
 

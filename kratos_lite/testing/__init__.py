@@ -38,7 +38,16 @@ __all__ = [
 
 
 def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tuple[str, list[Finding]]:
-    """Return the name and the findings of an element class, a shape class or a material instance.
+    """Check an element class, a shape class or a material instance.
+
+    Parameters
+    ----------
+    subject : what to check.
+
+    Returns
+    -------
+    (str, list of Finding)
+        The name of the subject and one finding for each check.
 
     Raises
     ------

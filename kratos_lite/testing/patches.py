@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
@@ -13,7 +12,7 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.generators import SPLITS, box, raise_order
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.report import Measured
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask
 
 Element = type[KinematicLinear]
 
@@ -61,14 +60,14 @@ def assemble(element: Element, points: Array, nodes: Ints) -> Array:
     return K
 
 
-def solve(K: Array, fixed: NDArray[np.bool_], u: Array, f: Array) -> Array:
+def solve(K: Array, fixed: Mask, u: Array, f: Array) -> Array:
     """Return u (n, 3) with K u = f where `fixed` (n, 3) is False; elsewhere it keeps its values."""
     free, known = ~fixed.ravel(), u.ravel() * fixed.ravel()
     known[free] = np.linalg.solve(K[np.ix_(free, free)], (f.ravel() - K @ known)[free])
     return known.reshape(u.shape)
 
 
-def on_box(points: Array) -> NDArray[np.bool_]:
+def on_box(points: Array) -> Mask:
     """Return for each component whether its node lies on the boundary of the unit cube."""
     outer = ((points == 0) | (points == 1)).any(axis=1)
     return np.repeat(outer[:, None], 3, axis=1)

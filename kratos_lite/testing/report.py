@@ -66,6 +66,16 @@ class Finding:
 def failures(findings: Iterable[Finding]) -> list[Finding]:
     """Return the findings of checks that were run and did not pass.
 
+    Parameters
+    ----------
+    findings : those of one subject or several.
+
+    Returns
+    -------
+    list of Finding
+
+    Examples
+    --------
     >>> failures([Finding("rank", True, 0, 0, ""), Finding("patch", False, 1, 0, "why", skipped=True)])
     []
     """
@@ -73,8 +83,19 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def report(name: str, findings: list[Finding]) -> str:
-    """Return the text that counts all findings of `name` and shows the failures.
+    """Return the text that counts the findings of a subject and shows its failures.
 
+    Parameters
+    ----------
+    name : of the subject.
+    findings : those of its checks.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> print(report("Wedge6", [Finding("kronecker", True, 0.0, 1e-14, "")]))
     Wedge6 conforms: 1 check passed
     """

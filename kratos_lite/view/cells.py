@@ -24,6 +24,10 @@ def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:
     shape : the cell.
     points : (g, d) reference coordinates to mark.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+
     Raises
     ------
     InputError

@@ -45,6 +45,10 @@ def motion_figure(
     unit : of the curves.
     size : largest width and height in inches, at 150 dots per inch.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+
     Raises
     ------
     InputError

@@ -6,12 +6,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite
 from kratos_lite.view.canvas import color_bar, colors_of, lines, new_figure, polygons
 
@@ -54,6 +54,10 @@ def surface_figure(
     scale : factor on the displacement; by default at least 1, the largest being a tenth of the body.
     size : largest width and height in inches, at 150 dots per inch.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+
     Raises
     ------
     InputError
@@ -94,7 +98,7 @@ def _exaggeration(X: Array, u: Array) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
 
-def _facets(cell: str, n: int) -> tuple[Array, NDArray[np.intp]]:
+def _facets(cell: str, n: int) -> tuple[Array, Ints]:
     """Return grid points on a reference face, and the corners of its n² facets."""
     steps = np.linspace(0, 1, n + 1)
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)

@@ -236,9 +236,9 @@ def test_joined_ends_move_by_one_function(wheels):
     model.add(Translation("x", rate=1.0, boundaries="periodic"))
     way = kl.TimeSeries([0.0, 1.0], [0.0, 1e-3])
     model.fix("x-", "x", way)
-    *_, one = model.transient().march(1e-2, 5)
+    *_, one = kl.integrate(model.transient(), 1e-2, 5)
     model.fix("x+", "x", way)
-    *_, both = model.transient().march(1e-2, 5)
+    *_, both = kl.integrate(model.transient(), 1e-2, 5)
     np.testing.assert_allclose(both.u, one.u, atol=1e-16)
     for other in (0.0, kl.TimeSeries([0.0, 1.0], [0.0, 2e-3])):
         model.fix("x+", "x", other, override=True)

@@ -30,10 +30,10 @@ def test_frames_table_and_arrays_hold_each_moment(tmp_path):
     model = shaken_bar()
     transient = model.transient()
     endings = [kl.SeriesWriter(tmp_path / f"swing{ending}", transient) for ending in (".pvd", ".csv", ".npz")]
-    moments = [transient.moment()]
+    moments = [transient.state()]
     for series in endings:
         series.add()
-    for moment in transient.march(dt=0.01, steps=6, every=3):
+    for moment in kl.integrate(transient, dt=0.01, steps=6, every=3):
         moments.append(moment)
         for series in endings:
             series.add(moment)
@@ -65,9 +65,9 @@ def test_frames_table_and_arrays_hold_each_moment(tmp_path):
 
 def test_the_energy_of_an_earlier_moment_is_that_of_then():
     transient = shaken_bar().transient()
-    then = transient.moment()
+    then = transient.state()
     start = transient.energy()
-    list(transient.march(dt=0.01, steps=3))
+    list(kl.integrate(transient, dt=0.01, steps=3))
     assert transient.energy(then) == start
     assert transient.energy() > 10 * abs(start)
 
@@ -76,7 +76,7 @@ def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
     """A bar that has come to rest has the stress of statics; a moment has summary and files of results."""
     model = shaken_bar()
     transient = model.transient(rayleigh=(2 * model.modes(1)[0][0], 0.0))
-    *_, late = transient.march(dt=0.02, steps=600, every=600)
+    *_, late = kl.integrate(transient, dt=0.02, steps=600, every=600)
     static, result = model.solve(), transient.result(late)
     np.testing.assert_allclose(result.stress("node"), static.stress("node"), rtol=0, atol=1e-5 * 8e4)
     np.testing.assert_allclose(result.report.total_load, static.report.total_load, atol=1e-9)
@@ -91,7 +91,7 @@ def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
 def test_a_moment_is_drawn_deformed(tmp_path):
     pytest.importorskip("matplotlib")
     transient = shaken_bar().transient()
-    *_, moment = transient.march(dt=0.02, steps=5)
+    *_, moment = kl.integrate(transient, dt=0.02, steps=5)
     kl.draw(tmp_path / "bar.png", transient.equations.model.mesh, moment.u, moment.u[:, 0])
     assert (tmp_path / "bar.png").stat().st_size > 10_000
 
@@ -125,7 +125,7 @@ def test_a_clamp_carries_the_weight_of_a_bar_and_its_moment():
     np.testing.assert_allclose(moment, (0, -weight * 0.5, 0), atol=1e-9 * weight)
     # In motion: d/dt of the momentum is weight + reaction, here at the first moment, at rest but accelerated.
     transient = model.transient()
-    start = transient.moment()
+    start = transient.state()
     mass = transient.equations.mass.nodal
     force, _ = kl.reaction_resultant(model, start)
     np.testing.assert_allclose(mass @ start.a, np.array((weight, 0, 0)) + force, atol=1e-9 * weight)
@@ -167,8 +167,8 @@ def test_a_wave_that_stands_in_the_window_moves_with_it():
     transient = bar.transient(displacement=u, velocity=v)
     expected = np.tile([-3.0 * 1e-3, 0.5, 0.0], (len(u), 1))
     np.testing.assert_allclose(transient.material_velocity(), expected, atol=1e-12)
-    then = transient.moment()
-    list(transient.march(dt=1e-3, steps=2))
+    then = transient.state()
+    list(kl.integrate(transient, dt=1e-3, steps=2))
     np.testing.assert_allclose(transient.material_velocity(then), expected, atol=1e-12)
 
 

@@ -22,7 +22,7 @@ def body_of(kind, **options):
 def snapshot(body):
     return (
         *(body.q.tolist(), body.u.tolist(), body.time, body.step, np.array(body.external_work).tolist()),
-        *(len(body.loads), len(body.constraints), body.scheme),
+        *(len(body.loads), len(body.constraints), body.integrator),
     )
 
 
@@ -108,23 +108,27 @@ def test_an_inertia_that_no_deformable_body_has():
 
 
 @pytest.mark.parametrize(
-    ("kind", "scheme", "words"),
+    ("kind", "integrator", "words"),
     [
-        (kl.RigidBody, "DEF_EXP", "schemes of a rigid body are RIG_NEG, RIG_POS, RIG_IMP; got 'DEF_EXP'"),
-        (kl.PseudoRigidBody, "RIG_NEG", "schemes of a pseudo-rigid body are .*; got 'RIG_NEG'"),
-        (kl.FiniteElementBody, "DEF_IMP", "schemes of a finite-element body are .*; got 'DEF_IMP'"),
+        (
+            kl.RigidBody,
+            "DEF_EXP",
+            "of a rigid body are momentum_conserving, explicit, implicit; got 'DEF_EXP'",
+        ),
+        (kl.PseudoRigidBody, "RIG_NEG", "integrators of a pseudo-rigid body are .*; got 'RIG_NEG'"),
+        (kl.FiniteElementBody, "DEF_IMP", "integrators of a finite-element body are .*; got 'DEF_IMP'"),
     ],
 )
-def test_a_scheme_of_another_kind(kind, scheme, words, refused):
+def test_a_scheme_of_another_kind(kind, integrator, words, refused):
     with pytest.raises(kl.InputError, match=words):
-        body_of(kind, scheme=scheme)
-    refused(body_of(kind), lambda body: setattr(body, "scheme", scheme), kl.InputError, words)
+        body_of(kind, integrator=integrator)
+    refused(body_of(kind), lambda body: setattr(body, "integrator", integrator), kl.InputError, words)
 
 
 @pytest.mark.parametrize("formulation", ["corotational", "modal"])
 def test_energy_momentum_is_for_the_total_lagrangian_formulation(formulation):
-    with pytest.raises(kl.InputError, match="schemes of a finite-element body are DEF_LIM, DEF_EXP"):
-        body_of(kl.FiniteElementBody, formulation=formulation, scheme="ENERGY_MOMENTUM")
+    with pytest.raises(kl.InputError, match="of a finite-element body are linearly_implicit, explicit"):
+        body_of(kl.FiniteElementBody, formulation=formulation, integrator="ENERGY_MOMENTUM")
 
 
 @pytest.mark.parametrize(
@@ -267,7 +271,7 @@ def test_a_load_on_faces_of_a_body_without_a_mesh(load, refused):
 def test_callbacks_that_return_nonsense(kind, function, words, refused):
     body = body_of(kind)
     body.add(kl.Callback(function))
-    refused(body, lambda body: list(kl.march(body, 1e-4, 3)), kl.InputError, words)
+    refused(body, lambda body: list(kl.integrate(body, 1e-4, 3)), kl.InputError, words)
 
 
 def test_nothing_pushes_or_holds_an_obstacle(refused):
@@ -370,7 +374,7 @@ def test_constraints_that_contradict_each_other(kind, refused):
     body.set_velocity()
     body.constrain(kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), 1.0))
     body.constrain(kl.PrescribedVelocity((0, 0, 0), (1, 0, 0), 2.0))
-    refused(body, lambda body: list(kl.march(body, 1e-3, 2)), kl.SolveError, "they contradict each other")
+    refused(body, lambda body: list(kl.integrate(body, 1e-3, 2)), kl.SolveError, "they contradict each other")
 
 
 # ---- march -----------------------------------------------------------------------------------------
@@ -397,20 +401,20 @@ def test_constraints_that_contradict_each_other(kind, refused):
 )
 def test_marches_that_are_refused(kind, arguments, words, refused):
     arguments = {"dt": 1e-3, "steps": 3, **arguments}
-    refused(body_of(kind), lambda body: kl.march(body, **arguments), kl.InputError, words)
+    refused(body_of(kind), lambda body: kl.integrate(body, **arguments), kl.InputError, words)
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])
 def test_an_explicit_step_beyond_its_stability(kind, refused):
-    body = body_of(kind, scheme="DEF_EXP")
+    body = body_of(kind, integrator="DEF_EXP")
     critical = body.critical_step()
     refused(
         body,
-        lambda body: kl.march(body, 1.01 * critical, 10),
+        lambda body: kl.integrate(body, 1.01 * critical, 10),
         kl.InputError,
-        r"DEF_EXP is not stable with steps of .* s: the critical step is .*substeps='auto'",
+        r"the explicit integrator is not stable with steps of .* s: the critical step is .*substeps='auto'",
     )
-    states = list(kl.march(body, 5 * critical, 3, substeps="auto"))
+    states = list(kl.integrate(body, 5 * critical, 3, substeps="auto"))
     assert states[-1].step == 3
     assert states[-1].time == pytest.approx(15 * critical)
     assert np.isfinite(states[-1].q).all()
@@ -419,21 +423,21 @@ def test_an_explicit_step_beyond_its_stability(kind, refused):
 @pytest.mark.parametrize("value", [3, "body", None, {}, []])
 def test_something_that_is_no_body(value):
     with pytest.raises(kl.KratosLiteError):
-        list(kl.march(value, 1e-3, 3))
+        list(kl.integrate(value, 1e-3, 3))
 
 
 @pytest.mark.parametrize(
-    ("kind", "scheme"),
+    ("kind", "integrator"),
     [(kl.RigidBody, "RIG_NEG"), (kl.PseudoRigidBody, "DEF_LIM"), (kl.FiniteElementBody, "DEF_LIM")],
 )
-def test_a_motion_that_blows_up_stops(kind, scheme):
-    body = body_of(kind, scheme=scheme)
+def test_a_motion_that_blows_up_stops(kind, integrator):
+    body = body_of(kind, integrator=integrator)
     body.u[...] = 1e200
     with (
         pytest.raises(kl.SolveError, match=r"no longer finite|beyond all numbers"),
         np.errstate(all="ignore"),
     ):
-        list(kl.march(body, 1.0, 5))
+        list(kl.integrate(body, 1.0, 5))
 
 
 def test_the_acronyms_of_solfec_name_the_same_formulations():

@@ -5,21 +5,21 @@ import pytest
 
 import kratos_lite as kl
 
-SCHEMES = [
-    *((kl.RigidBody, scheme) for scheme in ("RIG_POS", "RIG_NEG", "RIG_IMP")),
-    *((kl.PseudoRigidBody, scheme) for scheme in ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")),
+INTEGRATORS = [
+    *((kl.RigidBody, integrator) for integrator in ("RIG_POS", "RIG_NEG", "RIG_IMP")),
+    *((kl.PseudoRigidBody, integrator) for integrator in ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")),
 ]
-each = pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
+each = pytest.mark.parametrize(("kind", "integrator"), INTEGRATORS)
 
 
-def herd(kind, scheme, count=5, damping=0.0):
+def herd(kind, integrator, count=5, damping=0.0):
     """Return bodies of unlike sizes, materials, loads and velocities."""
     rng, bodies = np.random.default_rng(8), []
     for i in range(count):
         mesh = kl.box(tuple(rng.uniform(0.5, 1.5, 3)))
         material = kl.Isotropic3D(E=1e5 * (1 + i), nu=0.1 * (i % 4), density=500.0 + 100 * i)
         options = {"damping": damping} if kind is kl.PseudoRigidBody else {}
-        body = kind(mesh, material, scheme=scheme, **options)
+        body = kind(mesh, material, integrator=integrator, **options)
         body.set_velocity(rng.uniform(-1, 1, 3), rng.uniform(-3, 3, 3))
         if i % 2:
             body.add(kl.Gravity((0, 0, -9.81)))
@@ -36,13 +36,13 @@ def herd(kind, scheme, count=5, damping=0.0):
 
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
 @each
-def test_each_moves_as_if_it_were_alone(kind, scheme, damping):
-    bodies, alone = herd(kind, scheme, damping=damping), herd(kind, scheme, damping=damping)
-    states = list(kl.march(bodies, 2e-3, 30, every=10))
+def test_each_moves_as_if_it_were_alone(kind, integrator, damping):
+    bodies, alone = herd(kind, integrator, damping=damping), herd(kind, integrator, damping=damping)
+    states = list(kl.integrate(bodies, 2e-3, 30, every=10))
     assert [state.step for state in states] == [10, 20, 30]
     assert states[-1].q.shape == (5, 12)
     for i, body in enumerate(alone):
-        for _ in kl.march(body, 2e-3, 30, every=30):
+        for _ in kl.integrate(body, 2e-3, 30, every=30):
             pass
         np.testing.assert_allclose(states[-1].q[i], body.q, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(bodies[i].q, body.q, rtol=1e-12, atol=1e-12)
@@ -54,13 +54,13 @@ def test_each_moves_as_if_it_were_alone(kind, scheme, damping):
 
 
 @each
-def test_they_march_again_together_or_alone(kind, scheme):
-    bodies, alone = herd(kind, scheme), herd(kind, scheme)
-    for _ in kl.march(bodies, 2e-3, 5):
+def test_they_march_again_together_or_alone(kind, integrator):
+    bodies, alone = herd(kind, integrator), herd(kind, integrator)
+    for _ in kl.integrate(bodies, 2e-3, 5):
         pass
-    for _ in kl.march(bodies, 2e-3, 5):
+    for _ in kl.integrate(bodies, 2e-3, 5):
         pass
-    for _ in kl.march(alone, 2e-3, 10):
+    for _ in kl.integrate(alone, 2e-3, 10):
         pass
     for one, other in zip(bodies, alone, strict=True):
         np.testing.assert_allclose(one.q, other.q, rtol=1e-13, atol=1e-13)
@@ -69,38 +69,41 @@ def test_they_march_again_together_or_alone(kind, scheme):
 
 def test_one_object_holds_many():
     many = kl.RigidBody(
-        mass_properties=kl.MassProperties.box([[1.0, 2, 3], [0.4, 0.6, 1]], [1.0, 1000.0]), scheme="RIG_IMP"
+        mass_properties=kl.MassProperties.box([[1.0, 2, 3], [0.4, 0.6, 1]], [1.0, 1000.0]),
+        integrator="RIG_IMP",
     )
     many.set_velocity([[1, 0, 0], [0, 1, 0]], [[0, 0, 2], [0.05, 10, 0.05]])
     many.add(kl.Gravity((0, 0, -9.81)))
     L, E = many.angular_momentum(), many.energy()
-    for _ in kl.march(many, 1e-3, 100, every=100):
+    for _ in kl.integrate(many, 1e-3, 100, every=100):
         pass
     assert many.q.shape == (2, 12)
     np.testing.assert_allclose(many.angular_momentum(), L, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(many.energy(), E, rtol=1e-6)
     np.testing.assert_allclose(many.mass_center()[:, 2], -9.81 * 0.01 / 2, rtol=1e-12)
-    single = kl.RigidBody(mass_properties=kl.MassProperties.box((0.4, 0.6, 1.0), 1000.0), scheme="RIG_IMP")
+    single = kl.RigidBody(
+        mass_properties=kl.MassProperties.box((0.4, 0.6, 1.0), 1000.0), integrator="RIG_IMP"
+    )
     single.set_velocity((0, 1, 0), (0.05, 10, 0.05))
     single.add(kl.Gravity((0, 0, -9.81)))
-    for _ in kl.march(single, 1e-3, 100, every=100):
+    for _ in kl.integrate(single, 1e-3, 100, every=100):
         pass
     np.testing.assert_allclose(many.q[1], single.q, rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize("scheme", ["DEF_LIM", "ENERGY_MOMENTUM"])
-def test_many_pseudo_rigid_bodies_keep_their_invariants(scheme):
+@pytest.mark.parametrize("integrator", ["DEF_LIM", "ENERGY_MOMENTUM"])
+def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
     rng = np.random.default_rng(1)
     many = kl.PseudoRigidBody(
         material=kl.Isotropic3D(1e6, 0.3, 1000.0),
         mass_properties=kl.MassProperties.box(rng.uniform(0.5, 1, (20, 3)), np.full(20, 1000.0)),
-        scheme=scheme,
+        integrator=integrator,
     )
     many.set_velocity(rng.uniform(-1, 1, (20, 3)), rng.uniform(-5, 5, (20, 3)))
     L, E = many.angular_momentum(), many.energy()
-    for _ in kl.march(many, 2e-3, 50, every=50):
+    for _ in kl.integrate(many, 2e-3, 50, every=50):
         pass
-    if scheme == "ENERGY_MOMENTUM":
+    if integrator == "ENERGY_MOMENTUM":
         np.testing.assert_allclose(many.energy(), E, rtol=1e-12)
         np.testing.assert_allclose(many.angular_momentum(), L, rtol=1e-11, atol=1e-11)
     assert many.external_work.shape == (20,)
@@ -110,9 +113,13 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(scheme):
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
-        (lambda bodies: bodies.clear(), kl.InputError, "there is no body to march"),
+        (lambda bodies: bodies.clear(), kl.InputError, "there is no body to advance"),
         (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body stands twice"),
-        (lambda b: setattr(b[1], "scheme", "RIG_IMP"), kl.InputError, "same scheme.*body 1 'RIG_IMP'"),
+        (
+            lambda b: setattr(b[1], "integrator", "RIG_IMP"),
+            kl.InputError,
+            "same integrator.*body 1 'implicit'",
+        ),
         (lambda b: setattr(b[1], "time", 3.0), kl.InputError, "need the same time"),
         (lambda b: b[1].constrain(kl.FixPoint(b[1].center)), kl.ModelError, "body 1 has constraints"),
         (
@@ -143,5 +150,5 @@ def test_bodies_that_cannot_advance_together(change, error, words):
     change(bodies)
     before = [body.q.tolist() for body in bodies if isinstance(body, kl.Body)]
     with pytest.raises(error, match=words):
-        list(kl.march(bodies, 1e-3, 3))
+        list(kl.integrate(bodies, 1e-3, 3))
     assert [body.q.tolist() for body in bodies if isinstance(body, kl.Body)] == before

@@ -14,7 +14,7 @@ PAIRS = [(a, b) for a in KINDS for b in KINDS]
 def spinning(brick, kind, steps=40):
     body = brick(kind, cells=(1, 2, 2))
     body.set_velocity(FLIGHT, SPIN)
-    for _ in kl.march(body, 1e-3, steps, every=steps):
+    for _ in kl.integrate(body, 1e-3, steps, every=steps):
         pass
     return body
 

@@ -76,7 +76,7 @@ def test_it_stays_at_rest_in_time():
     body.add(kl.Gravity((0, 0, -G)))
     kl.find_equilibrium(body)
     q = body.q.copy()
-    for _ in kl.march(body, 1e-3, 20, every=20):
+    for _ in kl.integrate(body, 1e-3, 20, every=20):
         pass
     np.testing.assert_allclose(body.q, q, atol=1e-12 * abs(EXACT))
 

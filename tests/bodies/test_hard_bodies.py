@@ -20,7 +20,7 @@ each_kind = pytest.mark.parametrize("kind", KINDS)
 
 def march(body, dt, steps, **options):
     """Return the last state."""
-    *_, last = kl.march(body, dt, steps, every=steps, **options)
+    *_, last = kl.integrate(body, dt, steps, every=steps, **options)
     return last
 
 
@@ -30,7 +30,7 @@ def march(body, dt, steps, **options):
 @pytest.mark.parametrize("damping", [1e-3, 2e-2])
 @pytest.mark.parametrize(("kind", "options"), SOFT)
 def test_automatic_steps_are_stable_with_damping(kind, options, damping):
-    body = kind(kl.box(), RUBBER, scheme="DEF_EXP", damping=damping, **options)
+    body = kind(kl.box(), RUBBER, integrator="DEF_EXP", damping=damping, **options)
     body.u += 1e-3 * np.random.default_rng(0).normal(size=body.u.shape)
     start = body.energy()
     march(body, 0.1, 10, substeps="auto")
@@ -41,7 +41,7 @@ def test_the_critical_step_with_damping_is_sharp():
     """The highest mode of a pseudo-rigid cube, shorter and longer than h²ω²/2 + h η ω² = 2."""
     ends = {}
     for share in (0.99, 1.02):
-        body = kl.PseudoRigidBody(kl.box(), RUBBER, scheme="DEF_EXP", damping=0.01)
+        body = kl.PseudoRigidBody(kl.box(), RUBBER, integrator="DEF_EXP", damping=0.01)
         h, omega = body.critical_step(), body.highest_frequency()
         assert h**2 * omega**2 / 2 + h * 0.01 * omega**2 == pytest.approx(2, rel=1e-12)
         body.u[[0, 4, 8]] = 1e-9  # breathing
@@ -67,7 +67,7 @@ def test_bodies_that_advanced_together_have_clocks_of_their_own(kind):
     march(one, 0.1, 2)
     assert (one.step, two.step) == (5, 3)
     assert two.time == pytest.approx(0.3)
-    kl.State.of(one).put_into(two)
+    kl.State.of(one).restore(two)
     one.time = 7.0
     assert two.time == pytest.approx(0.5)
 
@@ -83,22 +83,22 @@ def test_part_of_a_group_may_go_on():
 @pytest.mark.parametrize("substeps", [1.5, 0, None, float("nan"), float("inf"), [1], "some", True])
 def test_substeps_are_whole_numbers(kind, substeps):
     with pytest.raises(InputError, match="substeps must be a whole number"):
-        kl.march(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
+        kl.integrate(kind(kl.box(), RUBBER), 0.1, 1, substeps=substeps)
 
 
 # ---- loads that depend on the velocity -------------------------------------------------------------
 
-SCHEMES = [(kl.RigidBody, s) for s in kl.RigidBody.schemes] + [
-    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.schemes
+INTEGRATORS = [(kl.RigidBody, s) for s in kl.RigidBody.integrators] + [
+    (kind, s) for kind in KINDS[1:] for s in kl.PseudoRigidBody.integrators
 ]
 
 
-@pytest.mark.parametrize(("kind", "scheme"), SCHEMES)
-def test_a_damper_is_of_second_order(kind, scheme):
+@pytest.mark.parametrize(("kind", "integrator"), INTEGRATORS)
+def test_a_damper_is_of_second_order(kind, integrator):
     """m v̇ = -d v of a body that only slides: v = exp(-d t / m), x = (m/d)(1 - v)."""
     errors = []
     for steps in (500, 1000):
-        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, scheme=scheme)
+        body = kind(kl.box((0.2, 0.2, 0.2)), RUBBER, integrator=integrator)
         d = float(body.mass)
         body.set_velocity((1, 0, 0))
         body.add(kl.Spring(body.center, (-9, 0.1, 0.1), stiffness=0, damping=d))
@@ -129,7 +129,7 @@ WRONG = [
     (lambda b: setattr(b, "damping", -1.0), "a damping must be one number"),
     (lambda b: setattr(b, "tolerance", float("nan")), "a tolerance must be finite"),
     (lambda b: setattr(b, "tolerance", -1.0), "a tolerance must be one number"),
-    (lambda b: type(b)(b.mesh, b.material, scheme=""), "the schemes of a"),
+    (lambda b: type(b)(b.mesh, b.material, integrator=""), "the integrators of a"),
     (lambda b: type(b)("box.msh", b.material), "a Mesh is needed"),
     (lambda b: b.angular_momentum((1, 2)), r"three components|shape"),
 ]

@@ -148,7 +148,7 @@ def test_weight_that_changes_in_time_accelerates_by_its_integral(kind):
     body = block(kind)
     body.add(kl.Gravity((0, 0, -10.0)), amplitude=kl.TimeSeries([0, 0.1, 0.2], [0, 1, 0]))
     body.add(kl.Gravity((2.0, 0, 0)), amplitude=lambda t: 3 * t * t)
-    for _ in kl.march(body, 1e-3, 200, every=200):
+    for _ in kl.integrate(body, 1e-3, 200, every=200):
         pass
     np.testing.assert_allclose(
         body.linear_momentum() / body.mass, (2 * 0.2**3, 0, -1.0), rtol=1e-5, atol=1e-12

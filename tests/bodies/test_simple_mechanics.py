@@ -13,18 +13,18 @@ RIGID = ("RIG_POS", "RIG_NEG", "RIG_IMP")
 SOFT = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")
 BODIES = [(kl.RigidBody, s) for s in RIGID] + [(k, s) for k in KINDS[1:] for s in SOFT]
 each_kind = pytest.mark.parametrize("kind", KINDS)
-each_body = pytest.mark.parametrize(("kind", "scheme"), BODIES)
+each_body = pytest.mark.parametrize(("kind", "integrator"), BODIES)
 G = 9.81
 
 
-def cube(kind, scheme=None, side=0.2, E=1e6, density=1000.0, center=(0, 0, 0), **options):
+def cube(kind, integrator=None, side=0.2, E=1e6, density=1000.0, center=(0, 0, 0), **options):
     origin = tuple(np.array(center) - side / 2)
     mesh = kl.box((side,) * 3, origin=origin)
-    return kind(mesh, kl.Isotropic3D(E=E, nu=0.3, density=density), scheme=scheme, **options)
+    return kind(mesh, kl.Isotropic3D(E=E, nu=0.3, density=density), integrator=integrator, **options)
 
 
 def end(body, dt, steps):
-    for _ in kl.march(body, dt, steps, every=steps):
+    for _ in kl.integrate(body, dt, steps, every=steps):
         pass
     return body
 
@@ -77,21 +77,21 @@ def bar(kind, **options):
 
 
 @pytest.mark.parametrize(
-    ("kind", "scheme", "h", "error"),
-    [(kl.RigidBody, scheme, 2e-3, 1e-5) for scheme in RIGID]
+    ("kind", "integrator", "h", "error"),
+    [(kl.RigidBody, integrator, 2e-3, 1e-5) for integrator in RIGID]
     + [(kl.PseudoRigidBody, "ENERGY_MOMENTUM", 5e-3, 2e-3), (kl.PseudoRigidBody, "DEF_LIM", 1e-3, 2e-3)]
     + [(kl.FiniteElementBody, "ENERGY_MOMENTUM", 1e-2, 2e-3)],
 )
-def test_a_pinned_bar_is_released(kind, scheme, h, error):
+def test_a_pinned_bar_is_released(kind, integrator, h, error):
     """Hanging straight down it turns with 2.1156487 rad/s; a slender bar would with 2.1216848."""
-    body, pins = bar(kind, scheme=scheme)
+    body, pins = bar(kind, integrator=integrator)
     start = float(body.energy())
     inertia, arm = 0.01 * (0.01 + 1) / 12 + 0.01 * 0.25**2, 0.25
     exact = np.sqrt(2 * 0.01 * 9.8 * arm * (1 - np.cos(np.radians(30))) / inertia)
     assert exact == pytest.approx(2.1156487, rel=1e-8)
     tilt, angles, rates = np.radians(30), [0.0], [0.0]
     top = np.array([0, 0, 0.5])
-    for _ in kl.march(body, h, int(1.0 / h)):
+    for _ in kl.integrate(body, h, int(1.0 / h)):
         z, v = body.position(top) - (0, 0, -0.25), body.velocity(top)
         angles.append(np.arctan2(z[1], z[2]))
         rates.append((z[2] * v[1] - z[1] * v[2]) / (z @ z))
@@ -108,20 +108,20 @@ PERIOD = 2.3606811980
 
 
 @pytest.mark.parametrize(
-    ("kind", "scheme", "h"),
-    [(kl.RigidBody, scheme, PERIOD / 400) for scheme in RIGID]
-    + [(kl.PseudoRigidBody, scheme, PERIOD / 400) for scheme in SOFT[1:]]
-    + [(kl.FiniteElementBody, scheme, PERIOD / 200) for scheme in SOFT[1:]]
+    ("kind", "integrator", "h"),
+    [(kl.RigidBody, integrator, PERIOD / 400) for integrator in RIGID]
+    + [(kl.PseudoRigidBody, integrator, PERIOD / 400) for integrator in SOFT[1:]]
+    + [(kl.FiniteElementBody, integrator, PERIOD / 200) for integrator in SOFT[1:]]
     + [(kl.PseudoRigidBody, "DEF_EXP", PERIOD / 1000)],
 )
-def test_a_pendulum_released_from_the_level(kind, scheme, h):
-    body = cube(kind, scheme, side=0.04, E=2e4, center=(1, 0, 0))
+def test_a_pendulum_released_from_the_level(kind, integrator, h):
+    body = cube(kind, integrator, side=0.04, E=2e4, center=(1, 0, 0))
     link = kl.RigidLink((1, 0, 0), (0, 0, 0))
     body.constrain(link)
     body.add(kl.Gravity((0, 0, -(np.pi**2))))
     start = float(body.energy())
     m, x, longest = float(body.mass), [1.0], 0.0
-    for _ in kl.march(body, h, round(1.02 * PERIOD / h)):
+    for _ in kl.integrate(body, h, round(1.02 * PERIOD / h)):
         p = body.position(np.array([1.0, 0, 0]))
         longest = max(longest, abs(np.linalg.norm(p) - 1))
         x.append(float(p[0]))
@@ -151,8 +151,8 @@ def test_the_link_of_a_pendulum_pulls_with_three_weights_at_the_lowest_point():
 
 
 @each_body
-def test_a_fixed_direction_leaves_the_others_free(kind, scheme):
-    body = cube(kind, scheme)
+def test_a_fixed_direction_leaves_the_others_free(kind, integrator):
+    body = cube(kind, integrator)
     corners = body.mesh.points
     feet = corners[corners[:, 2] < 0]
     rail = kl.FixDirection(feet, (0, 0, 2.0))
@@ -191,36 +191,36 @@ def test_reactions_are_those_of_statics(kind):
 
 
 @each_body
-def test_a_prescribed_displacement_is_met_at_every_step(kind, scheme):
-    body = cube(kind, scheme)
+def test_a_prescribed_displacement_is_met_at_every_step(kind, integrator):
+    body = cube(kind, integrator)
     corners = body.mesh.points
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 0.004, 0.001])
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (0, 0, 1), path))
     body.constrain(kl.PrescribedDisplacement(corners[[0, 1, 2, 3]], (1, 0, 0), lambda t: t * t))
-    for state in kl.march(body, 1e-3, 60):
+    for state in kl.integrate(body, 1e-3, 60):
         moved = body.position(corners[:4]) - corners[:4]
         np.testing.assert_allclose(moved[:, 2], path(state.time), atol=1e-13)
         np.testing.assert_allclose(moved[:, 0], state.time**2, atol=1e-13)
 
 
 @each_body
-def test_a_prescribed_velocity_is_met_at_every_step(kind, scheme):
-    body = cube(kind, scheme)
+def test_a_prescribed_velocity_is_met_at_every_step(kind, integrator):
+    body = cube(kind, integrator)
     corner = body.mesh.points[[0, 6]]
     path = kl.TimeSeries([0, 0.02, 0.05], [0.0, 2.0, -1.0])
     body.constrain(kl.PrescribedVelocity(corner, (0, 3, 4), path))
-    for state in kl.march(body, 1e-3, 60):
+    for state in kl.integrate(body, 1e-3, 60):
         np.testing.assert_allclose(body.velocity(corner) @ [0, 0.6, 0.8], path(state.time), atol=1e-12)
 
 
 @each_body
-def test_a_prescribed_acceleration_adds_up(kind, scheme):
-    body = cube(kind, scheme)
+def test_a_prescribed_acceleration_adds_up(kind, integrator):
+    body = cube(kind, integrator)
     body.set_velocity((0.5, 0, 0))
     body.constrain(
         kl.PrescribedAcceleration(body.mesh.points[:4], (1, 0, 0), kl.TimeSeries([0, 0.04], [0, 8.0]))
     )
-    for state in kl.march(body, 1e-3, 60):
+    for state in kl.integrate(body, 1e-3, 60):
         t = state.time
         gained = 100 * t * t if t < 0.04 else 0.16 + 8 * (t - 0.04)
         np.testing.assert_allclose(body.velocity(body.mesh.points[:4])[:, 0], 0.5 + gained, rtol=1e-11)
@@ -270,11 +270,11 @@ def test_work_of_reactions_counts():
 
 
 @each_body
-def test_a_spring_swings_with_its_frequency(kind, scheme):
-    body = cube(kind, scheme, E=2e6)
+def test_a_spring_swings_with_its_frequency(kind, integrator):
+    body = cube(kind, integrator, E=2e6)
     k = 8.0 * (2 * np.pi) ** 2  # 1 Hz
     body.add(kl.Spring((0, 0, 0), (0, 0, 1), k, length=0.9))
-    h = 1e-2 if scheme != "DEF_EXP" else 1e-3
+    h = 1e-2 if integrator != "DEF_EXP" else 1e-3
     count = round(1 / h)
     start = float(body.energy())
     end(body, h, count // 2)
@@ -319,16 +319,16 @@ def test_a_spring_of_your_own_law():
 
 
 @each_body
-def test_external_work_is_the_gain_of_energy(kind, scheme):
-    """Dead loads do their work to the last digit where the scheme keeps the energy by itself."""
-    body = cube(kind, scheme)
+def test_external_work_is_the_gain_of_energy(kind, integrator):
+    """Dead loads do their work to the last digit where the integrator keeps the energy by itself."""
+    body = cube(kind, integrator)
     body.add(kl.Gravity((0, 0, -G)))
     body.add(kl.Force((0.1, 0.1, 0.1), (50.0, 0, 20)), amplitude=kl.TimeSeries([0, 0.02, 0.04], [0, 1, 0]))
     body.set_velocity((1, 2, 3), (0.5, -1, 2))
     start = float(body.kinetic_energy() + body.internal_energy())
     end(body, 1e-3, 60)
     gain = float(body.kinetic_energy() + body.internal_energy()) - start
-    exact = scheme == "ENERGY_MOMENTUM"
+    exact = integrator == "ENERGY_MOMENTUM"
     assert body.external_work == pytest.approx(gain, rel=1e-10 if exact else 2e-2)
 
 

@@ -9,16 +9,20 @@ from kratos_lite.bodies.formulations import base
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
 
-def spinning(formulation, scheme, damping=0.0):
+def spinning(formulation, integrator, damping=0.0):
     body = kl.FiniteElementBody(
-        kl.box((0.4, 0.6, 1.0), (2, 3, 4)), RUBBER, formulation=formulation, scheme=scheme, damping=damping
+        kl.box((0.4, 0.6, 1.0), (2, 3, 4)),
+        RUBBER,
+        formulation=formulation,
+        integrator=integrator,
+        damping=damping,
     )
     body.set_velocity((1.0, 2.0, 3.0), (2.0, 10.0, 1.0))
     return body
 
 
 @pytest.mark.parametrize(
-    ("formulation", "scheme", "damping"),
+    ("formulation", "integrator", "damping"),
     [
         ("total_lagrangian", "DEF_LIM", 1e-3),
         ("total_lagrangian", "ENERGY_MOMENTUM", 0.0),
@@ -26,16 +30,16 @@ def spinning(formulation, scheme, damping=0.0):
         ("corotational", "DEF_LIM", 0.0),
     ],
 )
-def test_large_bodies_iterate_and_move_alike(formulation, scheme, damping, monkeypatch):
-    factorized = spinning(formulation, scheme, damping)
-    list(kl.march(factorized, 5e-3, 10))
+def test_large_bodies_iterate_and_move_alike(formulation, integrator, damping, monkeypatch):
+    factorized = spinning(formulation, integrator, damping)
+    list(kl.integrate(factorized, 5e-3, 10))
     monkeypatch.setattr(base, "FACTORIZED_MAX", 10)
     monkeypatch.setattr(base, "FACTORIZED_ONCE_MAX", 10)
     made = []
     iterated = base.Formulation._iterated
     monkeypatch.setattr(base.Formulation, "_iterated", lambda self, A: made.append(A) or iterated(self, A))
-    large = spinning(formulation, scheme, damping)
-    list(kl.march(large, 5e-3, 10))
+    large = spinning(formulation, integrator, damping)
+    list(kl.integrate(large, 5e-3, 10))
     assert made
     np.testing.assert_allclose(large.q, factorized.q, rtol=0, atol=1e-11)
     np.testing.assert_allclose(large.u, factorized.u, rtol=0, atol=1e-9)
@@ -47,7 +51,7 @@ def test_constant_matrices_are_factorized_once(monkeypatch):
     monkeypatch.setattr(base.Factorizer, "factorize", lambda self, A: made.append(A) or factorize(self, A))
     for formulation, count in (("corotational", 1), ("total_lagrangian", 7)):
         made.clear()
-        list(kl.march(spinning(formulation, "DEF_LIM"), 1e-3, 7))
+        list(kl.integrate(spinning(formulation, "DEF_LIM"), 1e-3, 7))
         assert len(made) == count
 
 
@@ -73,4 +77,4 @@ def test_nothing_is_integrated_over_the_volume_after_setup(kind, monkeypatch):
 
     monkeypatch.setattr(kl.KinematicLinear, "_jacobian", refuse)
     monkeypatch.setattr(kl.MassProperties, "of", refuse)
-    assert len(list(kl.march(body, 1e-3, 5))) == 5
+    assert len(list(kl.integrate(body, 1e-3, 5))) == 5

@@ -43,7 +43,7 @@ def test_a_summary_with_the_numbers(run, folder):
     done = run("solve", "box.json")
     assert (done.code, done.err) == (0, "")
     rows = done.rows
-    assert rows["body"] == "pseudo-rigid, 12 velocities, ENERGY_MOMENTUM"
+    assert rows["body"] == "pseudo-rigid, 12 velocities, energy_momentum"
     assert rows["mass"] == "240 kg"
     assert rows["time"] == "0 … 0.1 s, 20 steps"
     assert rows["linear momentum"] == f"(240, 480, {240 * (3 - 0.981):.6g}) kg m/s"
@@ -90,7 +90,7 @@ def test_all_outputs_of_a_scene_lie_beside_it(run, folder):
     assert done.out.count("written") == 5
     assert (folder / "inner" / "o.png").read_bytes()[:4] == b"\x89PNG"
     assert np.load(folder / "inner" / "o.npz")["step"].tolist() == [0, 5, 10, 15, 20]
-    assert kl.State.load(folder / "inner" / "end.npz").step == 20
+    assert kl.read_state(folder / "inner" / "end.npz").step == 20
 
 
 def test_options_win_over_the_scene(run, folder):
@@ -108,12 +108,12 @@ def test_a_restart_comes_to_the_same_end(run, folder):
     run("solve", "box.json", "-q", "--steps", "10", "--state", "half.npz")
     done = run("solve", "box.json", "--restart", "half.npz", "--steps", "10", "--state", "end.npz")
     assert done.rows["time"] == "0.05 … 0.1 s, 10 steps"
-    whole, end = kl.State.load("whole.npz"), kl.State.load("end.npz")
+    whole, end = kl.read_state("whole.npz"), kl.read_state("end.npz")
     assert (whole.time, whole.step) == (end.time, end.step)
     np.testing.assert_array_equal(whole.q, end.q)
     write(restart="half.npz")
     assert run("solve", "box.json", "--steps", "10", "--state", "again.npz", "-q").code == 0
-    np.testing.assert_array_equal(kl.State.load("again.npz").u, end.u)
+    np.testing.assert_array_equal(kl.read_state("again.npz").u, end.u)
 
 
 def test_a_restart_of_another_kind_is_refused(run, folder):
@@ -127,7 +127,9 @@ def test_an_explicit_step_that_is_too_long_is_refused_before_any_output(run, fol
     stiff = {"kind": "pseudo-rigid", "integrator": "DEF_EXP"}
     write(body=stiff, time={"step": 0.1, "steps": 5})
     for command in ("solve", "check"):
-        assert run(command, "box.json").refuses("DEF_EXP is not stable", "the critical step is 0.00584 s")
+        assert run(command, "box.json").refuses(
+            "explicit integrator is not", "the critical step is 0.00584 s"
+        )
     write(body=stiff, time={"step": 0.1, "steps": 5, "substeps": "auto"})
     assert run("solve", "box.json", "-q").code == 0
 
@@ -144,7 +146,7 @@ def test_what_exists_is_kept_when_a_march_fails(run, folder):
     assert done.code == 2
     assert "error: what a callback returns at t = 0.25 s must be finite" in done.err
     assert len((folder / "a.csv").read_text().splitlines()) == 4
-    assert kl.State.load("s.npz").step == 2
+    assert kl.read_state("s.npz").step == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
@@ -162,7 +164,7 @@ def test_ctrl_c_keeps_what_is_there(folder):
     index = re.findall(r'file="(\S+)"', (folder / "o.pvd").read_text())
     assert len(index) >= 4
     assert all((folder / name).exists() for name in index)
-    step = kl.State.load("end.npz").step
+    step = kl.read_state("end.npz").step
     again = subprocess.run(
         [*words[:5], "--restart", "end.npz", "--steps", "1"], capture_output=True, text=True, check=True
     )
@@ -173,7 +175,7 @@ def test_progress_is_shown_where_asked_for(run, folder):
     write(time={"step": 1e-4, "steps": 3000})
     done = run("solve", "box.json", "-q", "--progress")
     assert done.out == ""
-    assert re.search(r"\rmarch +\d+%", done.err)
+    assert re.search(r"\rintegrate +\d+%", done.err)
 
 
 def test_check_and_info(run, folder):
@@ -199,7 +201,7 @@ def test_a_script_is_a_scene(run, folder):
             "dt, steps, every = 0.1, 10, 5\n"
         )
     done = run("solve", "spin.py", "-o", "spin.csv")
-    assert done.rows["body"] == "rigid, 6 velocities, RIG_NEG"
+    assert done.rows["body"] == "rigid, 6 velocities, momentum_conserving"
     assert len((folder / "spin.csv").read_text().splitlines()) == 4
     assert run("check", "spin.py").out == "spin.py: rigid body, 10 steps of 0.1 s, no errors\n"
     assert "1000 kg" in run("info", "spin.py").out
@@ -228,7 +230,7 @@ def test_many_bodies_of_a_script(run, folder):
             "dt, steps = 0.1, 10\n"
         )
     done = run("solve", "many.py", "-o", "many.npz")
-    assert done.rows["body"] == "5 × rigid, 6 velocities, RIG_NEG"
+    assert done.rows["body"] == "5 × rigid, 6 velocities, momentum_conserving"
     assert done.rows["kinetic energy"] == "5 J"
     assert np.load("many.npz")["q"].shape == (11, 5, 12)
     assert run("solve", "many.py", "-o", "a.csv").refuses("a.csv: only a single body")

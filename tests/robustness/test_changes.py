@@ -105,3 +105,12 @@ def test_warnings_of_rules_come_once():
     same = [replace(group, rule=replace(group.rule, name="another")) for group in groups]
     (text,) = check_rules(model.mesh, groups + same)
     assert text.startswith("KinematicLinear3D8N with 1 Gauss points has 12 spurious zero-energy modes")
+
+
+def test_what_a_model_was_checked_with_cannot_be_changed_in_place():
+    model = pressed()
+    model.stress_free_at(np.zeros_like(model.mesh.points))
+    arrays = [model.mesh.points, model.mesh.blocks[0].nodes, model.prestress, model.initial_displacement]
+    for array in (*arrays, model.supports.fixed, model.supports.values):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1

@@ -134,7 +134,7 @@ class Constraint(ABC):
             The body is many bodies, or the constraint holds another one already.
         """
         if body.q.ndim > 1:
-            raise ModelError("a constraint holds a single body; march bodies with constraints one by one")
+            raise ModelError("a constraint holds a single body; integrate bodies with constraints one by one")
         if self._body is not None and self._body is not body:
             raise ModelError("this constraint holds another body already; make one for each body")
         if self._where is not None:

@@ -53,7 +53,8 @@ class Formulation(ABC):
 
     name: ClassVar[str]
     aliases: ClassVar[tuple[str, ...]] = ()
-    schemes: ClassVar[tuple[str, ...]]
+    without: ClassVar[tuple[str, ...]] = ()
+    """Integrators of deformable bodies that it does not have."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -138,13 +139,15 @@ class Formulation(ABC):
     def load_over(self, q: Array, dq: Array, damping: float) -> Array:
         """Return the load of the energy–momentum method; see `FiniteElementBody`."""
         raise ModelError(
-            f"the formulation {self.name} has no energy–momentum scheme; use formulation='total_lagrangian'"
+            f"the formulation {self.name} has no energy–momentum integrator; "
+            "use formulation='total_lagrangian'"
         )
 
     def increment_solver(self, q: Array, dq: Array, damping: float, c: float) -> Solve:
         """Return the solver of the energy–momentum method; see `FiniteElementBody`."""
         raise ModelError(
-            f"the formulation {self.name} has no energy–momentum scheme; use formulation='total_lagrangian'"
+            f"the formulation {self.name} has no energy–momentum integrator; "
+            "use formulation='total_lagrangian'"
         )
 
     def highest_frequency(self, q: Array) -> float:

@@ -26,7 +26,7 @@ class Corotational(Formulation):
 
     name = "corotational"
     aliases = ("BC",)
-    schemes = ("DEF_LIM", "DEF_EXP")
+    without = ("energy_momentum",)
 
     def __init__(
         self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None

@@ -14,7 +14,6 @@ class TotalLagrangian(Formulation):
 
     name = "total_lagrangian"
     aliases = ("TL",)
-    schemes = ("ENERGY_MOMENTUM", "DEF_LIM", "DEF_EXP")
 
     def load(self, q: Array) -> Array:
         """Return Σ F S grad N dV, (3n,) in N."""

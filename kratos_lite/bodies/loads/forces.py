@@ -101,7 +101,7 @@ class Spring(BodyLoad):
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
-                raise ModelError("a spring acts on single bodies; march them one by one")
+                raise ModelError("a spring acts on single bodies; integrate them one by one")
             y = body.position(X, q) - anchor
             distance = float(np.linalg.norm(y))
             direction = y / distance if distance > 0 else np.zeros(3)

@@ -62,7 +62,7 @@ class FollowerPressure(BodyLoad):
 
         def generalized(q: Array, u: Array, time: float) -> Array:
             if q.ndim > 1:
-                raise ModelError("a following pressure acts on single bodies; march them one by one")
+                raise ModelError("a following pressure acts on single bodies; integrate them one by one")
             return body.generalized_nodal_force(nodal(body.position(mesh.points, q)), q)
 
         return AppliedLoad(generalized)

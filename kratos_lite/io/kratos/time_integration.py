@@ -11,7 +11,7 @@ from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.settings import Settings
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 DYNAMIC = ("Dynamic", "dynamic")
 """Kratos' solver_type of what moves."""
@@ -41,9 +41,9 @@ def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeI
     )
 
 
-def _integrator(solver: Settings) -> Implicit:
+def _integrator(solver: Settings) -> ModelIntegrator:
     """Return the integrator that Kratos would take."""
-    from kratos_lite.analysis import bossak, newmark
+    from kratos_lite.analysis.integrators import Bossak, Newmark
 
     method = solver.text("time_integration_method", "implicit")
     if method != "implicit":
@@ -57,9 +57,9 @@ def _integrator(solver: Settings) -> Implicit:
     solver.expect(beta == 0.25, "newmark_beta", text)
     try:
         if kind == "newmark":
-            return newmark()
+            return Newmark()
         if kind == "bossak":
-            return bossak(solver.number("damp_factor_m", -0.3))
+            return Bossak(solver.number("damp_factor_m", -0.3))
     except InputError as error:
         raise solver.error("damp_factor_m", f"{solver.name('damp_factor_m')}: {error}") from None
     raise solver.error(

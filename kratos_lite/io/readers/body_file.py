@@ -181,12 +181,9 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
     owner, key = (settings, "body") if is_word else (section, "kind")
     kind = owner.placed(key, BODIES.__getitem__, owner.text(key))
     arguments = inspect.signature(kind).parameters
-    names = {"integrator": "scheme"}
-    options = [name for name in (*OPTIONS, "mass_properties") if names.get(name, name) in arguments]
+    options = [name for name in (*OPTIONS, "mass_properties") if name in arguments]
     section.check_keys(("kind", *options))
-    given: dict[str, Any] = {
-        names.get(name, name): OPTIONS[name](section, name) for name in OPTIONS if name in section
-    }
+    given: dict[str, Any] = {name: OPTIONS[name](section, name) for name in OPTIONS if name in section}
     if "mass_properties" in section:
         inner = section.section("mass_properties")
         given["mass_properties"] = section.placed("mass_properties", _mass_properties, inner, mesh, material)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,37 +16,27 @@ from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis import CentralDifference
-    from kratos_lite.analysis.schemes import Implicit
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 OF_MODELS = ("step", "steps", "every", "integrator", "rayleigh", "lumped", "restart")
 OF_BODIES = ("step", "steps", "every", "substeps")
-INTEGRATORS = {
-    "newmark": (0, 2),
-    "hht": (0, 1),
-    "bossak": (0, 1),
-    "generalized_alpha": (0, 1),
-    "central_difference": (0,),
-}
-"""How many numbers each integrator takes."""
 
 
-def integrator_of(name: str, numbers: list[float]) -> Implicit | CentralDifference:
+def integrator_of(name: str, numbers: list[float]) -> ModelIntegrator:
     """Return an integrator by its name and numbers; InputError for those that are none.
 
-    >>> integrator_of("hht", [-0.1]).name
+    >>> str(integrator_of("hht", [-0.1]))
     'hht(-0.1)'
     """
+    from kratos_lite.analysis.integrators import INTEGRATORS
+
     if name not in INTEGRATORS:
         hint = nearest(name, INTEGRATORS)
         raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
-    counts = INTEGRATORS[name]
+    make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
+    counts = sorted({0, len(fields(INTEGRATORS[name]))})  # type: ignore[arg-type]
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
-    from kratos_lite import analysis
-
-    make: Callable[..., Implicit | CentralDifference]
-    make = getattr(analysis, "CentralDifference" if name == "central_difference" else name)
     return make(*numbers)
 
 
@@ -99,7 +90,7 @@ def _whole(section: Settings, key: str, *default: int) -> int:
     return section.placed(key, whole_number, section.integer(key, *default), key)
 
 
-def _integrator(section: Settings) -> Implicit | CentralDifference:
+def _integrator(section: Settings) -> ModelIntegrator:
     value = section.values["integrator"]
     name, numbers = value, []
     if isinstance(value, Object) and len(value) == 1:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
-from kratos_lite.bodies import Body, State, march
+from kratos_lite.analysis import State, integrate
+from kratos_lite.bodies import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.series import SeriesWriter
+from kratos_lite.io.writers.state import read_state
 from kratos_lite.io.writers.trajectory import draw_trajectory
 from kratos_lite.typing import Array, Progress
 
@@ -23,12 +26,13 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
     body, time = case.body, case.time
     assert time is not None
     if time.restart is not None:
-        State.load(time.restart).put_into(body)
+        read_state(time.restart).restore(body)
     for path in case.outputs.results:
         SeriesWriter(path, body)
 
     def steps() -> Iterator[State]:
-        return march(body, time.step, time.steps, every=time.every, substeps=time.substeps, progress=progress)
+        options: dict[str, Any] = {"every": time.every, "substeps": time.substeps, "progress": progress}
+        return integrate(body, time.step, time.steps, **options)
 
     return body, placed(time, steps)
 
@@ -106,7 +110,7 @@ def rows_of(body: Body) -> list[tuple[str, str]]:
     """Return what a body is, as rows of a table."""
     formulation = f" {body.formulation.name}" if isinstance(body, FiniteElementBody) else ""
     many = f"{len(body.q)} × " if body.q.ndim > 1 else ""
-    rows = [("body", f"{many}{body.kind}{formulation}, {body.dofs} velocities, {body.scheme}")]
+    rows = [("body", f"{many}{body.kind}{formulation}, {body.dofs} velocities, {body.integrator}")]
     if body.mesh is not None:
         elements = ", ".join(f"{len(block)} {block.name}" for block in body.mesh.blocks if len(block))
         rows.append(("mesh", f"{body.mesh.n_nodes} nodes, {elements}"))

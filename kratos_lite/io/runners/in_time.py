@@ -11,6 +11,7 @@ import numpy as np
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, TimeIntegration
 from kratos_lite.io.writers.series import SeriesWriter, make_folder
+from kratos_lite.io.writers.state import write_state
 
 
 class Monitor(Protocol):
@@ -52,4 +53,4 @@ def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor:
 
 
 def _save(last: list[Any], path: str) -> None:
-    last[0].save(path)
+    write_state(path, last[0])

@@ -9,34 +9,38 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis import Moment, Transient
+from kratos_lite.analysis import State, TransientAnalysis, integrate
 from kratos_lite.analysis.result import vector
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import draw
+from kratos_lite.io.writers.state import read_state
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import NodalForces, TimeDependentLoad
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Progress
 
 
-def prepare(case: Case, progress: Progress | None = None) -> tuple[Transient, Iterator[Moment]]:
+def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnalysis, Iterator[State]]:
     """Return the transient of a case and its states, checked, without a step."""
     time = case.time
     assert time is not None
     names = ("integrator", "rayleigh", "lumped", "displacement", "velocity")
     given: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
-    given["scheme"] = given.pop("integrator")
     transient = case.model.transient(**given)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
-        transient = Transient(_held_at_first(transient), **given)
+        transient = TransientAnalysis(_held_at_first(transient), **given)
     if time.restart is not None:
-        transient.put(Moment.load(time.restart))
-    return transient, placed(time, lambda: transient.march(time.step, time.steps, every=time.every))
+        read_state(time.restart).restore(transient)
+
+    def steps() -> Iterator[State]:
+        return integrate(transient, time.step, time.steps, every=time.every, progress=progress)
+
+    return transient, placed(time, steps)
 
 
-def _held_at_first(transient: Transient) -> Structure:
+def _held_at_first(transient: TransientAnalysis) -> Structure:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
     inner = e.times_stiffness(transient.u, 0.0) + e.times_damping(transient.v, 0.0) - e.load(0.0)
@@ -49,7 +53,7 @@ def _held_at_first(transient: Transient) -> Structure:
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Take the steps of a model; its result is that of the end."""
     transient, states = prepare(case, progress)
-    start = transient.moment()
+    start = transient.state()
     summary, clock = _Summary(transient), perf_counter()
     follow(case, transient, start, states, summary)
     rows = summary.rows(case, perf_counter() - clock)
@@ -58,7 +62,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     return Outcome(case, rows, transient.result(summary.last))
 
 
-def _draw(path: str, mesh: Mesh, state: Moment) -> None:
+def _draw(path: str, mesh: Mesh, state: State) -> None:
     title = f"displacement at t = {state.time:g} s"
     draw(path, mesh, state.u, np.linalg.norm(state.u, axis=1), title=title, unit="m")
 
@@ -66,13 +70,13 @@ def _draw(path: str, mesh: Mesh, state: Moment) -> None:
 class _Summary:
     """What the summary says of a transient: its start, its last state and the one that moved farthest."""
 
-    def __init__(self, transient: Transient) -> None:
+    def __init__(self, transient: TransientAnalysis) -> None:
         self.transient, self.energy = transient, transient.energy()
         self.kept = 0
         self.largest, self.row = 0.0, 0
-        self.start = self.last = self.farthest = transient.moment()
+        self.start = self.last = self.farthest = transient.state()
 
-    def add(self, state: Moment) -> None:
+    def add(self, state: State) -> None:
         """Take a state."""
         self.last, self.kept = state, self.kept + 1
         length = np.linalg.norm(state.u, axis=1)
@@ -93,7 +97,7 @@ class _Summary:
             ("nodes", str(mesh.n_nodes)),
             ("elements", kinds),
             ("unknowns", str(len(e.system.reduced.free))),
-            ("integrator", self.transient.scheme.name + (", lumped mass" if e.mass.lumped else "")),
+            ("integrator", str(self.transient.integrator) + (", lumped mass" if e.mass.lumped else "")),
             ("time", span),
             ("largest displacement", f"{self.largest:.6e} m {where}"),
             ("energy", f"{self.energy:.6e} J at the start, {self.transient.energy():.6e} J at the end"),

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kratos_lite.analysis import Transient
-from kratos_lite.bodies import Body, State
-from kratos_lite.bodies.state import at
+from kratos_lite.analysis import State, TransientAnalysis
+from kratos_lite.analysis.state import at
+from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.writers.results import fields
 from kratos_lite.mesh import Mesh
@@ -115,12 +115,12 @@ class RecordedModel:
     columns: tuple[str, ...] = OF_MODELS
     names: tuple[str, ...] = ("time", "step", "u", "v", "a", "reactions")
 
-    def __init__(self, transient: Transient) -> None:
+    def __init__(self, transient: TransientAnalysis) -> None:
         self.transient = transient
 
     def now(self) -> Any:
         """Return the state of the model as it is now."""
-        return self.transient.moment()
+        return self.transient.state()
 
     def mesh(self) -> Mesh:
         """Return the mesh of the model."""
@@ -142,9 +142,9 @@ class RecordedModel:
         return {}
 
 
-def recorded(subject: Body | Transient, path: str | Path) -> Recorded:
+def recorded(subject: Body | TransientAnalysis, path: str | Path) -> Recorded:
     """Return what a subject offers; InputError for one that is no body and no transient."""
-    if isinstance(subject, Transient):
+    if isinstance(subject, TransientAnalysis):
         return RecordedModel(subject)
     if isinstance(subject, Body):
         return RecordedBody(subject, path)

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from kratos_lite.analysis import Transient
+from kratos_lite.analysis import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_arrays, write_whole
@@ -126,13 +126,13 @@ class SeriesWriter:
     >>> folder = getfixture("tmp_path")
     >>> with SeriesWriter(folder / "spin.pvd", body) as series:
     ...     series.add()
-    ...     for state in kl.march(body, dt=0.01, steps=20, every=10):
+    ...     for state in kl.integrate(body, dt=0.01, steps=20, every=10):
     ...         series.add(state)
     >>> sorted(path.name for path in folder.iterdir())
     ['spin.pvd', 'spin_00000.vtu', 'spin_00001.vtu', 'spin_00002.vtu']
     """
 
-    def __init__(self, path: str | Path, owner: Body | Transient, *, mode: str = "binary") -> None:
+    def __init__(self, path: str | Path, owner: Body | TransientAnalysis, *, mode: str = "binary") -> None:
         check_series(path)
         self.count = 0
         self._subject = recorded(owner, path)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite import view
-from kratos_lite.bodies import Body, State
+from kratos_lite.analysis import State
+from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.writers.pictures import save_figure
 from kratos_lite.io.writers.recorded import RecordedBody, check_single
@@ -58,7 +59,7 @@ def draw_trajectory(
     >>> import kratos_lite as kl
     >>> body = kl.PseudoRigidBody(kl.box(), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
     >>> body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
-    >>> draw_trajectory(getfixture("tmp_path") / "spin.png", body, kl.march(body, 0.01, 100, every=10))
+    >>> draw_trajectory(getfixture("tmp_path") / "spin.png", body, kl.integrate(body, 0.01, 100, every=10))
     """
     check_single(body, path)
     if body.mesh is None:

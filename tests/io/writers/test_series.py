@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.analysis.state import at
 from kratos_lite.bodies.rotations import exp
-from kratos_lite.bodies.state import at
 from kratos_lite.io.writers.recorded import OF_BODIES as COLUMNS
 
 RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
@@ -28,7 +28,7 @@ def test_frames_hold_the_motion_of_the_nodes(tmp_path, kind):
     body = thrown(kind)
     with kl.SeriesWriter(tmp_path / "fly.pvd", body) as series:
         series.add()
-        for state in kl.march(body, 0.01, 10, every=5):
+        for state in kl.integrate(body, 0.01, 10, every=5):
             series.add(state)
     names = [f"fly_0000{i}.vtu" for i in range(3)]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fly.pvd", *names]
@@ -50,7 +50,7 @@ def test_table_and_arrays_hold_each_state(tmp_path, kind):
         kl.SeriesWriter(tmp_path / "a.csv", body) as table,
         kl.SeriesWriter(tmp_path / "a.npz", body) as arrays,
     ):
-        states = list(kl.march(body, 0.01, 20, every=10))
+        states = list(kl.integrate(body, 0.01, 20, every=10))
         for state in states:  # the body is at the end already: each state is looked at as itself
             table.add(state)
             arrays.add(state)
@@ -78,7 +78,7 @@ def test_an_error_leaves_what_there_is(tmp_path, name):
 
     def stopped():
         with kl.SeriesWriter(tmp_path / name, body) as series:
-            for state in kl.march(body, 0.01, 100):
+            for state in kl.integrate(body, 0.01, 100):
                 series.add(state)
                 if state.step == 3:
                     raise KeyboardInterrupt
@@ -119,7 +119,7 @@ def test_no_state_no_file(tmp_path):
 def test_many_bodies_are_written_as_arrays_only(tmp_path):
     many = kl.RigidBody(mass_properties=kl.MassProperties.box([(1, 1, 1), (1, 2, 3)], density=1.0))
     with kl.SeriesWriter(tmp_path / "a.npz", many) as series:
-        for state in kl.march(many, 0.1, 3):
+        for state in kl.integrate(many, 0.1, 3):
             series.add(state)
     assert np.load(tmp_path / "a.npz")["q"].shape == (3, 2, 12)
     for name in ("a.csv", "a.pvd"):
@@ -144,7 +144,7 @@ def test_bad_targets_are_refused_at_once(tmp_path):
 def test_a_picture_shows_path_and_energies(tmp_path, kind):
     pytest.importorskip("matplotlib")
     body = thrown(kind)
-    kl.draw_trajectory(tmp_path / "a.svg", body, kl.march(body, 0.01, 20, every=2), title="a throw")
+    kl.draw_trajectory(tmp_path / "a.svg", body, kl.integrate(body, 0.01, 20, every=2), title="a throw")
     words = words_of(tmp_path / "a.svg")
     assert {"a throw", "kinetic", "potential", "sum", "time in s", "energy in J"} <= set(words)
     assert ("internal" in words) == (kind is not kl.RigidBody)
@@ -167,11 +167,11 @@ def test_a_picture_of_one_state_has_no_curves(tmp_path):
 def test_a_picture_says_when_a_body_starts_and_ends(tmp_path):
     pytest.importorskip("matplotlib")
     body = thrown(kl.RigidBody)
-    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body), *kl.march(body, 0.01, 20)])
+    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body), *kl.integrate(body, 0.01, 20)])
     assert {"0 s", "0.2 s"} <= set(words_of(tmp_path / "a.svg"))
     body = kl.RigidBody(kl.box(), RUBBER)
     body.set_velocity(angular=(0, 0, 2 * np.pi))
-    states = [kl.State.of(body), *kl.march(body, 0.01, 100)]  # once around
+    states = [kl.State.of(body), *kl.integrate(body, 0.01, 100)]  # once around
     kl.draw_trajectory(tmp_path / "b.svg", body, states)
     assert "0 s and 1 s" in words_of(tmp_path / "b.svg")
 
@@ -181,7 +181,7 @@ def test_turning_points_are_among_the_positions_drawn():
 
     body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
     body.constrain(kl.PrescribedDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
-    q = [kl.State.of(body).q, *(state.q for state in kl.march(body, 0.01, 100))]
+    q = [kl.State.of(body).q, *(state.q for state in kl.integrate(body, 0.01, 100))]
     assert _telling(body, q, 4) == [0, 25, 75, 100]
     assert _telling(body, q[:1], 6) == [0]
     assert _telling(body, q, 1) == [100]
@@ -210,7 +210,7 @@ def test_a_body_is_turned_about_its_mass_center(kind):
 def test_a_body_comes_back_from_a_state():
     body = thrown(kl.PseudoRigidBody)
     start = kl.State.of(body)
-    *_, end = kl.march(body, 0.01, 5)
+    *_, end = kl.integrate(body, 0.01, 5)
     with at(body, start):
         assert body.time == 0.0
         np.testing.assert_array_equal(body.u, start.u)

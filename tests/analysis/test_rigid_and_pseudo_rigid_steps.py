@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from kratos_lite.bodies import steps
+from kratos_lite import native
+from kratos_lite.analysis.integrators import pseudo_rigid, rigid
 from kratos_lite.bodies.rotations import exp, hat
-from kratos_lite.bodies.steps import PSEUDO_SCHEMES, RIGID_SCHEMES
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 
@@ -17,7 +17,7 @@ NONE3, NONE6, NONE12 = np.zeros(3), np.zeros(6), np.zeros(12)
 def engine(request, monkeypatch):
     """Run a test with the compiled kernel and without it."""
     if request.param == "numpy":
-        monkeypatch.setattr(steps, "kernels", lambda name: None)
+        monkeypatch.setattr(native, "kernels", lambda name: None)
     elif kernels("motion") is None:
         pytest.skip("the compiled kernels were not built")
     return request.param
@@ -77,46 +77,48 @@ def energy_and_momentum(q, u, constant):
     return np.trace(rate @ E0 @ rate.T) / 2 + volume / 2 * E @ C @ E, L
 
 
-def top(h, scheme, time=1.0):
+def top(h, integrator, time=1.0):
     """Return q and u of a free top after a time, with its inertia."""
     q, u = np.zeros(12), np.array([8.0, 0.02, 0, 0, 0, 0])
     q[[0, 4, 8]] = 1
     J = np.diag([5.0, 10, 1])
     constant = (J, np.diag([0.2, 0.1, 1]), np.array(1.0))
-    steps.rigid_steps(q, u, *constant, NONE3, NONE6, NONE6, h, round(time / h), scheme)
+    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, h, round(time / h), integrator)
     return q, u, J
 
 
 TOP = """
-0.01   RIG_POS 1.06e-2  7.75e-4
-0.01   RIG_NEG 3.36e-2 -7.74e-4
-0.01   RIG_IMP 2.68e-3 -5.3e-7
-0.005  RIG_POS 2.6e-3   9.7e-5
-0.005  RIG_NEG 4.3e-3  -9.7e-5
-0.005  RIG_IMP 6.7e-4  -1.3e-7
-0.0025 RIG_POS 6.4e-4   1.2e-5
-0.0025 RIG_NEG 5.7e-4  -1.2e-5
-0.0025 RIG_IMP 1.7e-4  -3.3e-8
+0.01   explicit 1.06e-2  7.75e-4
+0.01   momentum_conserving 3.36e-2 -7.74e-4
+0.01   implicit 2.68e-3 -5.3e-7
+0.005  explicit 2.6e-3   9.7e-5
+0.005  momentum_conserving 4.3e-3  -9.7e-5
+0.005  implicit 6.7e-4  -1.3e-7
+0.0025 explicit 6.4e-4   1.2e-5
+0.0025 momentum_conserving 5.7e-4  -1.2e-5
+0.0025 implicit 1.7e-4  -3.3e-8
 """
 
 
 @pytest.fixture(scope="module")
 def rotation_at_one():
-    """Return the rotation of the free top at t = 1 by extrapolation of an even scheme of second order."""
+    """Return the rotation of the free top at t = 1 by extrapolation of an even integrator of second order."""
     h = 2.0**-14 if kernels("motion") else 2.0**-10
-    fine, coarse = (top(step, "RIG_IMP")[0][:9] for step in (h, 2 * h))
+    fine, coarse = (top(step, "implicit")[0][:9] for step in (h, 2 * h))
     return (4 * fine - coarse) / 3
 
 
-@pytest.mark.parametrize(("h", "scheme", "error", "drift"), [line.split() for line in TOP.split("\n")[1:-1]])
-def test_free_top_has_the_errors_of_its_scheme(h, scheme, error, drift, rotation_at_one):
-    q, u, J = top(float(h), scheme)
+@pytest.mark.parametrize(
+    ("h", "integrator", "error", "drift"), [line.split() for line in TOP.split("\n")[1:-1]]
+)
+def test_free_top_has_the_errors_of_its_scheme(h, integrator, error, drift, rotation_at_one):
+    q, u, J = top(float(h), integrator)
     assert np.linalg.norm(q[:9] - rotation_at_one) == pytest.approx(float(error), rel=0.05)
     assert u[:3] @ J @ u[:3] / 2 / 160.002 - 1 == pytest.approx(float(drift), rel=0.05)
 
 
-@pytest.mark.parametrize("scheme", ["RIG_NEG", "RIG_IMP"])
-def test_spatial_momentum_is_that_of_the_impulse(engine, scheme):
+@pytest.mark.parametrize("integrator", ["momentum_conserving", "implicit"])
+def test_spatial_momentum_is_that_of_the_impulse(engine, integrator):
     q, u, (J, inverse, mass) = rigid_bodies(20)
     torque, force, gravity = np.array([3.0, -2, 1]), np.array([1.0, 2, 3]), np.array([0, 0, -9.81])
 
@@ -125,7 +127,7 @@ def test_spatial_momentum_is_that_of_the_impulse(engine, scheme):
         return (R @ J @ u[:, :3, None])[..., 0], mass[:, None] * u[:, 3:]
 
     (angular, linear), spatial = momentum(), np.concatenate([torque, force])
-    steps.rigid_steps(q, u, J, inverse, mass, gravity, spatial, NONE6, 0.01, 100, scheme)
+    rigid.steps(q, u, J, inverse, mass, gravity, spatial, NONE6, 0.01, 100, integrator)
     after = momentum()
     np.testing.assert_allclose(after[0], angular + torque, rtol=0, atol=1e-12 * np.abs(angular).max())
     np.testing.assert_allclose(after[1], linear + force + mass[:, None] * gravity, rtol=0, atol=1e-12)
@@ -142,10 +144,10 @@ def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_
     start, vertical = energy(), (q[:9].reshape(3, 3).T @ J @ u[:3])[2]
     assert start == pytest.approx(1269.975005207, rel=1e-12)
     for _ in range(1111):
-        qh = steps.rigid_half(q, u, h)
+        qh = rigid.half_step(q, u, h)
         load = np.zeros(6)
         load[:3] = qh[:9].reshape(3, 3) @ (-20 * np.cross(qh[6:9], [0, 0, 1.0]))
-        steps.rigid_finish(q, u, qh, load, J, np.diag([0.2, 0.2, 1]), np.array(1.0), h, "RIG_IMP")
+        rigid.finish_step(q, u, qh, load, J, np.diag([0.2, 0.2, 1]), np.array(1.0), h, "implicit")
     assert energy() - start == pytest.approx(-1.53e-4, rel=0.05)
     assert (q[:9].reshape(3, 3).T @ J @ u[:3])[2] == pytest.approx(vertical, rel=1e-12)
 
@@ -153,11 +155,11 @@ def test_heavy_top_keeps_its_vertical_momentum_and_loses_as_little_energy_as_it_
 def test_work_of_a_constant_force_is_force_times_way(engine):
     q, u, constant = rigid_bodies(5)
     start, work, force = q[:, 9:].copy(), np.ones(5), np.array([0, 0, 0, 1.0, -2, 3])
-    steps.rigid_steps(q, u, *constant, NONE3, force, NONE6, 0.01, 50, "RIG_NEG", work=work)
+    rigid.steps(q, u, *constant, NONE3, force, NONE6, 0.01, 50, "momentum_conserving", work=work)
     np.testing.assert_allclose(work, 1 + (q[:, 9:] - start) @ force[3:], rtol=1e-13)
     q, u, constant = pseudo_bodies(5)
     start, work, load = q.copy(), np.ones(5), np.arange(12.0)
-    steps.pseudo_steps(q, u, *constant, NONE3, load, 0.01, 50, "DEF_LIM", work=work)
+    pseudo_rigid.steps(q, u, *constant, NONE3, load, 0.01, 50, "linearly_implicit", work=work)
     np.testing.assert_allclose(work, 1 + (q - start) @ load, rtol=1e-13)
 
 
@@ -168,7 +170,7 @@ def test_convected_loads_turn_with_the_body(engine):
     J = np.diag([1.0, 2, 4])
     constant = (J, np.linalg.inv(J), np.array(2.0), NONE3, NONE6)
     convected = np.array([3.0, 0, 0, 4, 0, 0])
-    steps.rigid_steps(q, u, *constant, convected, 0.01, 100, "RIG_NEG")
+    rigid.steps(q, u, *constant, convected, 0.01, 100, "momentum_conserving")
     axis = np.array([np.cos(1), np.sin(1), 0])
     np.testing.assert_allclose(u, [3, 0, 0, *(2 * axis)], atol=1e-13)
     np.testing.assert_allclose(q[9:], axis, atol=1e-13)
@@ -183,7 +185,7 @@ def test_energy_momentum_conserves_at_any_step(engine, young, h):
     q, u, constant = spinning_box(young)
     energy, L = energy_and_momentum(q, u, constant)
     for _ in range(5):
-        steps.pseudo_steps(q, u, *constant, NONE3, NONE12, h, 20, "ENERGY_MOMENTUM")
+        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 20, "energy_momentum")
         now, momentum = energy_and_momentum(q, u, constant)
         assert now == pytest.approx(energy, rel=1e-13)
         np.testing.assert_allclose(momentum, L, rtol=0, atol=1e-13 * np.linalg.norm(L))
@@ -194,7 +196,7 @@ def test_energy_momentum_conserves_at_any_step(engine, young, h):
 def test_a_stiff_body_conserves_over_long_times(young, h):
     q, u, constant = spinning_box(young)
     energy, L = energy_and_momentum(q, u, constant)
-    steps.pseudo_steps(q, u, *constant, NONE3, NONE12, h, 100_000, "ENERGY_MOMENTUM")
+    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 100_000, "energy_momentum")
     now, momentum = energy_and_momentum(q, u, constant)
     assert now == pytest.approx(energy, rel=1e-11)
     np.testing.assert_allclose(momentum, L, rtol=0, atol=1e-11 * np.linalg.norm(L))
@@ -205,7 +207,7 @@ def test_explicit_steps_keep_momentum_and_err_as_they_should(engine):
     energy, L = energy_and_momentum(q, u, constant)
     worst = 0
     for _ in range(200):
-        steps.pseudo_steps(q, u, *constant, NONE3, NONE12, 1e-3, 5, "DEF_EXP")
+        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1e-3, 5, "explicit")
         worst = max(worst, abs(energy_and_momentum(q, u, constant)[0] / energy - 1))
     assert worst == pytest.approx(4.8e-5, rel=0.1)
     np.testing.assert_allclose(
@@ -222,37 +224,37 @@ ROTATED = [
 
 
 SPINNING = """
-DEF_EXP         1e-3    1.7e-3
-DEF_EXP         1.25e-4 1.3e-5
-DEF_LIM         1e-3    2.20e-3
-DEF_LIM         2.5e-4  8.3e-5
-ENERGY_MOMENTUM 1e-3    2.16e-3
-ENERGY_MOMENTUM 2.5e-4  8.05e-5
+explicit         1e-3    1.7e-3
+explicit         1.25e-4 1.3e-5
+linearly_implicit         1e-3    2.20e-3
+linearly_implicit         2.5e-4  8.3e-5
+energy_momentum 1e-3    2.16e-3
+energy_momentum 2.5e-4  8.05e-5
 """
 
 
-@pytest.mark.parametrize(("scheme", "h", "error"), [line.split() for line in SPINNING.split("\n")[1:-1]])
-def test_spinning_box_has_the_errors_of_its_scheme(scheme, h, error):
+@pytest.mark.parametrize(("integrator", "h", "error"), [line.split() for line in SPINNING.split("\n")[1:-1]])
+def test_spinning_box_has_the_errors_of_its_scheme(integrator, h, error):
     q, u, constant = spinning_box(1e6)
-    steps.pseudo_steps(q, u, *constant, NONE3, NONE12, float(h), round(1 / float(h)), scheme)
+    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, float(h), round(1 / float(h)), integrator)
     assert np.linalg.norm(q[:9].reshape(3, 3) - ROTATED) == pytest.approx(float(error), rel=0.05)
 
 
-@pytest.mark.parametrize("scheme", ["DEF_LIM", "ENERGY_MOMENTUM"])
-def test_small_vibration_has_the_frequency_of_the_midpoint_rule(engine, scheme):
+@pytest.mark.parametrize("integrator", ["linearly_implicit", "energy_momentum"])
+def test_small_vibration_has_the_frequency_of_the_midpoint_rule(engine, integrator):
     """Breathing of a cube of 0.5 m: tan(w_d h/2) = w h/2."""
     omega, h, amplitude = 346.4101615137754, 2e-3, 1e-7
     q, u = np.zeros(12), np.zeros(12)
     q[[0, 4, 8]] = 1 + amplitude
     mass, volume = np.array(125.0), np.array(0.125)
     constant = (mass / 12 * 0.25 * np.eye(3), mass, volume, isotropic(1e6), np.array(0.0))
-    steps.pseudo_steps(q, u, *constant, NONE3, NONE12, h, 37, scheme)
+    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, h, 37, integrator)
     phase = 2 * np.arctan(omega * h / 2) * 37
     np.testing.assert_allclose((q[[0, 4, 8]] - 1) / amplitude, np.cos(phase), atol=1e-5)
 
 
-@pytest.mark.parametrize("scheme", PSEUDO_SCHEMES)
-def test_damping_stops_vibration_and_nothing_else(engine, scheme):
+@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+def test_damping_stops_vibration_and_nothing_else(engine, integrator):
     q, u, constant = spinning_box(1e6)
     constant = (*constant[:4], np.array(1e-3))
     q[:9] *= 1.01
@@ -260,119 +262,123 @@ def test_damping_stops_vibration_and_nothing_else(engine, scheme):
     u[9:] = 1, 2, 3
     seen = []
     for _ in range(10):
-        steps.pseudo_steps(q, u, *constant, NONE3, NONE12, 1e-4, 50, scheme)
+        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1e-4, 50, integrator)
         seen.append(energy_and_momentum(q, u, constant)[0])
     assert seen[-1] < 0.98 * energy
-    if scheme == "ENERGY_MOMENTUM":
+    if integrator == "energy_momentum":
         assert (np.diff([energy, *seen]) <= 0).all()
         np.testing.assert_allclose(energy_and_momentum(q, u, constant)[1], L, atol=1e-12 * np.linalg.norm(L))
     np.testing.assert_allclose(u[9:], [1, 2, 3], rtol=1e-15)
     np.testing.assert_allclose(q[9:], [0.05, 0.1, 0.15], rtol=1e-12)
 
 
-@pytest.mark.parametrize("scheme", PSEUDO_SCHEMES)
-def test_free_fall_of_a_deformable_body_is_exact(engine, scheme):
+@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+def test_free_fall_of_a_deformable_body_is_exact(engine, integrator):
     q, u, constant = pseudo_bodies(3)
     x, v, g = q[:, 9:].copy(), u[:, 9:].copy(), np.array([0, 1.0, -9.81])
-    steps.pseudo_steps(q, u, *constant, g, NONE12, 1e-3, 100, scheme)
+    pseudo_rigid.steps(q, u, *constant, g, NONE12, 1e-3, 100, integrator)
     np.testing.assert_allclose(q[:, 9:], x + 0.1 * v + 0.005 * g, rtol=0, atol=1e-13)
 
 
 # compiled against NumPy
 
 
-def run_rigid(scheme, n=37, count=20, h=0.01):
+def run_rigid(integrator, n=37, count=20, h=0.01):
     q, u, constant = rigid_bodies(n)
     rng, work = np.random.default_rng(5), np.zeros(n)
     loads = rng.standard_normal((n, 3)), rng.standard_normal((n, 6)), rng.standard_normal((n, 6))
-    steps.rigid_steps(q, u, *constant, *loads, h, count, scheme, work=work)
+    rigid.steps(q, u, *constant, *loads, h, count, integrator, work=work)
     return np.column_stack([q, u, work])
 
 
-def run_pseudo(scheme, n=37, count=20, h=0.01):
+def run_pseudo(integrator, n=37, count=20, h=0.01):
     q, u, constant = pseudo_bodies(n)
     rng, work = np.random.default_rng(6), np.zeros(n)
-    steps.pseudo_steps(q, u, *constant, NONE3 + 1, rng.standard_normal((n, 12)), h, count, scheme, work=work)
+    pseudo_rigid.steps(
+        q, u, *constant, NONE3 + 1, rng.standard_normal((n, 12)), h, count, integrator, work=work
+    )
     return np.column_stack([q, u, work])
 
 
-RUNS = [(run_rigid, scheme) for scheme in RIGID_SCHEMES] + [(run_pseudo, scheme) for scheme in PSEUDO_SCHEMES]
+RUNS = [(run_rigid, integrator) for integrator in rigid.METHODS] + [
+    (run_pseudo, integrator) for integrator in pseudo_rigid.METHODS
+]
 
 
 @compiled
-@pytest.mark.parametrize(("run", "scheme"), RUNS)
-def test_compiled_steps_are_those_of_numpy(run, scheme, monkeypatch):
-    found = run(scheme)
-    monkeypatch.setattr(steps, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run(scheme), rtol=0, atol=2e-13)
+@pytest.mark.parametrize(("run", "integrator"), RUNS)
+def test_compiled_steps_are_those_of_numpy(run, integrator, monkeypatch):
+    found = run(integrator)
+    monkeypatch.setattr(native, "kernels", lambda name: None)
+    np.testing.assert_allclose(found, run(integrator), rtol=0, atol=2e-13)
 
 
 @compiled
-@pytest.mark.parametrize("scheme", RIGID_SCHEMES)
-def test_compiled_steps_are_those_of_numpy_where_half_a_step_is_more_than_a_radian(scheme, monkeypatch):
+@pytest.mark.parametrize("integrator", rigid.METHODS)
+def test_compiled_steps_are_those_of_numpy_where_half_a_step_is_more_than_a_radian(integrator, monkeypatch):
     assert (np.linalg.norm(rigid_bodies(37)[1][:, :3], axis=1) * 0.25 / 2 > 1).any()
-    found = run_rigid(scheme, count=1, h=0.25)
-    monkeypatch.setattr(steps, "kernels", lambda name: None)
-    np.testing.assert_allclose(found, run_rigid(scheme, count=1, h=0.25), rtol=0, atol=2e-13)
+    found = run_rigid(integrator, count=1, h=0.25)
+    monkeypatch.setattr(native, "kernels", lambda name: None)
+    np.testing.assert_allclose(found, run_rigid(integrator, count=1, h=0.25), rtol=0, atol=2e-13)
 
 
 @compiled
-@pytest.mark.parametrize(("run", "scheme"), RUNS)
-def test_steps_do_not_depend_on_the_number_of_threads(run, scheme):
+@pytest.mark.parametrize(("run", "integrator"), RUNS)
+def test_steps_do_not_depend_on_the_number_of_threads(run, integrator):
     motion, results = kernels("motion"), []
     for count in (1, 2, 3, 5):
         motion.set_threads(count)
-        results.append(run(scheme, n=1100, count=3))
+        results.append(run(integrator, n=1100, count=3))
     motion.set_threads(2)
     for other in results[1:]:
         np.testing.assert_array_equal(other, results[0])
 
 
 @compiled
-@pytest.mark.parametrize("scheme", RIGID_SCHEMES)
-def test_one_body_moves_as_in_a_crowd(scheme):
+@pytest.mark.parametrize("integrator", rigid.METHODS)
+def test_one_body_moves_as_in_a_crowd(integrator):
     q, u, constant = rigid_bodies(1000)
     one, rate = q[437].copy(), u[437].copy()
     own = tuple(value[437].copy() for value in constant)
-    steps.rigid_steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 7, scheme)
-    steps.rigid_steps(one, rate, *own, NONE3, NONE6, NONE6, 0.01, 7, scheme)
+    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 7, integrator)
+    rigid.steps(one, rate, *own, NONE3, NONE6, NONE6, 0.01, 7, integrator)
     np.testing.assert_array_equal(one, q[437])
     np.testing.assert_array_equal(rate, u[437])
 
 
 @compiled
-@pytest.mark.parametrize("scheme", PSEUDO_SCHEMES)
-def test_one_deformable_body_moves_as_in_a_crowd(scheme):
+@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+def test_one_deformable_body_moves_as_in_a_crowd(integrator):
     q, u, constant = pseudo_bodies(1000)
     one, rate = q[437].copy(), u[437].copy()
     own = tuple(np.array(value[437]) for value in constant)
-    steps.pseudo_steps(q, u, *constant, NONE3, NONE12, 0.01, 7, scheme)
-    steps.pseudo_steps(one, rate, *own, NONE3, NONE12, 0.01, 7, scheme)
+    pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 0.01, 7, integrator)
+    pseudo_rigid.steps(one, rate, *own, NONE3, NONE12, 0.01, 7, integrator)
     np.testing.assert_array_equal(one, q[437])
     np.testing.assert_array_equal(rate, u[437])
 
 
-@pytest.mark.parametrize("scheme", RIGID_SCHEMES)
-def test_two_halves_are_a_step(engine, scheme):
+@pytest.mark.parametrize("integrator", rigid.METHODS)
+def test_two_halves_are_a_step(engine, integrator):
     q, u, constant = rigid_bodies(21)
     q2, u2 = q.copy(), u.copy()
     load = np.array([1.0, 2, 3, 4, 5, 6])
     spatial, convected = np.concatenate([NONE3, load[3:]]), np.concatenate([load[:3], NONE3])
     for _ in range(5):
-        steps.rigid_steps(q, u, *constant, NONE3, spatial, convected, 0.02, 1, scheme)
-        qh = steps.rigid_half(q2, u2, 0.02)
-        steps.rigid_finish(q2, u2, qh, np.tile(load, (21, 1)), *constant, 0.02, scheme)
+        rigid.steps(q, u, *constant, NONE3, spatial, convected, 0.02, 1, integrator)
+        qh = rigid.half_step(q2, u2, 0.02)
+        rigid.finish_step(q2, u2, qh, np.tile(load, (21, 1)), *constant, 0.02, integrator)
     np.testing.assert_array_equal(q, q2)
     np.testing.assert_array_equal(u, u2)
 
 
-@pytest.mark.parametrize("scheme", PSEUDO_SCHEMES)
-def test_one_step_is_the_first_of_many(engine, scheme):
+@pytest.mark.parametrize("integrator", pseudo_rigid.METHODS)
+def test_one_step_is_the_first_of_many(engine, integrator):
     q, u, constant = pseudo_bodies(21)
     q2, u2, load = q.copy(), u.copy(), np.arange(12.0)
-    steps.pseudo_steps(q, u, *constant, NONE3, load, 0.01, 2, scheme)
+    pseudo_rigid.steps(q, u, *constant, NONE3, load, 0.01, 2, integrator)
     for _ in range(2):
-        steps.pseudo_finish(q2, u2, np.tile(load, (21, 1)), *constant, 0.01, scheme)
+        pseudo_rigid.finish_step(q2, u2, np.tile(load, (21, 1)), *constant, 0.01, integrator)
     np.testing.assert_array_equal(q, q2)
     np.testing.assert_array_equal(u, u2)
 
@@ -382,8 +388,8 @@ def test_what_bodies_share_is_given_once(engine):
     first = tuple(value[0].copy() for value in constant)
     every = tuple(np.repeat(value[:1], 9, axis=0) for value in constant)
     q2, u2 = q.copy(), u.copy()
-    steps.rigid_steps(q, u, *first, NONE3, NONE6, NONE6, 0.01, 3)
-    steps.rigid_steps(q2, u2, *every, NONE3, NONE6, NONE6, 0.01, 3)
+    rigid.steps(q, u, *first, NONE3, NONE6, NONE6, 0.01, 3)
+    rigid.steps(q2, u2, *every, NONE3, NONE6, NONE6, 0.01, 3)
     np.testing.assert_array_equal(np.column_stack([q, u]), np.column_stack([q2, u2]))
 
 
@@ -392,8 +398,8 @@ def test_arrays_that_the_kernel_does_not_take_are_computed_all_the_same():
     wide = np.zeros((9, 24))
     wide[:, ::2] = q
     strided, u2 = wide[:, ::2], u.copy()
-    steps.rigid_steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 3)
-    steps.rigid_steps(strided, u2, *constant, NONE3, NONE6, NONE6, 0.01, 3)
+    rigid.steps(q, u, *constant, NONE3, NONE6, NONE6, 0.01, 3)
+    rigid.steps(strided, u2, *constant, NONE3, NONE6, NONE6, 0.01, 3)
     np.testing.assert_allclose(strided, q, rtol=0, atol=1e-13)
 
 
@@ -401,11 +407,11 @@ def test_arrays_that_the_kernel_does_not_take_are_computed_all_the_same():
 def test_wrong_shapes_are_refused():
     q, u, (J, inverse, mass) = rigid_bodies(9)
     with pytest.raises(ValueError, match=r"u must be \(N, 6\)"):
-        steps.rigid_half(q, u[:5], 0.01)
+        rigid.half_step(q, u[:5], 0.01)
     with pytest.raises(ValueError, match=r"q must be \(N, 12\)"):
-        steps.rigid_half(u, u, 0.01)
+        rigid.half_step(u, u, 0.01)
     with pytest.raises(ValueError, match="inertia must be"):
-        steps.rigid_steps(q, u, J[:4], inverse, mass, NONE3, NONE6, NONE6, 0.01, 1)
+        rigid.steps(q, u, J[:4], inverse, mass, NONE3, NONE6, NONE6, 0.01, 1)
 
 
 # what cannot be computed
@@ -417,21 +423,21 @@ def test_a_body_without_a_velocity_is_named(engine):
     q[:, :9] = np.eye(3).ravel()
     u[17, :9] = hat([0, 300.0, 10]).ravel()
     with pytest.raises(
-        SolveError, match=r"ENERGY_MOMENTUM: step number 10 of body 17, h = 1 s, failed: Newton"
+        SolveError, match=r"energy_momentum: step number 10 of body 17, h = 1 s, failed: Newton"
     ):
-        steps.pseudo_steps(q, u, *constant, NONE3, NONE12, 1.0, 20, "ENERGY_MOMENTUM")
+        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 1.0, 20, "energy_momentum")
 
 
 def test_a_motion_without_bounds_is_named(engine):
     q, u, constant = spinning_box(1e8)
     with pytest.raises(
-        SolveError, match=r"DEF_EXP: step number \d+, h = 0.1 s, failed: its velocity grew .* shorter"
+        SolveError, match=r"explicit: step number \d+, h = 0.1 s, failed: its velocity grew .* shorter"
     ):
-        steps.pseudo_steps(q, u, *constant, NONE3, NONE12, 0.1, 200, "DEF_EXP")
+        pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, 0.1, 200, "explicit")
 
 
 def test_an_implicit_rotation_without_a_velocity_is_named(engine):
     q, u, constant = rigid_bodies(12)
     u[5, :3] = np.nan
-    with pytest.raises(SolveError, match=r"RIG_IMP: step of body 5, h = 0.1 s, failed: Newton's method"):
-        steps.rigid_finish(q, u, steps.rigid_half(q, u, 0.1), np.zeros((12, 6)), *constant, 0.1, "RIG_IMP")
+    with pytest.raises(SolveError, match=r"implicit: step of body 5, h = 0.1 s, failed: Newton's method"):
+        rigid.finish_step(q, u, rigid.half_step(q, u, 0.1), np.zeros((12, 6)), *constant, 0.1, "implicit")

@@ -84,10 +84,10 @@ def by_hand(load=None, **options):
     model.fix("Bottom")
     if load is not None:
         model.add(load)
-    return list(model.transient(**options).march(dt=0.01, steps=20))
+    return list(kl.integrate(model.transient(**options), dt=0.01, steps=20))
 
 
-def test_the_scheme_damping_and_steps(write):
+def test_integrator_damping_and_steps(write):
     scene = read_case(write(*CLAMP, rayleigh_alpha=0.5, rayleigh_beta=1e-4))
     assert str(scene.time) == "20 steps of 0.01 s by bossak(-0.3)"
     assert scene.time.rayleigh == (0.5, 1e-4)
@@ -124,7 +124,7 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     assert forces[2] is not forces[1]
     assert forces[4] is forces[3]
     ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
-    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), scheme=kl.bossak())
+    expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), integrator=kl.Bossak())
     for one, other in zip(moments(scene), expected, strict=True):
         same(one, other)
 
@@ -142,7 +142,7 @@ def test_supports_that_move_with_t(write):
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom", "x", lambda t: 0.01 * t * t)
     model.fix("Bottom", "yz")
-    expected = list(model.transient(scheme=kl.bossak()).march(dt=0.01, steps=20))
+    expected = list(kl.integrate(model.transient(integrator=kl.Bossak()), dt=0.01, steps=20))
     same(moments(scene)[-1], expected[-1])
     assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
 
@@ -171,7 +171,7 @@ def test_a_support_that_changes_for_a_while_is_refused(write, value):
         read_case(path)
 
 
-def test_a_kratos_file_with_the_key_of_ours_is_no_march(write, run):
+def test_a_kratos_file_with_the_key_time_of_ours_stays_at_rest(write, run):
     path = write(*CLAMP)
     content = {**json.loads(path.read_text()), "time": {"step": 1.0, "steps": 2}}
     content["solver_settings"]["solver_type"] = "static"
@@ -204,7 +204,7 @@ def test_options_change_a_dynamic_run_file(write, run):
     model = kl.Model(kl.read("mesh.mdpa").mesh, kl.Isotropic3D(E=1e8, nu=0.2, density=2000.0))
     model.fix("Bottom")
     model.add(kl.Traction("Top", (1e5, 0.0, 0.0)), amplitude=lambda t: t)
-    *_, last = model.transient().march(dt=5e-3, steps=40)
+    *_, last = kl.integrate(model.transient(), dt=5e-3, steps=40)
     with np.load("end.npz") as file:
         np.testing.assert_allclose(file["u"][-1], last.u, rtol=0, atol=1e-10 * np.abs(last.u).max())
     assert "time        20 steps of 0.01 s by bossak(-0.3)" in run("info", "run.json").out
@@ -212,7 +212,7 @@ def test_options_change_a_dynamic_run_file(write, run):
 
 
 @pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
-def test_checks_compare_the_end_of_the_march(write, run, value, word, code):
+def test_expected_values_are_compared_at_the_end_of_the_run(write, run, value, word, code):
     push = ("Top", "SURFACE_LOAD_X", "1e5*t")
     end = moments(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh

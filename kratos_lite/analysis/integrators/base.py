@@ -1,0 +1,170 @@
+"""What the stepping loop asks of an integrator; each kind is found by its name, so a new one is one file.
+
+An integrator of models is a class that registers itself by its `name`.  One of bodies registers itself by the
+word that a body holds (`body.integrator`) and the class of bodies that it advances.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import fields
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.prescribed_motion import Kinematics
+from kratos_lite.bodies.body import Body
+from kratos_lite.errors import InputError
+from kratos_lite.registry import Registry
+from kratos_lite.typing import Array
+
+INTEGRATORS: Registry[type[ModelIntegrator]] = Registry("integrator")
+"""Integrators of models by name."""
+BODY_INTEGRATORS: dict[tuple[type[Body], str], type[BodyIntegrator[Any]]] = {}
+"""Integrators of bodies by class of bodies and word."""
+
+B = TypeVar("B", bound=Body)
+
+
+class ModelIntegrator(ABC):
+    """A way to take one step of the equations of motion of a model.
+
+    Subclasses are frozen dataclasses whose fields are their numbers.
+
+    Attributes
+    ----------
+    name : word under which files find it.
+    lumps_mass : whether it needs the mass in the nodes.
+    balanced : whether M a + C v + K u = f holds at the end of each step.
+    """
+
+    name: ClassVar[str]
+    lumps_mass: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "name" in cls.__dict__:
+            INTEGRATORS.add(cls.name, cls)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether M a + C v + K u = f holds at the end of each step."""
+        return False
+
+    def check(self, e: EquationsOfMotion) -> None:  # noqa: B027 (most take all models)
+        """Refuse a model that it cannot take.
+
+        Parameters
+        ----------
+        e : its equations of motion.
+
+        Raises
+        ------
+        ModelError
+            The model has something that the integrator does not take.
+        """
+
+    def critical_step(self, e: EquationsOfMotion) -> float:
+        """Return the longest stable step.
+
+        Parameters
+        ----------
+        e : equations of motion.
+
+        Returns
+        -------
+        float, s; infinite if any step is stable.
+        """
+        return np.inf
+
+    @abstractmethod
+    def step(self, e: EquationsOfMotion, now: Kinematics, start: float, h: float) -> Kinematics:
+        """Take one step.
+
+        Parameters
+        ----------
+        e : equations of motion.
+        now : displacement, velocity and acceleration (3a,) at its start.
+        start, h : time at its start, and its length, in s.
+
+        Returns
+        -------
+        displacement, velocity and acceleration (3a,) at its end.
+        """
+
+    def __str__(self) -> str:
+        numbers = [f"{getattr(self, field.name):g}" for field in fields(self)]  # type: ignore[arg-type]
+        return f"{self.name}({', '.join(numbers)})" if numbers else self.name
+
+
+class BodyIntegrator(ABC, Generic[B]):
+    """A way to take one step of a body.
+
+    Attributes
+    ----------
+    name : the word that bodies hold.
+    bodies : class of bodies that it advances.
+    """
+
+    name: ClassVar[str]
+    bodies: ClassVar[type[Body]]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "name" in cls.__dict__:
+            BODY_INTEGRATORS[cls.bodies, cls.name] = cls
+            if cls.name not in cls.bodies.integrators:
+                cls.bodies.integrators = {**cls.bodies.integrators, cls.name: ""}
+
+    def critical_step(self, body: B) -> float:
+        """Return the longest stable step in s at the configuration of a body."""
+        return np.inf
+
+    def check(self, body: B, h: float) -> None:
+        """Log what may go wrong with steps of h s."""
+
+    def check_stable(self, body: B, h: float) -> None:
+        """Raise InputError if steps of h s are longer than the critical one."""
+        check_stable(f"the {self.name} integrator", h, self.critical_step(body), "an implicit integrator")
+
+    def running(self) -> AbstractContextManager[Any]:
+        """Return the context in which steps are taken."""
+        return nullcontext()
+
+    def free_steps(self, body: B, h: float, count: int) -> bool:
+        """Take steps under constant loads, without constraints, all at once; False if it cannot."""
+        return False
+
+    @abstractmethod
+    def step(self, body: B, h: float, v: Array) -> Array:
+        """Advance a body by h s, loaded as by the velocity v.
+
+        Returns the generalized load (..., dofs) at the middle, reactions included.
+        """
+
+    def finish(self, body: B) -> None:
+        """Bring the end of a step to what the body can represent."""
+
+
+def body_integrator(body: Body) -> BodyIntegrator[Any]:
+    """Return the integrator that a body names.
+
+    >>> import kratos_lite as kl
+    >>> body_integrator(kl.Obstacle(kl.box())).name
+    'uniform'
+    """
+    for kind in type(body).__mro__:
+        if (kind, body.integrator) in BODY_INTEGRATORS:
+            return BODY_INTEGRATORS[kind, body.integrator]()
+    raise InputError(f"no integrator {body.integrator!r} is registered for {type(body).__name__}")
+
+
+def check_stable(what: str, h: float, critical: float, cure: str) -> None:
+    """Raise InputError if steps of h s are longer than the critical one."""
+    if h > critical * (1 + 1e-9):
+        raise InputError(
+            f"{what} is not stable with steps of {h:g} s: the critical step is {critical:.4g} s; "
+            f"take a shorter step, substeps='auto', or {cure}"
+        )

@@ -1,0 +1,158 @@
+"""Integrators of finite-element bodies.
+
+Each step is drift–kick–drift: half a step of displacement with the old velocity, loads at the middle, the new
+velocity, and half a step with that.  They differ in the matrix of the kick.
+
+Source: bodies of Solfec-1.0 (Koziara & Bićanić, IJNME 81 (2010) 1073-1092; Zhang & Skeel, Appl. Numer.
+Math. 25 (1997) 297-302); Simo & Tarnow, ZAMP 43 (1992) 757-792.
+"""
+
+from __future__ import annotations
+
+import logging
+from abc import abstractmethod
+from contextlib import AbstractContextManager
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis.integrators.base import BodyIntegrator
+from kratos_lite.bodies.constraint_projection import Step, constrained_step
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.linear_algebra import Solve
+from kratos_lite.errors import SolveError
+from kratos_lite.solvers.blas import one_thread
+from kratos_lite.typing import Array
+
+_log = logging.getLogger("kratos_lite")
+STIFF = 15.0
+"""h ω up to which the linearly implicit integrator has never been seen to blow up."""
+NEWTON_MAX = 50
+"""Iterations of one step; a step that needs more is too long."""
+SLOW = 0.2
+"""Rate of an iteration with old factors above which new ones are made."""
+
+
+class _FiniteElement(BodyIntegrator[FiniteElementBody]):
+    bodies = FiniteElementBody
+
+    def running(self) -> AbstractContextManager[Any]:
+        """Keep dense algebra to one thread."""
+        return one_thread()
+
+    def finish(self, body: FiniteElementBody) -> None:
+        """Bring displacement and velocity to what the formulation can represent."""
+        body.q, body.u = body.formulation.project(body.q, body.u)
+
+
+class _Kick(_FiniteElement):
+    @abstractmethod
+    def solver(self, body: FiniteElementBody, qh: Array, h: float) -> Solve:
+        """Return what turns forces at the middle into changes of the velocity by h."""
+
+    def step(self, body: FiniteElementBody, h: float, v: Array) -> Array:
+        """Take a step; see `BodyIntegrator.step`."""
+        qh = body.q + h / 2 * body.u
+        solve = self.solver(body, qh, h)
+        load = body.external_load(qh, body.time + h / 2, v)
+        force = load - body.internal_load(qh)
+        if body.damping:
+            force -= body.damping * body.damping_load(qh, body.u)
+
+        def advance(extra: Array) -> Step:
+            u = body.u + h * solve(force + extra)
+            return Step(qh + h / 2 * u, u, load)
+
+        return constrained_step(body, h, qh, advance, lambda: solve)
+
+
+class Explicit(_Kick):
+    """Explicit (Solfec's DEF_EXP): momenta exact, energy bounded, steps up to the critical one."""
+
+    name = "explicit"
+
+    def critical_step(self, body: FiniteElementBody) -> float:
+        """Return `Deformable.critical_step`."""
+        return body.critical_step()
+
+    def solver(self, body: FiniteElementBody, qh: Array, h: float) -> Solve:
+        """Return the solution with the mass matrix."""
+        return body.mass_solver()
+
+
+class LinearlyImplicit(_Kick):
+    """Linearly implicit (Solfec's DEF_LIM): M + (η h/2 + h²/4) K at the middle.
+
+    The linear momentum is exact, the angular one to O(h⁴); a stiff body that spins may gain energy.
+    """
+
+    name = "linearly_implicit"
+
+    def check(self, body: FiniteElementBody, h: float) -> None:
+        """Warn of stiff bodies."""
+        warn_of_stiffness(body, h)
+
+    def solver(self, body: FiniteElementBody, qh: Array, h: float) -> Solve:
+        """Return the solution with the tangent at the middle."""
+        return body.solver(qh, body.damping * h / 2 + h * h / 4)
+
+
+class EnergyMomentum(_FiniteElement):
+    """Implicit: energy and both momenta exact whatever the step.
+
+    M (u⁺ - u) / h + f(q, dq) = f_ext at q + dq/2, with dq = h/2 (u + u⁺).
+    """
+
+    name = "energy_momentum"
+
+    def step(self, body: FiniteElementBody, h: float, v: Array) -> Array:
+        """Take a step; see `BodyIntegrator.step`."""
+        middle = body.q + h / 2 * body.u
+        solve = body.solver(middle, h * h / 4 * (1 + 2 * body.damping / h))
+
+        def advance(extra: Array) -> Step:
+            u, load = _balanced(body, h, v, extra, solve)
+            return Step(body.q + h / 2 * (body.u + u), u, load)
+
+        return constrained_step(body, h, middle, advance, lambda: solve)
+
+
+def _balanced(
+    body: FiniteElementBody, h: float, loading: Array, extra: Array, solve: Solve
+) -> tuple[Array, Array]:
+    """Return the velocity at the end and the load at the middle, by Newton with factors kept a while."""
+    q, u, ratio = body.q, body.u, body.damping / h
+    v, last = u.copy(), np.inf
+    for _ in range(NEWTON_MAX):
+        dq = h / 2 * (u + v)
+        load = body.external_load(q + dq / 2, body.time + h / 2, loading)
+        force = load + extra - body.load_over(q, dq, ratio)
+        step = solve(h * force - body.times_mass(v - u))
+        size, scale = float(np.abs(step).max()), float(np.abs(v).max())
+        if not np.isfinite(size):
+            break
+        v = v + step
+        if size <= body.tolerance * scale:
+            return v, load
+        if size > SLOW * last:
+            given = float(np.abs(solve(h * (load + extra))).max())  # at rest, loads tell what is small
+            if size <= 1e-9 * max(scale, given):
+                return v, load
+            solve = body.increment_solver(q, h / 2 * (u + v), ratio, h * h / 2)
+        last = size
+    raise SolveError(
+        f"the energy–momentum step at t = {body.time:g} s with dt = {h:g} s does not converge; "
+        "take a shorter step"
+    )
+
+
+def warn_of_stiffness(body: Deformable, h: float) -> None:
+    """Warn where linearly implicit steps of h s may let a stiff body that spins gain energy."""
+    if (share := h * body.highest_frequency()) > STIFF:
+        _log.warning(
+            "linearly_implicit with h ω = %.3g: above %g a stiff body that spins may gain energy without "
+            "bound; use energy_momentum, a shorter step or damping",
+            share,
+            STIFF,
+        )

@@ -1,0 +1,139 @@
+"""Stepping: the one loop through time, of bodies and of models."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from math import ceil
+from typing import Protocol
+
+import numpy as np
+
+from kratos_lite.analysis.body_motion import BodyMotion
+from kratos_lite.analysis.state import State
+from kratos_lite.analysis.transient import TransientAnalysis
+from kratos_lite.bodies.body import Body
+from kratos_lite.errors import SolveError
+from kratos_lite.typing import Progress
+from kratos_lite.validation import function_or_none, positive_step, whole_number
+
+_log = logging.getLogger("kratos_lite")
+SAFETY = 0.95
+"""Share of the critical step that automatic substeps take."""
+
+
+class Motion(Protocol):
+    """What the loop advances."""
+
+    def critical_step(self) -> float:
+        """Return the longest stable step in s."""
+
+    def prepare(self, h: float, parts: int) -> None:
+        """Check steps of h s, each in so many parts, and make ready for them."""
+
+    def advance(self, h: float, count: int) -> None:
+        """Take so many steps."""
+
+    def diverged(self) -> bool:
+        """Return whether the motion has grown beyond all bounds."""
+
+    def state(self) -> State:
+        """Return the state of now."""
+
+
+def integrate(
+    subject: Body | Sequence[Body] | TransientAnalysis,
+    dt: float,
+    steps: int | None = None,
+    *,
+    every: int = 1,
+    substeps: int | str = 1,
+    until: Callable[[State], bool] | None = None,
+    progress: Progress | None = None,
+) -> Iterator[State]:
+    """Advance bodies or a model in time, and yield their states.
+
+    The subject itself moves along: after the loop, or after leaving it early, also by Ctrl-C, it is where the
+    last step has brought it; a second call goes on from there, also with another step.
+
+    Parameters
+    ----------
+    subject : one body; one object that holds many; a sequence of rigid or pseudo-rigid bodies, which are
+        advanced together on arrays; or a model in time, `Model.transient()`.
+    dt : step in s, > 0.
+    steps : number of steps; without end if not given.
+    every : a state is yielded after so many steps, and after the last.
+    substeps : parts into which each step is divided, or ``"auto"``: as many as an explicit integrator needs
+        to be stable; each state tells how many.
+    until : function of a state; the loop ends when it is true.
+    progress : called with ``"integrate"`` and the share of `steps` done, 0 … 1, before a state is yielded.
+
+    Yields
+    ------
+    State
+        Copies of what the subject is at the time.
+
+    Raises
+    ------
+    InputError
+        An argument is wrong, a step is longer than the critical one of an explicit integrator, or a
+        constraint is not met at the start.
+    ModelError
+        The model has changed since it was made ready, or bodies cannot advance together.
+    SolveError
+        A step has no solution, or the motion grows without bound.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> stone = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), kl.Isotropic3D(E=1e9, nu=0.3, density=2000.0))
+    >>> stone.add(kl.Gravity((0, 0, -10.0)))
+    >>> states = list(integrate(stone, dt=0.1, steps=10, every=5))
+    >>> [round(float(state.q[11]), 9) for state in states]
+    [-1.2, -4.95]
+    """
+    h, every = positive_step(dt), whole_number(every, "every")
+    count = None if steps is None else whole_number(steps, "steps")
+    function_or_none(until, "until must be a function of a state")
+    function_or_none(progress, "progress must be a function of a phase and a share")
+    motion: Motion = subject if isinstance(subject, TransientAnalysis) else BodyMotion(subject)
+    parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
+    if substeps == "auto":
+        critical = motion.critical_step()
+        parts = max(1, ceil(h / (SAFETY * critical)))
+        _log.info("each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
+    motion.prepare(h, parts)
+    return _states(motion, h, count, every, until, progress)
+
+
+def _states(
+    motion: Motion,
+    h: float,
+    count: int | None,
+    every: int,
+    until: Callable[[State], bool] | None,
+    progress: Progress | None,
+) -> Iterator[State]:
+    done = 0
+    while count is None or done < count:
+        chunk = every if count is None else min(every, count - done)
+        motion.advance(h, chunk)
+        done += chunk
+        if motion.diverged():
+            raise _divergence(motion, h)
+        if progress and count:
+            progress("integrate", done / count)
+        state = motion.state()
+        yield state
+        if until and until(state):
+            return
+
+
+def _divergence(motion: Motion, h: float) -> SolveError:
+    with np.errstate(over="ignore", invalid="ignore"):
+        state = motion.state()
+    return SolveError(
+        f"the motion grows without bound: at t = {state.time:g} s it is no longer finite, or far beyond the "
+        f"size of the model; is {state.integrator} stable with steps of {h / state.substeps:g} s "
+        "(take shorter ones), and are all units SI?"
+    )
