@@ -8,6 +8,7 @@ from functools import cached_property
 
 import kratos_lite as kl
 
+
 def public_things():
     """Yield the classes and functions of ``kl.__all__`` and ``kl.ale``."""
     names = [(kl, name) for name in kl.__all__] + [(kl.ale, name) for name in kl.ale.__all__]
