@@ -13,11 +13,6 @@ import kratos_lite
 
 PACKAGE = Path(kratos_lite.__file__).parent
 
-UPWARDS = {("analysis", "io"), ("bodies", "io")}
-"""Rooms of which the first still imports from the second, a floor above; take out what is gone."""
-CIRCULAR: set[str] = set()
-"""Rooms with files that still import each other; take out those without."""
-
 
 def floor(module):
     """Return number and name of the floor entry that a module belongs to."""
@@ -51,7 +46,7 @@ def test_imports_point_to_floors_below(module, path):
     for target in imports(path):
         below, target_name = floor(target)
         down = below < own or target_name == name or below == own == 0
-        assert down or (name, target_name) in UPWARDS, f"{module} imports {target}"
+        assert down, f"{module} imports {target}"
 
 
 def circles():
@@ -69,8 +64,7 @@ def circles():
 
 
 def test_no_files_import_each_other():
-    found = [circle for circle in circles() if not {name.split(".")[0] for name in circle} & CIRCULAR]
-    assert [sorted(circle) for circle in found] == []
+    assert [sorted(circle) for circle in circles()] == []
 
 
 def test_the_picture_of_the_structure_is_current():

@@ -80,7 +80,8 @@ def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0
     """Return the velocity of the material in space where nothing changes with the time.
 
     It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
-    moving frame has no first term: its body is at rest but for its waves.  That of a `TransientAnalysis` adds u'.
+    moving frame has no first term: its body is at rest but for its waves.  That of a
+    `TransientAnalysis` adds u'.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Returns
     -------
-    int : Newton iterations.
+    int, Newton iterations.
 
     Raises
     ------
