@@ -95,6 +95,23 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
 def _add_solve(commands: Any) -> None:
     solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
     solve.add_argument("input", help=f"{MODEL}; or {BODY}")
+    _add_outputs(solve)
+    _add_model(solve)
+    _add_motion(solve)
+    _add_time(solve)
+    how = solve.add_argument_group("solver")
+    how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
+    how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
+    how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
+    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
+    how.add_argument(
+        "--progress", action="store_true", help="show the share done, also where not on a terminal"
+    )
+    how.add_argument("-v", "--verbose", action="store_true", help="say also what the solution did without")
+    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def _add_outputs(solve: argparse.ArgumentParser) -> None:
     out = solve.add_argument_group("output (instead of the files that the input names)")
     out.add_argument(
         "-o",
@@ -116,21 +133,17 @@ def _add_solve(commands: Any) -> None:
         choices=("binary", "compressed", "ascii"),
         help="how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)",
     )
+
+
+def _add_model(solve: argparse.ArgumentParser) -> None:
     given = solve.add_argument_group(
         "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
     )
+    fix = "prescribe displacements in m along the axes named, 0 if no value is given"
     _add_options(
         given,
-        (
-            "--material",
-            "[PART:][LAW:]E=…,nu=…",
-            "constants in SI units; replaces the materials of the file",
-        ),
-        (
-            "--fix",
-            "PART:xyz[=VALUE]",
-            "prescribe displacements in m along the axes named, 0 if no value is given",
-        ),
+        ("--material", "[PART:][LAW:]E=…,nu=…", "constants in SI units; replaces the materials of the file"),
+        ("--fix", "PART:xyz[=VALUE]", fix),
         ("--gravity", "X,Y,Z", "acceleration in m/s²"),
         ("--traction", "PART:X,Y,Z", "force per area in Pa"),
         ("--pressure", "PART:P", "pressure in Pa, positive into the body"),
@@ -138,18 +151,6 @@ def _add_solve(commands: Any) -> None:
         action="append",
         default=[],
     )
-    _add_motion(solve)
-    _add_time(solve)
-    how = solve.add_argument_group("solver")
-    how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
-    how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
-    how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
-    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
-    how.add_argument(
-        "--progress", action="store_true", help="show the share done, also where not on a terminal"
-    )
-    how.add_argument("-v", "--verbose", action="store_true", help="say also what the solution did without")
-    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 
 
 def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:

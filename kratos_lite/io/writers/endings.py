@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.formats.vtu import check_mode
 
 RESULTS = (".vtu", ".vtk", ".json")
 """Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
@@ -25,6 +24,8 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
             f"{path}: results cannot be written as {ending!r}; {' '.join(RESULTS)} hold all fields"
         )
     if mode is not None:
+        from kratos_lite.io.formats.vtu import check_mode  # rarely needed
+
         check_mode(mode)
         if ending != ".vtu":
             raise InputError(
