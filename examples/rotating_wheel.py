@@ -57,7 +57,8 @@ print(f"with damping, 45° to each side: {before:.4f} and {behind:.4f} mm per MP
 model, result = wheel(60.0)
 force, _ = kl.reaction_resultant(model, result, "inner")
 m = result.report.motion
-print(f"critical rate {m['critical_rate']:.1f} rad/s, of waves about {m['critical_rate_of_waves']:.1f} rad/s")
+mesh_rate, wave_rate = m["critical_rate"], m["critical_rate_of_waves"]
+print(f"critical rate {mesh_rate:.1f} rad/s, about {wave_rate:.1f} rad/s by wave speeds")
 print(f"the hub carries {force[2] / 1e3:.2f} kN")
 
 # %%

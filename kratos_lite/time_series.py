@@ -1,4 +1,4 @@
-"""TimeSeries: numbers by time, straight between them."""
+"""TimeSeries: values at times, linearly interpolated."""
 
 from __future__ import annotations
 

@@ -154,7 +154,8 @@ class Model(Structure):
     def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
         """Return natural frequencies and mode shapes.
 
-        Supports hold what they hold, at zero.  A motion of the material is left out: see `complex_modes`.
+        All supported degrees of freedom are fixed at zero.  A motion of the material is ignored: see
+        `complex_modes`.
 
         Parameters
         ----------

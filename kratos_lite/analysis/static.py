@@ -62,7 +62,7 @@ def check_arguments(solver: str, tolerance: float, progress: Progress | None) ->
 class StaticAnalysis:
     """The static analysis of a structure, for many sets of loads; made by `Model.static`.
 
-    It follows its structure: new prescribed values are taken over; anything else that changes K (materials,
+    It follows its structure: new prescribed values are used; anything else that changes K (materials,
     rules, which degrees of freedom are prescribed, constraints, initial stress) has all checked and made
     anew at the next solution.
 

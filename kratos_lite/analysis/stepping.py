@@ -53,25 +53,25 @@ def integrate(
 ) -> Iterator[State]:
     """Advance bodies or a model in time, and yield their states.
 
-    The subject itself moves along: after the loop, or after leaving it early, also by Ctrl-C, it is where the
-    last step has brought it; a second call goes on from there, also with another step.
+    The subject itself is advanced: after the loop, or after leaving it early, also by Ctrl-C, it is in the
+    state after its last step; a second call continues from there, possibly with another step.
 
     Parameters
     ----------
-    subject : one body; one object that holds many; a sequence of rigid or pseudo-rigid bodies, which are
+    subject : one body; one object that holds a batch of bodies; a sequence of rigid or pseudo-rigid bodies, which are
         advanced together on arrays; or a model in time, `Model.transient()`.
     dt : step in s, > 0.
-    steps : number of steps; without end if not given.
-    every : a state is yielded after so many steps, and after the last.
+    steps : number of steps; if not given, until the loop is left or `until` returns true.
+    every : output interval in steps; the state after the last step is always yielded.
     substeps : parts into which each step is divided, or ``"auto"``: as many as an explicit integrator needs
         to be stable; each state tells how many.
-    until : function of a state; the loop ends when it is true.
-    progress : called with ``"integrate"`` and the share of `steps` done, 0 … 1, before a state is yielded.
+    until : function of a state; the loop ends after the first yielded state for which it returns true.
+    progress : called with ``"integrate"`` and the fraction of `steps` done, 0 … 1, before a state is yielded.
 
     Yields
     ------
     State
-        Copies of what the subject is at the time.
+        Copies of the state of the subject.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def integrate(
         An argument is wrong, a step is longer than the critical one of an explicit integrator, or a
         constraint is not met at the start.
     ModelError
-        The model has changed since it was made ready, or bodies cannot advance together.
+        The model has changed since the transient analysis was created, or bodies cannot advance together.
     SolveError
         A step has no solution, or the motion grows without bound.
 

@@ -92,7 +92,7 @@ class AffineBody(Body):
         Raises
         ------
         InputError
-            The shape is wrong, or A is none of this kind.
+            The shape is wrong, or A is invalid for this kind of body.
         """
         q = finite(q, "a configuration")
         if q.shape != self.q.shape:

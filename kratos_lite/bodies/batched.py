@@ -96,7 +96,7 @@ def _alike(members: Sequence[Body]) -> Body:
                 "together: integrate it alone"
             )
     if len({id(body) for body in members}) < len(members):
-        raise InputError("a body stands twice among those to advance together")
+        raise InputError("a body occurs twice among those to advance together")
     return first
 
 

@@ -1,7 +1,7 @@
 """Body: a body under loads and constraints, with its energies.
 
 What a kind of body defines is in `free_body`.  Everything else (loads, constraints, energies, time
-integration) stands on that.
+integration) builds on that.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class Body(FreeBody):
     Parameters
     ----------
     mesh, material : the shape and what it is made of, or None for a body given by its mass properties.
-    mass_properties : mass, volume, mass center, Euler and inertia tensor.
-    q, u : configuration and velocity at the start; their layout is that of the kind.
-    integrator : word of the time integrator, one of `integrators`; the first of them if None.
+    mass_properties : mass, volume, mass center, second-moment (Euler) tensor and inertia tensor.
+    q, u : configuration and velocity at the start; the layout depends on the kind of body.
+    integrator : name of the time integrator, one of `integrators`; the first of them if None.
     damping : η ≥ 0 in s, viscous stress η C Ė (stiffness-proportional damping).
 
     Attributes
@@ -49,17 +49,17 @@ class Body(FreeBody):
     tolerance : relative size of the last Newton step of an implicit integrator.
     loads, constraints : what acts on the body.
     external_work : work of loads and reactions since the start, J.
-    integrated_velocity : u as time integration left it, None before.  Where it is another one, or constraints
-        are new, time integration starts with an impulse that meets the constraints.
+    integrated_velocity : u after the last step, None before the first.  If u differs from it, or constraints
+        are new, time integration starts with an impulse that satisfies the constraints.
 
     Raises
     ------
     InputError
-        The integrator or the damping is none of this kind.
+        The integrator is not available for this kind of body, or the damping is invalid.
     """
 
     integrators: ClassVar[Mapping[str, str]] = {}
-    """Words for the time integrators that the kind has, the default first, and their names in Solfec."""
+    """Names of the time integrators of the kind of body, the default first, and their aliases in Solfec."""
     convertible: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -174,7 +174,7 @@ class Body(FreeBody):
 
     @property
     def integrator(self) -> str:
-        """Word of the time integrator, one of `integrators`; their names in Solfec are taken, too."""
+        """Name of the time integrator, one of `integrators`; Solfec's acronyms are aliases."""
         return self._integrator
 
     @integrator.setter
@@ -199,7 +199,7 @@ class Body(FreeBody):
 
     @property
     def tolerance(self) -> float:
-        """Relative size of the last Newton step of an implicit integrator, 0 … 1; 0 stands for round-off."""
+        """Relative size of the last Newton step of an implicit integrator, 0 … 1; 0 means to round-off."""
         return self._tolerance
 
     @tolerance.setter
@@ -223,7 +223,7 @@ class Body(FreeBody):
         Raises
         ------
         InputError
-            It is no load, or the amplitude is none.
+            `load` is not a load, or the amplitude is invalid.
         ModelError, MeshError
             It does not act on bodies of this kind, or a point lies outside the body.
 
@@ -236,7 +236,7 @@ class Body(FreeBody):
         [0.0, 0.0, 0.0, 6.0, 0.0, 0.0]
         """
         if isinstance(load, Constraint):
-            raise InputError(f"a {type(load).__name__} is a constraint, no load: body.constrain takes it")
+            raise InputError(f"a {type(load).__name__} is a constraint, not a load: use body.constrain")
         self.loads.append(apply_load(load, self, amplitude))
         self._constant = None
 
@@ -252,9 +252,9 @@ class Body(FreeBody):
         MeshError
             A point lies outside the body.
         ModelError
-            The body is many bodies, or the constraint holds another one already.
+            The body is a batch of bodies, or the constraint is already bound to another body.
         InputError
-            It is no constraint.
+            `constraint` is not a constraint.
         """
         if not isinstance(constraint, Constraint):
             raise InputError(
@@ -319,7 +319,7 @@ class Body(FreeBody):
         return np.asarray((self.u * self.times_mass(self.u)).sum(axis=-1) / 2)
 
     def potential_energy(self) -> Array | float:
-        """Return the potential energy of gravity, springs and other dead loads of constant size.
+        """Return the potential energy of gravity, springs and other constant dead loads.
 
         Returns
         -------

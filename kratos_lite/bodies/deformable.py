@@ -18,9 +18,9 @@ class Deformable(Body):
     """A body whose configurations form a linear space: q + h u is one again.
 
     Its integrators are ``"explicit"``: momenta exact, energy bounded, steps up to `critical_step`;
-    ``"linearly_implicit"``: linear momentum exact, angular momentum to O(h⁴), not safe for a stiff body that
-    spins; ``"energy_momentum"``: implicit, energy and both momenta exact whatever the step.  Solfec's
-    DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, name them, too.
+    ``"linearly_implicit"``: linear momentum exact, angular momentum to O(h⁴), not safe for stiff spinning
+    bodies; ``"energy_momentum"``: implicit, energy and both momenta exact whatever the step.  Solfec's
+    DEF_EXP and DEF_LIM, and ENERGY_MOMENTUM, are aliases.
     """
 
     jacobian_is_constant = True

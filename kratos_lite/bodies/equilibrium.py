@@ -1,4 +1,4 @@
-"""Statics: where a body rests, by Newton with the tangent, not by a motion that dies out."""
+"""Static equilibrium of a body, by Newton's method with the tangent, not by dynamic relaxation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UNBALANCED = 1e-8
 
 
 def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
-    """Bring a deformable body to rest under its loads and constraints at its time.
+    """Bring a deformable body to static equilibrium under its loads and constraints at its time.
 
     The configuration becomes that of equilibrium, the velocity zero; constraints know their reactions.
 
@@ -62,7 +62,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     for constraint in body.constraints:
         if not constraint.positional:
             raise ModelError(
-                f"a {type(constraint).__name__} says nothing of a body at rest; use PrescribedDisplacement"
+                f"a {type(constraint).__name__} does not apply in static equilibrium; use PrescribedDisplacement"
             )
     start = body.q.copy()
     for count in INCREMENTS:

@@ -87,12 +87,12 @@ class FreeBody(ABC):
 
         Parameters
         ----------
-        q : laid out as that of the kind.
+        q : the layout depends on the kind of body.
 
         Raises
         ------
         InputError
-            It is none of this body: a wrong shape, no rotation, an inverted shape.
+            It is invalid: a wrong shape, not a rotation, or an inverted body.
         """
 
     @abstractmethod
@@ -106,7 +106,7 @@ class FreeBody(ABC):
         Raises
         ------
         InputError
-            It is no rotation, or does not fit the bodies.
+            It is not a rotation, or its shape does not fit the bodies.
         """
 
     @abstractmethod
@@ -259,14 +259,14 @@ class FreeBody(ABC):
         Raises
         ------
         ModelError
-            There is no mesh, or there are many bodies without a material.
+            There is no mesh, or the body is a batch without a material.
         """
         if self.mesh is None:
             raise ModelError(f"this {self.kind} body has no mesh")
         if self.material is not None:
             return elements_of(self.mesh, self.material)
         if self.q.ndim > 1:
-            raise ModelError("many bodies on one mesh need a material for a load on it")
+            raise ModelError("a batch of bodies needs a material for loads on its mesh")
         unit = mass_properties_of(self.mesh, Isotropic3D(1.0, 0.0, 1.0))
         return elements_of(self.mesh, Isotropic3D(1.0, 0.0, float(self.mass / unit.mass)))
 

@@ -35,10 +35,10 @@ class RigidBody(AffineBody):
     mesh : the shape; may be left out where mass_properties are given.
     material : its density counts.
     mass_properties : mass, center and inertia in place of those of mesh and material; with leading axes for
-        many bodies at once.
+        a batch of bodies.
     integrator : ``momentum_conserving`` (explicit, spatial angular momentum exact, energy decays; if not
         given), ``explicit`` (energy grows) or ``implicit`` (momentum exact, symmetric in time); Solfec's
-        RIG_NEG, RIG_POS and RIG_IMP name them, too.
+        RIG_NEG, RIG_POS and RIG_IMP are aliases.
     tolerance : relative size of the last Newton step of an implicit integrator.
 
     Raises
@@ -192,7 +192,7 @@ class RigidBody(AffineBody):
 
 
 class Obstacle(RigidBody):
-    """A body that nothing pushes: it stands, or moves as `set_velocity` says.
+    """A body that loads do not affect: it is fixed, or moves at the velocity set by `set_velocity`.
 
     Its vectors are those of a rigid body; it carries neither mass nor energy, and takes no loads.
 
@@ -234,10 +234,10 @@ class Obstacle(RigidBody):
         Raises
         ------
         ModelError
-            Always: nothing pushes an obstacle.
+            Always: loads do not affect an obstacle.
         """
         raise ModelError(
-            "nothing pushes an obstacle: give its motion by set_velocity, or make it a RigidBody"
+            "loads do not affect an obstacle: set its motion with set_velocity, or use a RigidBody"
         )
 
     def constrain(self, constraint: object) -> None:
@@ -248,4 +248,4 @@ class Obstacle(RigidBody):
         ModelError
             Always: an obstacle needs no support.
         """
-        raise ModelError("an obstacle needs no constraint: it stands, or moves as set_velocity says")
+        raise ModelError("an obstacle needs no constraint: it is fixed, or moves at the velocity set")

@@ -1,4 +1,4 @@
-"""Files: read a model and write models, meshes and results, by the ending of the file name."""
+"""Files: read a model and write models, meshes and results, by the extension of the file name."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
-    """Write a result, a state, a model or a mesh by the ending of `path`.
+    """Write a result, a state, a model or a mesh by the extension of `path`.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     Raises
     ------
     InputError
-        The thing is none of these, or the format cannot hold it.
+        The thing is not one of these, or the format cannot hold it.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result

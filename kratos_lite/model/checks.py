@@ -30,14 +30,14 @@ FOLD = 0.2
 
 
 def checked_mesh(mesh: object) -> Mesh:
-    """Return a mesh; InputError if it is none."""
+    """Return a mesh; InputError if it is not a mesh."""
     if not isinstance(mesh, Mesh):
         raise InputError(f"a Mesh is needed, such as kratos_lite.box() gives; got {type(mesh).__name__}")
     return mesh
 
 
 def checked_material(material: object) -> LinearMaterial:
-    """Return a material; InputError if it is none."""
+    """Return a material; InputError if it is not a material."""
     if not isinstance(material, LinearMaterial):
         raise InputError(f"a material such as Isotropic3D is needed; got {type(material).__name__}")
     return material

@@ -63,7 +63,7 @@ class Structure:
     Raises
     ------
     InputError
-        `mesh` is no Mesh, or `material` no material.
+        `mesh` is not a Mesh, or `material` not a material.
     MeshError
         A part or property of `material` does not exist.
     """
@@ -94,7 +94,7 @@ class Structure:
 
     @property
     def version(self) -> tuple[int, int]:
-        """Counts of the changes of all that matters to the equations, but prescribed values and loads."""
+        """Change counters of everything that affects the equations except prescribed values and loads."""
         self._freeze()
         return self._changes, self.supports.version
 
@@ -120,7 +120,7 @@ class Structure:
         Raises
         ------
         InputError
-            It is no material.
+            `material` is not a material.
         MeshError
             There is no such part, property or element.
         """
@@ -141,7 +141,7 @@ class Structure:
         Raises
         ------
         InputError
-            It is neither.
+            `rule` is invalid.
         MeshError
             There is no such part, property or element.
         """
@@ -281,7 +281,7 @@ class Structure:
         Raises
         ------
         InputError
-            A degree of freedom, weight or constant is none.
+            A degree of freedom, weight or constant is invalid.
         """
         if not isinstance(masters, Mapping):
             raise InputError(f"masters must map (node row, axis letter) to a weight; got {masters!r}")
@@ -306,13 +306,13 @@ class Structure:
         Parameters
         ----------
         load : such as `Gravity` or `Traction`; or a motion such as `kratos_lite.ale.Rotation`.
-        amplitude : number, `TimeSeries` or function of time in s that multiplies the load; statics take it
-            at the time 0.
+        amplitude : number, `TimeSeries` or function of time in s that multiplies the load; statics uses its
+            value at t = 0.
 
         Raises
         ------
         InputError
-            It is neither, or the amplitude is none.
+            `load` is neither a load nor a motion, or the amplitude is invalid.
         ModelError
             The motion does not fit the model, or there is one already.
 

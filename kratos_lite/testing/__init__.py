@@ -52,7 +52,7 @@ def check(subject: type[KinematicLinear] | type[Shape] | LinearMaterial) -> tupl
     Raises
     ------
     InputError
-        If the subject is none of these.
+        If the subject is not one of these.
     """
     if isinstance(subject, LinearMaterial):
         return type(subject).__name__, check_material(subject)
@@ -75,7 +75,7 @@ def assert_conforms(subject: type[KinematicLinear] | type[Shape] | LinearMateria
     ConformanceError
         With the text of `report`: each failed check, what it measured and where.
     InputError
-        If the subject is none of these.
+        If the subject is not one of these.
     """
     name, findings = check(subject)
     if failures(findings):

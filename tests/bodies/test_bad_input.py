@@ -276,7 +276,9 @@ def test_callbacks_that_return_nonsense(kind, function, words, refused):
 
 def test_nothing_pushes_or_holds_an_obstacle(refused):
     floor = kl.Obstacle(kl.box())
-    refused(floor, lambda body: body.add(kl.Gravity((0, 0, 1))), kl.ModelError, "nothing pushes an obstacle")
+    refused(
+        floor, lambda body: body.add(kl.Gravity((0, 0, 1))), kl.ModelError, "loads do not affect an obstacle"
+    )
     refused(
         floor,
         lambda body: body.constrain(kl.FixPoint((0, 0, 0))),
@@ -333,7 +335,7 @@ def test_a_load_is_no_constraint(load, refused):
 
 
 def test_a_constraint_is_no_load(refused):
-    words = "a FixPoint is a constraint, no load: body.constrain takes it"
+    words = "a FixPoint is a constraint, not a load: use body.constrain"
     refused(body_of(kl.RigidBody), lambda body: body.add(kl.FixPoint((0, 0, 0))), kl.InputError, words)
 
 

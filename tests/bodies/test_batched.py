@@ -114,7 +114,7 @@ def test_many_pseudo_rigid_bodies_keep_their_invariants(integrator):
     ("change", "error", "words"),
     [
         (lambda bodies: bodies.clear(), kl.InputError, "there is no body to advance"),
-        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body stands twice"),
+        (lambda bodies: bodies.append(bodies[0]), kl.InputError, "a body occurs twice"),
         (
             lambda b: setattr(b[1], "integrator", "RIG_IMP"),
             kl.InputError,

@@ -251,6 +251,7 @@ def test_a_velocity_says_nothing_of_rest():
     body = cube()
     body.constrain(kl.PrescribedVelocity([0, 0, 0], (1, 0, 0), 1.0))
     with pytest.raises(
-        kl.ModelError, match="PrescribedVelocity says nothing of a body at rest; use PrescribedDisplacement"
+        kl.ModelError,
+        match="PrescribedVelocity does not apply in static equilibrium; use PrescribedDisplacement",
     ):
         kl.find_equilibrium(body)

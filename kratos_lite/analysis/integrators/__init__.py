@@ -1,4 +1,4 @@
-"""Time integrators of models and bodies: a new one is one file here."""
+"""Time integrators of models and bodies: a new one is a file here, and its import below."""
 
 from kratos_lite.analysis.integrators import finite_element, pseudo_rigid, rigid  # noqa: F401 (they register)
 from kratos_lite.analysis.integrators.base import (

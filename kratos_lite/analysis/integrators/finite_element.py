@@ -1,7 +1,7 @@
 """Integrators of finite-element bodies.
 
 Each step is drift–kick–drift: half a step of displacement with the old velocity, loads at the middle, the new
-velocity, and half a step with that.  They differ in the matrix of the kick.
+velocity, and half a step with that.  They differ in the matrix of the velocity update.
 
 Source: bodies of Solfec-1.0 (Koziara & Bićanić, IJNME 81 (2010) 1073-1092; Zhang & Skeel, Appl. Numer.
 Math. 25 (1997) 297-302); Simo & Tarnow, ZAMP 43 (1992) 757-792.

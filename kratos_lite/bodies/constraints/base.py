@@ -131,7 +131,7 @@ class Constraint(ABC):
         MeshError
             A point lies outside the body.
         ModelError
-            The body is many bodies, or the constraint holds another one already.
+            The body is a batch of bodies, or the constraint is already bound to another body.
         """
         if body.q.ndim > 1:
             raise ModelError("a constraint holds a single body; integrate bodies with constraints one by one")

@@ -56,7 +56,7 @@ class PrescribedVelocity(AlongDirection):
         self.speed = function_of(velocity, "a velocity")
 
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
-        """Return the velocity that is missing; see `Constraint.gap`."""
+        """Return the velocity error; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self.speed(time)
 
     def starting_velocities(self, v: Array, time: float, h: float) -> Array:
@@ -86,7 +86,7 @@ class PrescribedAcceleration(AlongDirection):
         self._target = (body.velocity(self.points) @ self.direction)[:, None] + gained
 
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
-        """Return the velocity that is missing; see `Constraint.gap`."""
+        """Return the velocity error; see `Constraint.gap`."""
         return np.asarray(v @ self.direction)[:, None] - self._target
 
     def starting_velocities(self, v: Array, time: float, h: float) -> Array:

@@ -94,7 +94,7 @@ class BodyLoad(ABC):
         Raises
         ------
         ModelError, MeshError, InputError
-            It does not act on such a body, or a point lies outside, or it does not fit many bodies.
+            It does not act on such a body, a point lies outside, or it does not support batches of bodies.
         """
 
 

@@ -26,7 +26,7 @@ class Callback(BodyLoad):
     Raises
     ------
     InputError
-        It is no function.
+        It is not a function.
 
     Examples
     --------

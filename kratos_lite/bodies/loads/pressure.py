@@ -44,7 +44,7 @@ class FollowerPressure(BodyLoad):
         Raises
         ------
         ModelError
-            The body is many bodies or has no mesh, or there are no such faces.
+            The body is a batch of bodies or has no mesh, or there are no such faces.
         """
         mesh = body.mesh
         if mesh is None:

@@ -155,9 +155,9 @@ def recorded(subject: Body | TransientAnalysis, path: str | Path) -> Recorded:
 
 
 def check_single(body: Body, path: str | Path) -> None:
-    """Raise ModelError for many bodies at once."""
+    """Raise ModelError for a batch of bodies."""
     if body.q.ndim > 1:
-        raise ModelError(f"{path}: only a single body can be written so; for many bodies write .npz")
+        raise ModelError(f"{path}: only a single body can be written so; write batches of bodies as .npz")
 
 
 def arrays_of(subject: Recorded, states: Sequence[Any]) -> dict[str, Array]:

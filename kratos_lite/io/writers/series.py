@@ -92,7 +92,7 @@ KINDS: dict[str, type[Writer]] = {".pvd": Frames, ".csv": Table, ".npz": Arrays}
 
 
 class SeriesWriter:
-    """Write states in time to files; the ending of the path says what they are.
+    """Write a series of states to a file; the extension of the path selects the format.
 
     - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
       DISPLACEMENT (m) and VELOCITY (m/s) on its nodes; of a transient also ACCELERATION (m/s²), REACTION (N)
@@ -115,9 +115,9 @@ class SeriesWriter:
     Raises
     ------
     InputError
-        The ending is none of these, or a file cannot be written.
+        The extension is not one of these, or a file cannot be written.
     ModelError
-        The body has no mesh, or is many bodies.
+        The body has no mesh, or is a batch of bodies.
 
     Examples
     --------

@@ -50,7 +50,7 @@ def draw_trajectory(
     InputError
         There are no states, or the file cannot be written.
     ModelError
-        The body has no mesh, or is many bodies.
+        The body has no mesh, or is a batch of bodies.
     KratosLiteError
         matplotlib is missing.
 

@@ -53,7 +53,7 @@ class TimeDependentLoad(Load):
     Raises
     ------
     InputError
-        It is no function.
+        It is not a function.
 
     Examples
     --------
