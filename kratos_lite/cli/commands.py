@@ -81,7 +81,7 @@ def _print(lines: list[str]) -> None:
 
 def info(options: Namespace) -> int:
     """Describe a file; of a run file, what it means."""
-    from kratos_lite.io.documents import ending
+    from kratos_lite.io.formats import ending
 
     if ending(options.input) in (".json", ".py"):
         from kratos_lite.io.files import read_case
@@ -97,7 +97,7 @@ def info(options: Namespace) -> int:
 
 def _document(options: Namespace) -> Document:
     """Return what a file says; of a run file, what the model says that it means."""
-    from kratos_lite.io.documents import ending, read_document
+    from kratos_lite.io.formats import ending, read_document
 
     if ending(options.input) not in (".json", ".py"):
         return read_document(options.input, strict=not options.lenient)
@@ -193,7 +193,7 @@ def _check_python(path: Path) -> int:
 
 def convert(options: Namespace) -> int:
     """Convert a file."""
-    from kratos_lite.io.files import write_document
+    from kratos_lite.io.formats import write_document
     from kratos_lite.io.outputs import check_targets
 
     document = _document(options)
@@ -207,7 +207,7 @@ def convert(options: Namespace) -> int:
 
 def _counts(path: str, mesh: Mesh) -> str:
     """Return the numbers of what a format holds of a mesh."""
-    from kratos_lite.io.documents import ELEM_SET, ending
+    from kratos_lite.io.formats import ELEM_SET, ending
 
     kind = ending(path)
     whole = kind == ".mdpa" or kind in ELEM_SET  # others hold no elements of unknown shape

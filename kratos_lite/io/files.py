@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
-from kratos_lite.io.documents import ELEM_SET, ending, read_document
+from kratos_lite.io.formats import ending, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
-    from kratos_lite.io.document import Document
     from kratos_lite.io.settings import Settings
     from kratos_lite.mesh import Mesh
 
@@ -149,48 +148,3 @@ def _with_named_sides(mesh: Mesh) -> Mesh:
     named = copy(mesh)
     named.parts = {kratos_name(name) if name in SIDES else name: part for name, part in mesh.parts.items()}
     return named
-
-
-def write_document(path: str | Path, document: Document) -> list[str]:
-    """Write a document by the ending of `path`; return notes on what the format cannot hold."""
-    kind = ending(path)
-    if kind == ".mdpa":
-        from kratos_lite.io.formats.mdpa.writer import write_mdpa
-
-        return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
-    if kind in ELEM_SET:
-        from kratos_lite.io.formats.elem import write_elem
-
-        return [str(note) for note in write_elem(path, document)]
-    if kind in ("", ".json"):
-        raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
-    from kratos_lite.io.writers.results import mesh_fields
-
-    points, cells = mesh_fields(document.mesh)
-    if kind == ".vtu":
-        from kratos_lite.io.formats.vtu import write_vtu
-
-        write_vtu(path, document.mesh, points, cells)
-    else:
-        from kratos_lite.io.formats.meshio import write_meshio
-
-        write_meshio(path, document.mesh, points, cells)
-    return _left_out(kind, document)
-
-
-def _mixed(document: Document) -> list[str]:
-    """Note constraints between different directions, which Kratos 10 shifts by one when it reads them."""
-    mixed = [c.id for c in document.constraints if {name for _, name in c.masters} - {c.slave[1]}]
-    shown = ", ".join(map(str, mixed[:5])) + (" …" if len(mixed) > 5 else "")
-    text = f"constraints {shown} mix directions; kratos_lite reads them as meant, Kratos does not"
-    return [text] if mixed else []
-
-
-def _left_out(kind: str, document: Document) -> list[str]:
-    """Note what a format of meshes does not hold."""
-    data = ("properties", "nodal_data", "element_data", "condition_data", "constraints", "tables")
-    lost = [name.replace("_", " ") for name in data if getattr(document, name)]
-    lost += ["parts and conditions"] if document.mesh.parts or document.mesh.conditions else []
-    notes = [f"{kind} files hold meshes only; left out: {', '.join(lost)}"] if lost else []
-    unknown = [f"{len(b)} {b.name}" for b in document.mesh.blocks if b.shape is None and len(b)]
-    return [*notes, f"left out, for their shape is unknown: {', '.join(unknown)}"] if unknown else notes

@@ -9,7 +9,7 @@ from pathlib import Path
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
-from kratos_lite.io.documents import ELEM_SET, ending
+from kratos_lite.io.formats import ELEM_SET, ending
 from kratos_lite.io.writers.endings import check_ending, check_result, check_series
 from kratos_lite.io.writers.results import write_result
 

@@ -1,1 +1,98 @@
-"""File formats, one module or folder each."""
+"""File formats, one module or folder each; here the reader and the writer are chosen by the ending.
+
+A new format is one module, and one branch in `read_document`, in `write_document`, or in both.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kratos_lite.errors import InputError
+from kratos_lite.io.document import Document
+
+ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
+
+
+def ending(path: str | Path) -> str:
+    """Return the ending of a path in lower case, without ``.gz``.
+
+    >>> ending("beam.MDPA.gz")
+    '.mdpa'
+    """
+    suffixes = [s.lower() for s in Path(path).suffixes]
+    if suffixes and suffixes[-1] == ".gz":
+        suffixes.pop()
+    return suffixes[-1] if suffixes else ""
+
+
+def read_document(path: str | Path, *, strict: bool = True) -> Document:
+    """Return what a model file says: .mdpa, any file of an .elem set or its stem, or what meshio reads.
+
+    `strict` refuses `.mdpa` rows that do not stand on lines of their own.
+    """
+    path = Path(path)
+    kind = ending(path)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
+    if kind == ".mdpa":
+        from kratos_lite.io.formats.mdpa.reader import read_mdpa
+
+        return read_mdpa(path, strict=strict)
+    stem = "" if path.is_file() else path.name  # "." has no name to put an ending to
+    is_stem = stem and any(path.with_name(stem + s).is_file() for s in (".elem", ".node"))
+    if kind in ELEM_SET or is_stem:
+        from kratos_lite.io.formats.elem import read_elem
+
+        return read_elem(path)
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
+    from kratos_lite.io.formats.meshio import read_meshio
+
+    return read_meshio(path)
+
+
+def write_document(path: str | Path, document: Document) -> list[str]:
+    """Write a document by the ending of `path`; return notes on what the format cannot hold."""
+    kind = ending(path)
+    if kind == ".mdpa":
+        from kratos_lite.io.formats.mdpa.writer import write_mdpa
+
+        return [str(note) for note in write_mdpa(path, document)] + _mixed(document)
+    if kind in ELEM_SET:
+        from kratos_lite.io.formats.elem import write_elem
+
+        return [str(note) for note in write_elem(path, document)]
+    if kind in ("", ".json"):
+        raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
+    from kratos_lite.io.writers.results import mesh_fields
+
+    points, cells = mesh_fields(document.mesh)
+    if kind == ".vtu":
+        from kratos_lite.io.formats.vtu import write_vtu
+
+        write_vtu(path, document.mesh, points, cells)
+    else:
+        from kratos_lite.io.formats.meshio import write_meshio
+
+        write_meshio(path, document.mesh, points, cells)
+    return _left_out(kind, document)
+
+
+def _mixed(document: Document) -> list[str]:
+    """Note constraints between different directions, which Kratos 10 shifts by one when it reads them."""
+    mixed = [c.id for c in document.constraints if {name for _, name in c.masters} - {c.slave[1]}]
+    shown = ", ".join(map(str, mixed[:5])) + (" …" if len(mixed) > 5 else "")
+    text = f"constraints {shown} mix directions; kratos_lite reads them as meant, Kratos does not"
+    return [text] if mixed else []
+
+
+def _left_out(kind: str, document: Document) -> list[str]:
+    """Note what a format of meshes does not hold."""
+    data = ("properties", "nodal_data", "element_data", "condition_data", "constraints", "tables")
+    lost = [name.replace("_", " ") for name in data if getattr(document, name)]
+    lost += ["parts and conditions"] if document.mesh.parts or document.mesh.conditions else []
+    notes = [f"{kind} files hold meshes only; left out: {', '.join(lost)}"] if lost else []
+    unknown = [f"{len(b)} {b.name}" for b in document.mesh.blocks if b.shape is None and len(b)]
+    return [*notes, f"left out, for their shape is unknown: {', '.join(unknown)}"] if unknown else notes

@@ -10,7 +10,7 @@ from pathlib import Path
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
 from kratos_lite.io.document import Document
-from kratos_lite.io.documents import read_document
+from kratos_lite.io.formats import read_document
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of

@@ -15,7 +15,7 @@ from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import Problems
 from kratos_lite.io.case import Case, Outputs
-from kratos_lite.io.documents import read_document
+from kratos_lite.io.formats import read_document
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos.properties import material_from
 from kratos_lite.io.kratos.to_model import model_from

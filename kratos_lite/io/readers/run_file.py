@@ -9,7 +9,7 @@ from typing import Any
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import Problems
 from kratos_lite.io.case import Case, Outputs
-from kratos_lite.io.documents import ending, read_document
+from kratos_lite.io.formats import ending, read_document
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.io.readers.motion import add_motion
