@@ -1,7 +1,7 @@
-"""Draw the rooms of the package and their imports, from the source: ``python docs/structure.py``.
+"""Draw the packages and their imports, from the source: ``python docs/structure.py``.
 
-The picture, ``docs/images/structure.svg``, has one row for each floor. An arrow leads from a room to one
-that it imports from, unless a way through other rooms leads there, too.
+The picture, ``docs/images/structure.svg``, has one row for each layer. An arrow leads from a package to one
+that it imports, unless a path through other packages leads there, too.
 """
 
 import ast
@@ -26,14 +26,14 @@ FLOORS = [
     {"cli": (1, "commands and options")},
     {"__main__": (1, "python -m kratos_lite")},
 ]
-"""The rooms of each floor, with column in the picture and content; modules import only from floors above."""
+"""The packages of each layer, lowest first, with column in the picture and contents."""
 
 COLUMN, ROW, BOX, HEIGHT = 220, 72, 196, 44
 TEXT = 'text-anchor="middle" font-family="Helvetica, Arial, sans-serif"'
 
 
 def modules() -> Iterator[tuple[str, Path]]:
-    """Yield the dotted name, without that of the package, and the file of each module."""
+    """Yield the dotted name, without ``kratos_lite``, and the file of each module."""
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
@@ -42,7 +42,7 @@ def modules() -> Iterator[tuple[str, Path]]:
 
 
 def imports(path: Path, names: set[str]) -> Iterator[str]:
-    """Yield those of the modules that a file imports: at the top, in functions, for types alone."""
+    """Yield the modules that a file imports: at the top, in functions, and for type checking."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("kratos_lite."):
             home = str(node.module).removeprefix("kratos_lite").removeprefix(".")
@@ -53,13 +53,13 @@ def imports(path: Path, names: set[str]) -> Iterator[str]:
 
 
 def room(module: str) -> str:
-    """Return the room of a module; those at the root of the package are one, the ground."""
+    """Return the package of a module; the modules at the root are grouped as base modules."""
     top = module.partition(".")[0]
-    return "ground" if top in FLOORS[0] else top
+    return "base modules" if top in FLOORS[0] else top
 
 
 def arrows() -> list[tuple[str, str]]:
-    """Return the pairs of rooms of which the first imports from the second, and no way leads around."""
+    """Return the pairs (package, imported package) that other imports do not imply."""
     names = {name for name, _ in modules()}
     below: dict[str, set[str]] = {room(name): set() for name in names}
     for name, path in modules():
@@ -77,7 +77,7 @@ def arrows() -> list[tuple[str, str]]:
 
 
 def places() -> dict[str, tuple[float, float]]:
-    """Return the center of the box of each room."""
+    """Return the center of the box of each package."""
     return {
         room(name): (COLUMN * (column + 0.5), ROW * (len(FLOORS) - level - 0.5))
         for level, names in enumerate(FLOORS)
@@ -88,7 +88,7 @@ def places() -> dict[str, tuple[float, float]]:
 def picture() -> str:
     """Return the picture as the text of an SVG file."""
     at, words = places(), {name: words for names in FLOORS for name, (_, words) in names.items()}
-    words["ground"] = GROUND
+    words["base modules"] = GROUND
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {4 * COLUMN} {ROW * len(FLOORS)}">',
         '<marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" '
@@ -98,12 +98,12 @@ def picture() -> str:
     ]
     for name, other in arrows():
         (x, y), (x2, y2) = at[name], at[other]
-        x2 = x if other == "ground" else x2
+        x2 = x if other == "base modules" else x2
         y, turned, y2 = y + HEIGHT / 2, y + ROW - HEIGHT / 2, y2 - HEIGHT / 2
         curve = f"M {x:g} {y:g} C {x:g} {turned:g} {x2:g} {y:g} {x2:g} {turned:g} V {y2:g}"
         lines.append(f'<path d="{curve}" fill="none" stroke="#667" marker-end="url(#tip)"/>')
     for name, (x, y) in at.items():
-        width = BOX + 3 * COLUMN if name == "ground" else BOX
+        width = BOX + 3 * COLUMN if name == "base modules" else BOX
         box = f'x="{x - width / 2:g}" y="{y - HEIGHT / 2:g}" width="{width:g}" height="{HEIGHT}" rx="6"'
         lines += [
             f'<rect {box} fill="#eef3fa" stroke="#357"/>',
