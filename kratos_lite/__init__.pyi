@@ -1,19 +1,19 @@
 """The public names, one a line; ``import kratos_lite`` reads them here."""
 
 from kratos_lite import ale as ale
-from kratos_lite.analysis import HHT as HHT
-from kratos_lite.analysis import Bossak as Bossak
-from kratos_lite.analysis import CentralDifference as CentralDifference
-from kratos_lite.analysis import GeneralizedAlpha as GeneralizedAlpha
-from kratos_lite.analysis import Newmark as Newmark
-from kratos_lite.analysis import State as State
-from kratos_lite.analysis import TransientAnalysis as TransientAnalysis
-from kratos_lite.analysis import critical_rate as critical_rate
-from kratos_lite.analysis import integrate as integrate
-from kratos_lite.analysis import material_velocity as material_velocity
-from kratos_lite.analysis import reaction_resultant as reaction_resultant
+from kratos_lite.analysis.integrators import HHT as HHT
+from kratos_lite.analysis.integrators import Bossak as Bossak
+from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
+from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
+from kratos_lite.analysis.integrators import Newmark as Newmark
+from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.outputs import material_velocity as material_velocity
+from kratos_lite.analysis.outputs import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.result import Result as Result
+from kratos_lite.analysis.state import State as State
+from kratos_lite.analysis.stepping import integrate as integrate
+from kratos_lite.analysis.transient import TransientAnalysis as TransientAnalysis
 from kratos_lite.bodies import BODIES as BODIES
 from kratos_lite.bodies import Body as Body
 from kratos_lite.bodies import Callback as Callback

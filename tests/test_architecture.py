@@ -108,6 +108,19 @@ def test_small_scene_loads_nothing_heavy():
     assert not {"scipy", "pyamg", "meshio", "matplotlib"} & loaded(code)
 
 
+SOLVED_AT_REST = {
+    "kl": "import kratos_lite as kl\nkl.read({cube!r}).solve()",
+    "cli": "from kratos_lite.cli import main\nmain(['solve', {cube!r}, '--quiet'])",
+}
+
+
+@pytest.mark.parametrize("code", SOLVED_AT_REST.values(), ids=SOLVED_AT_REST)
+def test_statics_loads_no_module_of_other_analyses(code):
+    names = loaded(code.format(cube=str(PACKAGE.parent / "examples" / "gravity_cube.mdpa")))
+    others = ("ale", "bodies", "analysis.integrators", "analysis.modal", "analysis.transient")
+    assert not {name for name in names for other in others if name.startswith(f"kratos_lite.{other}")}
+
+
 def test_public_names_exist_and_are_documented():
     for name in kratos_lite.__all__:
         thing = getattr(kratos_lite, name)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from kratos_lite.analysis import modal
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
-from kratos_lite.analysis.steady import solve_steady
-from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.transient import TransientAnalysis
 
 
 class Model(Structure):
@@ -66,6 +66,8 @@ class Model(Structure):
             If the accuracy asked for cannot be reached.
         """
         if self.motion is not None:
+            from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
+
             return solve_steady(self, solver, tolerance, progress)
         return StaticAnalysis(self, solver, tolerance, progress).solve()
 
@@ -149,6 +151,8 @@ class Model(Structure):
         >>> [round(state.time, 6) for state in states]
         [0.005, 0.01]
         """
+        from kratos_lite.analysis.transient import TransientAnalysis
+
         return TransientAnalysis(self, **options)
 
     def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
@@ -174,7 +178,9 @@ class Model(Structure):
         SolveError
             If the iteration does not converge.
         """
-        return modal.natural_modes(self, count, lumped)
+        from kratos_lite.analysis.modal import natural_modes
+
+        return natural_modes(self, count, lumped)
 
     def complex_modes(self, count: int = 6) -> tuple[Complexes, Complexes]:
         """Return the complex modes of a model with its motion at the time 0: λ² M + λ C + K is singular.
@@ -195,4 +201,6 @@ class Model(Structure):
         SolveError
             If the iteration does not converge.
         """
-        return modal.complex_modes(self, count)
+        from kratos_lite.analysis.modal import complex_modes
+
+        return complex_modes(self, count)

@@ -6,9 +6,8 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from kratos_lite.ale import Motion, Rotation, Translation
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
@@ -16,6 +15,9 @@ from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
 from kratos_lite.validation import whole_number
+
+if TYPE_CHECKING:
+    from kratos_lite.ale import Motion
 
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
@@ -224,6 +226,8 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         if options.damping:
             raise InputError("--damping belongs to --rotation or --translation; give one of them too")
         return None
+    from kratos_lite.ale import Rotation, Translation  # a quick start without motion
+
     rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
     try:
         if passes:

@@ -6,7 +6,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.ale.checks import rayleigh_speed
-from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates_beside
 from kratos_lite.errors import InputError, ModelError
 

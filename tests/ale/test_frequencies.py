@@ -5,7 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rate, reduced
 
 ANTIPLANE = [180.108469387701, 225.729859510629, 323.298640126683, 434.583943383590, 547.913923852690]

@@ -6,7 +6,7 @@ from scipy.special import jv, yv
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 
 E_PLANE, NU_PLANE = 210e6 / (1 - 0.3**2), 0.3 / 0.7
 A, B, RHO = 0.3, 1.0, 7620.0

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu, spsolve
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
-from kratos_lite.analysis import EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.voigt import acoustic_tensor
 

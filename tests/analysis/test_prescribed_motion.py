@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.analysis import HHT, CentralDifference, GeneralizedAlpha, Newmark
+from kratos_lite.analysis.integrators import HHT, CentralDifference, GeneralizedAlpha, Newmark
 from kratos_lite.time_series import TimeSeries
 
 E, RHO = 1e6, 1000.0

@@ -5,7 +5,8 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation
-from kratos_lite.analysis import HHT, CentralDifference, GeneralizedAlpha, Newmark, State
+from kratos_lite.analysis.integrators import HHT, CentralDifference, GeneralizedAlpha, Newmark
+from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.time_series import TimeSeries
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis import State, integrate
+from kratos_lite.analysis.state import State
+from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis import State, TransientAnalysis, integrate
 from kratos_lite.analysis.result import vector
+from kratos_lite.analysis.state import State
+from kratos_lite.analysis.stepping import integrate
+from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed
 from kratos_lite.io.runners.outcome import Outcome

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kratos_lite.analysis import State, TransientAnalysis
-from kratos_lite.analysis.state import at
+from kratos_lite.analysis.state import State, at
+from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.writers.results import fields

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from kratos_lite.analysis import TransientAnalysis
+from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_arrays, write_whole

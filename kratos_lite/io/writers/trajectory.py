@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite import view
-from kratos_lite.analysis import State
+from kratos_lite.analysis.state import State
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.writers.pictures import save_figure
