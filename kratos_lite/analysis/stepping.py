@@ -58,8 +58,8 @@ def integrate(
 
     Parameters
     ----------
-    subject : one body; one object that holds a batch of bodies; a sequence of rigid or pseudo-rigid bodies, which are
-        advanced together on arrays; or a model in time, `Model.transient()`.
+    subject : one body; one object that holds a batch of bodies; a sequence of rigid or
+        pseudo-rigid bodies, advanced together on arrays; or a model in time, `Model.transient()`.
     dt : step in s, > 0.
     steps : number of steps; if not given, until the loop is left or `until` returns true.
     every : output interval in steps; the state after the last step is always yielded.

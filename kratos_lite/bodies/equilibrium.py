@@ -62,7 +62,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     for constraint in body.constraints:
         if not constraint.positional:
             raise ModelError(
-                f"a {type(constraint).__name__} does not apply in static equilibrium; use PrescribedDisplacement"
+                f"a {type(constraint).__name__} does not apply in statics; use PrescribedDisplacement"
             )
     start = body.q.copy()
     for count in INCREMENTS:

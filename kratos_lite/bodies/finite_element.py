@@ -43,8 +43,8 @@ class FiniteElementBody(Deformable):
     mesh : the shape.
     material : one material, or materials by part name or property id.
     formulation : ``total_lagrangian`` (Saint Venant–Kirchhoff), ``corotational`` (small strains relative
-        to one rotation of the body), ``modal`` (the same with the lowest modes only); Solfec's acronyms ``TL``,
-        ``BC`` and ``BC-MODAL`` are aliases.
+        to one rotation of the body), ``modal`` (the same with the lowest modes only); Solfec's acronyms
+        ``TL``, ``BC`` and ``BC-MODAL`` are aliases.
     modes : number of modes for ``modal``.
     lumped : whether the mass is lumped at the nodes; the consistent mass is exact for rigid motions.
     integrator : one of `Deformable.integrators`; ``energy_momentum`` for ``total_lagrangian`` and

@@ -252,6 +252,6 @@ def test_a_velocity_says_nothing_of_rest():
     body.constrain(kl.PrescribedVelocity([0, 0, 0], (1, 0, 0), 1.0))
     with pytest.raises(
         kl.ModelError,
-        match="PrescribedVelocity does not apply in static equilibrium; use PrescribedDisplacement",
+        match="PrescribedVelocity does not apply in statics; use PrescribedDisplacement",
     ):
         kl.find_equilibrium(body)
