@@ -68,7 +68,7 @@ def build_parser() -> argparse.ArgumentParser:
     check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
     convert = _add(commands, "convert", "convert a model file to another format")
     convert.add_argument("input", help=MODEL)
-    convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, by its ending")
+    convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, chosen by the extension")
     # All its words, also --help, are for the program that it runs.
     bench = commands.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
     bench.set_defaults(debug=False)
@@ -104,10 +104,8 @@ def _add_solve(commands: Any) -> None:
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
-    how.add_argument(
-        "--progress", action="store_true", help="show the share done, also where not on a terminal"
-    )
-    how.add_argument("-v", "--verbose", action="store_true", help="say also what the solution did without")
+    how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")
+    how.add_argument("-v", "--verbose", action="store_true", help="also list what the solution skipped")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 
 
@@ -119,7 +117,7 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         default=[],
-        help="at rest .vtu for ParaView, .vtk or .json; in time .pvd for ParaView, .csv or .npz; may be "
+        help="static: .vtu for ParaView, .vtk or .json; in time: .pvd for ParaView, .csv or .npz; may be "
         "given several times",
     )
     _add_options(
@@ -168,12 +166,12 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
     )
     ale.add_argument(
-        "--stiffening", action="store_true", help="add the stiffness that the centrifugal stress gives"
+        "--stiffening", action="store_true", help="add the geometric stiffness of the centrifugal stress"
     )
     ale.add_argument(
         "--boundaries",
         choices=("absorbing", "periodic", "fixed", "natural"),
-        help="what the cut faces of the moving frame do (absorbing)",
+        help="condition on the cut faces of the moving frame (absorbing)",
     )
 
 
@@ -186,8 +184,8 @@ def _add_time(solve: argparse.ArgumentParser) -> None:
         ("--integrator", "NAME[:NUMBERS]", f"of models: {INTEGRATORS}"),
         ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K of models, in 1/s and s"),
     )
-    time.add_argument("--steps", type=int, metavar="N", help="number of steps, instead of that of the file")
-    time.add_argument("--lumped", action="store_true", help="mass of models in the nodes")
+    time.add_argument("--steps", type=int, metavar="N", help="number of steps, overrides the file")
+    time.add_argument("--lumped", action="store_true", help="lumped mass (models)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
