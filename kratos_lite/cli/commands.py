@@ -49,7 +49,7 @@ def use_threads(count: int | None) -> None:
 
 
 def _solve(options: Namespace, clock: float) -> int:
-    from kratos_lite.cli.options import case_of
+    from kratos_lite.cli.case import case_of
     from kratos_lite.io.run import run
 
     seconds = {"import": perf_counter() - clock}

@@ -1,273 +1,180 @@
-"""Options of the command line: what they add to the case of an input."""
+"""The options of each command: a new one is an `add_argument`, and its meaning in `cli.case`."""
 
 from __future__ import annotations
 
-from argparse import Namespace
-from collections.abc import Callable
-from dataclasses import replace
-from math import isfinite
-from typing import TYPE_CHECKING, Any
+import argparse
+import re
+from typing import Any
 
-from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, nearest
-from kratos_lite.io.case import Case, Outputs, TimeIntegration
-from kratos_lite.io.files import read_case
-from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
-from kratos_lite.validation import whole_number
+from kratos_lite import __version__
 
-if TYPE_CHECKING:
-    from kratos_lite.ale import Motion
-
-OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
-"""Options that need a time integration."""
-OF_MODELS = (
-    *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
-    *("rotation", "translation", "center", "stiffening", "boundaries", "damping"),
-    *("integrator", "rayleigh", "lumped"),
-)
-"""Options that bodies do not have."""
-
-
-def case_of(options: Namespace) -> Case:
-    """Return the case of an input and the options of the command line, which win where there is one value."""
-    materials = [material(text) for text in options.material]
-    everywhere = any(part is None for part, _ in materials)
-    case = read_case(options.input, materials=not everywhere, strict=not options.lenient)
-    if case.is_of_model:
-        apply(case.model, options, materials)
-        if options.solver:
-            case.solver = options.solver
-        if options.tolerance is not None:
-            case.tolerance = options.tolerance
-    else:
-        _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
-    case.time = _time(options, case.time)
-    _set_outputs(case.outputs, options)
-    if options.modes is not None:
-        _take_modes(case, options)
-    return case
-
-
-def _refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
-    """Raise InputError for the first of some options that is given."""
-    for name in names:
-        if getattr(options, name) not in (None, False, []):
-            raise InputError(f"--{name.replace('_', '-')} {why}")
-
-
-def _take_modes(case: Case, options: Namespace) -> None:
-    """Ask a case for natural frequencies, whatever its file says of time and outputs."""
-    if options.time is not None:
-        raise InputError("--modes and --time: give one of them")
-    if options.output or options.json or options.picture or options.state:
-        raise InputError("--modes prints a table; it writes no files")
-    case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
-
-
-def _set_outputs(outputs: Outputs, options: Namespace) -> None:
-    """Let the files of the options take the place of those of the input."""
-    for name in ("json", "picture", "state"):
-        if (path := getattr(options, name)) is not None:
-            setattr(outputs, name, path)
-    outputs.results, outputs.mode = options.output or outputs.results, options.vtu
-
-
-def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
-    """Return the time integration that the options and a file ask for."""
-    time = given
-    if options.time is not None:
-        step, steps, every = _steps(options.time)
-        time = (
-            replace(given, step=step, steps=steps, every=every, place="")
-            if given
-            else TimeIntegration(step, steps, every)
-        )
-    if time is None:
-        _refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
-        return None
-    _refuse(options, ("solver", "tolerance"), "is for statics; time integration chooses its own solver")
-    changes: dict[str, Any] = {}
-    if options.steps is not None:
-        changes["steps"] = whole_number(options.steps, "--steps")
-    if options.integrator:
-        from kratos_lite.io.readers.time import integrator_of  # it brings the readers of JSON
-
-        name, _, words = options.integrator.partition(":")
-        changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
-    if options.rayleigh:
-        changes["rayleigh"] = _rayleigh(options.rayleigh)
-    if options.lumped:
-        changes["lumped"] = True
-    if options.restart:
-        changes["restart"] = options.restart
-    return replace(time, **changes)
-
-
-def _steps(text: str) -> tuple[float, int, int]:
-    """Return step, number of steps and every how many a state is kept of ``STEP:STEPS[:EVERY]``.
-
-    >>> _steps("1e-3:200:10")
-    (0.001, 200, 10)
-    """
-    step, *counts = text.split(":")
-    if len(counts) not in (1, 2) or not all(count.isdecimal() for count in counts):
-        raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
-    steps, every = (int(count) for count in (*counts, "1")[:2])
-    return number(step, "--time"), steps, every
-
-
-def _numbers(text: str, option: str) -> list[float]:
-    return [number(word, option) for word in text.split(",")] if text else []
-
-
-def _rayleigh(text: str) -> tuple[float, float]:
-    values = _numbers(text, "--rayleigh")
-    if len(values) != 2 or min(values) < 0:
-        raise InputError(f"--rayleigh: ALPHA,BETA, both ≥ 0, in 1/s and s are needed; got {text!r}")
-    return values[0], values[1]
-
-
-def number(text: str, option: str) -> float:
-    """Return a finite number or say which option holds what instead."""
-    try:
-        value = float(text) if "_" not in text else float("nan")
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value):
-        raise InputError(f"{option}: {text!r} is not a finite number such as 1.5 or 2e9")
-    return value
-
-
-def vector(text: str, option: str) -> list[float]:
-    """Return three numbers.
-
-    >>> vector("0,0,-9.81", "--gravity")
-    [0.0, 0.0, -9.81]
-    """
-    words = text.split(",")
-    if len(words) != 3:
-        raise InputError(f"{option}: three numbers X,Y,Z are needed; got {text!r}")
-    return [number(word, option) for word in words]
-
-
-LOADS: dict[str, tuple[Callable[[str, Any], Load], Callable[[str, str], Any], str]] = {
-    "traction": (Traction, vector, "PART:X,Y,Z"),
-    "pressure": (Pressure, number, "PART:P"),
-    "point_load": (PointLoad, vector, "PART:X,Y,Z"),
+EXIT_CODES = """exit codes:
+  0    done
+  1    a defect of kratos-lite
+  2    bad input, or an output that cannot be written
+  3    solved, but an expected value of the run file is missed
+  130  interrupted with Ctrl-C"""
+MODEL = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
+BODY = "a .json file with a body, or a .py script with body, dt and steps"
+EXAMPLES = {
+    "solve": """kratos-lite solve cube.mdpa -o cube.vtu
+  kratos-lite solve ProjectParameters.json --json result.json
+  kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
+  kratos-lite solve bridge.mdpa --modes 10
+  kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
+  kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
+  kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
+  kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
+      --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
+    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
+    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+    "  kratos-lite check my_element.py",
+    "convert": "kratos-lite convert beam.elem beam.mdpa\n  kratos-lite convert beam.mdpa beam.vtu",
 }
+INTEGRATORS = (
+    "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or "
+    "central_difference (newmark, the trapezoidal rule)"
+)
+RESTART = (
+    "go on from a state that --state wrote; series and picture then hold the rest of the run only, and "
+    "replace those of the same name, so give them new names"
+)
 
 
-def split_part(text: str, option: str, example: str) -> tuple[str, str]:
-    """Split ``PART:rest`` at the last colon."""
-    part, colon, rest = text.rpartition(":")
-    if not (part and colon and rest):
-        raise InputError(f"{option}: expected {example}; got {text!r}")
-    return part, rest
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog="kratos-lite",
+        description="Finite elements for solids: from an input file to displacements and stresses.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_solve(commands)
+    info = _add(commands, "info", "describe a file without solving it")
+    info.add_argument("input", help=f"{MODEL}; or {BODY}")
+    check = _add(
+        commands, "check", "report every problem of a file, or of the elements and materials in a Python file"
+    )
+    check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
+    convert = _add(commands, "convert", "convert a model file to another format")
+    convert.add_argument("input", help=MODEL)
+    convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, chosen by the extension")
+    # All its words, also --help, are for the program that it runs.
+    bench = commands.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
+    bench.set_defaults(debug=False)
+    return parser
 
 
-def material(text: str) -> tuple[str | None, LinearMaterial]:
-    """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
-
-    >>> material("steel:E=210e9,nu=0.3")
-    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
-    """
-    option = f"--material {text}"
-    *names, constants = text.split(":")
-    part, law = None, "Isotropic3D"
-    for name in names:
-        if name in MATERIALS:
-            law = name
-        elif part is None:
-            part = name
-        else:
-            laws = ", ".join(MATERIALS)
-            raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
-    kind: Any = MATERIALS[law]
-    known = list(kind.variables)
-    values: dict[str, float] = {}
-    for pair in constants.split(","):
-        key, equals, value = pair.partition("=")
-        field = {v: k for k, v in kind.variables.items()}.get(key.strip(), key.strip())
-        if not equals or field not in known:
-            raise InputError(f"{option}: constants of {law} are {', '.join(known)}; got {pair!r}")
-        if field in values:
-            raise InputError(f"{option}: {field} is given twice")
-        values[field] = number(value, option)
-    missing = [k for k in known if k not in values and k != "density"]
-    if missing:
-        raise InputError(f"{option}: {law} also needs {', '.join(missing)}")
-    return part, kind(**values)
+def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
+    command: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=text,
+        description=text[0].upper() + text[1:] + ".",
+        epilog=f"examples:\n  {EXAMPLES[name]}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # "-1,0,0" and "-z:30" are values, not options
+    command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
+    command.add_argument(
+        "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
+    )
+    command.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    return command
 
 
-def _where(model: Model, part: str | None) -> str | int | None:
-    """Return what a word before the constants of a material means: a part, a property id, or all."""
-    if part is None or part in model.mesh.parts or (part[1:] in ("+", "-") and part[0] in "xyz"):
-        return part
-    if part.isdecimal():
-        return int(part)
-    laws, parts = ", ".join(MATERIALS), ", ".join(model.mesh.parts) or "none"
-    hint = nearest(part, [*MATERIALS, *model.mesh.parts])
-    raise InputError(f"--material: unknown law or part {part!r}; laws are {laws}, parts are {parts}.{hint}")
+def _add_solve(commands: Any) -> None:
+    solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
+    solve.add_argument("input", help=f"{MODEL}; or {BODY}")
+    _add_outputs(solve)
+    _add_model(solve)
+    _add_motion(solve)
+    _add_time(solve)
+    how = solve.add_argument_group("solver")
+    how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
+    how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
+    how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
+    how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
+    how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")
+    how.add_argument("-v", "--verbose", action="store_true", help="also list what the solution skipped")
+    how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
 
 
-def motion(model: Model, options: Namespace) -> Motion | None:
-    """Return the motion of the material that the options give, or None."""
-    turns, passes = options.rotation, options.translation
-    if (turns or passes) and model.motion is not None:
-        raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
-    if turns and passes:
-        raise InputError("--rotation and --translation: a model has one motion; give one of them")
-    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("boundaries", "translation")):
-        if getattr(options, option) and not getattr(options, owner):
-            raise InputError(f"--{option} belongs to --{owner}; give that too")
-    text, option = turns or passes, "--rotation" if turns else "--translation"
-    if not text:
-        if options.damping:
-            raise InputError("--damping belongs to --rotation or --translation; give one of them too")
-        return None
-    from kratos_lite.ale import Rotation, Translation  # a quick start without motion
-
-    rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
-    try:
-        if passes:
-            return Translation(*rates, boundaries=options.boundaries or "absorbing", damping=damping)
-        center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
-        return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
-    except InputError as error:
-        raise InputError(f"{option} {text}: {error}") from None
+def _add_outputs(solve: argparse.ArgumentParser) -> None:
+    out = solve.add_argument_group("output (instead of the files that the input names)")
+    out.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        action="append",
+        default=[],
+        help="static: .vtu for ParaView, .vtk or .json; in time: .pvd for ParaView, .csv or .npz; may be "
+        "given several times",
+    )
+    _add_options(
+        out,
+        ("--json", "OUT.json", "summary, displacements and reactions by node id"),
+        ("--picture", "OUT.png", "picture of the deformed model, or of a body along its path"),
+        ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
+    )
+    out.add_argument(
+        "--vtu",
+        choices=("binary", "compressed", "ascii"),
+        help="how .vtu files store their numbers: quickest, smallest, or to be read by eye (binary)",
+    )
 
 
-def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
-    """Return axis, rate and acceleration of ``AXIS:RATE[:ACCELERATION]``.
+def _add_model(solve: argparse.ArgumentParser) -> None:
+    given = solve.add_argument_group(
+        "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
+    )
+    fix = "prescribe displacements in m along the axes named, 0 if no value is given"
+    _add_options(
+        given,
+        ("--material", "[PART:][LAW:]E=…,nu=…", "constants in SI units; replaces the materials of the file"),
+        ("--fix", "PART:xyz[=VALUE]", fix),
+        ("--gravity", "X,Y,Z", "acceleration in m/s²"),
+        ("--traction", "PART:X,Y,Z", "force per area in Pa"),
+        ("--pressure", "PART:P", "pressure in Pa, positive into the body"),
+        ("--point-load", "PART:X,Y,Z", "force in N on each node of the part"),
+        action="append",
+        default=[],
+    )
 
-    >>> _rates("z:-30:2.5", "--rotation")
-    ('z', -30.0, 2.5)
-    """
-    axis, *numbers = text.split(":")
-    if not axis or len(numbers) not in (1, 2):
-        raise InputError(f"{option}: expected AXIS:RATE[:ACCELERATION] such as z:30; got {text!r}")
-    rate, acceleration = (number(word, option) for word in (*numbers, "0")[:2])
-    return vector(axis, option) if "," in axis else axis, rate, acceleration
+
+def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:
+    for option, meta, text in options:
+        group.add_argument(option, metavar=meta, help=text, **settings)
 
 
-def apply(model: Model, options: Namespace, materials: list[tuple[str | None, LinearMaterial]]) -> None:
-    """Add the materials, supports, loads and motion of the command line to a model."""
-    # the special wins over the general
-    for part, law in sorted(materials, key=lambda pair: pair[0] is not None):
-        model.assign(law, _where(model, part))
-    for text in options.fix:
-        part, rest = split_part(text, "--fix", "PART:axes or PART:axes=value")
-        axes, equals, value = rest.partition("=")
-        model.fix(part, axes, number(value, "--fix") if equals else 0.0)
-    if options.gravity and any(isinstance(load, Gravity) for load in model.loads):
-        model.notes.append("--gravity is added to the gravity of the file")
-    for text in options.gravity:
-        model.add(Gravity(vector(text, "--gravity")))
-    for name, (load, read, example) in LOADS.items():
-        option = f"--{name.replace('_', '-')}"
-        for text in getattr(options, name):
-            part, rest = split_part(text, option, example)
-            model.add(load(part, read(rest, option)))
-    if (given_motion := motion(model, options)) is not None:
-        model.add(given_motion)
+def _add_motion(solve: argparse.ArgumentParser) -> None:
+    ale = solve.add_argument_group("motion of the material through the mesh (one at most; docs/ale.md)")
+    _add_options(
+        ale,
+        ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
+        ("--center", "X,Y,Z", "a point of the axis in m (0,0,0)"),
+        ("--translation", "AXIS:RATE[:ACCELERATION]", "of the moving frame, in m/s and m/s²"),
+        ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
+    )
+    ale.add_argument(
+        "--stiffening", action="store_true", help="add the geometric stiffness of the centrifugal stress"
+    )
+    ale.add_argument(
+        "--boundaries",
+        choices=("absorbing", "periodic", "fixed", "natural"),
+        help="condition on the cut faces of the moving frame (absorbing)",
+    )
+
+
+def _add_time(solve: argparse.ArgumentParser) -> None:
+    time = solve.add_argument_group("time integration (docs/dynamics.md, docs/bodies.md)")
+    _add_options(
+        time,
+        ("--time", "STEP:STEPS[:EVERY]", "step in s, their number, and every how many is kept"),
+        ("--restart", "STATE.npz", RESTART),
+        ("--integrator", "NAME[:NUMBERS]", f"of models: {INTEGRATORS}"),
+        ("--rayleigh", "ALPHA,BETA", "damping ALPHA·M + BETA·K of models, in 1/s and s"),
+    )
+    time.add_argument("--steps", type=int, metavar="N", help="number of steps, overrides the file")
+    time.add_argument("--lumped", action="store_true", help="lumped mass (models)")

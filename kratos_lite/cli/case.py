@@ -1,0 +1,273 @@
+"""What the options of the command line add to the case of an input."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.io.case import Case, Outputs, TimeIntegration
+from kratos_lite.io.files import read_case
+from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.validation import whole_number
+
+if TYPE_CHECKING:
+    from kratos_lite.ale import Motion
+
+OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
+"""Options that need a time integration."""
+OF_MODELS = (
+    *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
+    *("rotation", "translation", "center", "stiffening", "boundaries", "damping"),
+    *("integrator", "rayleigh", "lumped"),
+)
+"""Options that bodies do not have."""
+
+
+def case_of(options: Namespace) -> Case:
+    """Return the case of an input and the options of the command line, which win where there is one value."""
+    materials = [material(text) for text in options.material]
+    everywhere = any(part is None for part, _ in materials)
+    case = read_case(options.input, materials=not everywhere, strict=not options.lenient)
+    if case.is_of_model:
+        apply(case.model, options, materials)
+        if options.solver:
+            case.solver = options.solver
+        if options.tolerance is not None:
+            case.tolerance = options.tolerance
+    else:
+        _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
+    case.time = _time(options, case.time)
+    _set_outputs(case.outputs, options)
+    if options.modes is not None:
+        _take_modes(case, options)
+    return case
+
+
+def _refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
+    """Raise InputError for the first of some options that is given."""
+    for name in names:
+        if getattr(options, name) not in (None, False, []):
+            raise InputError(f"--{name.replace('_', '-')} {why}")
+
+
+def _take_modes(case: Case, options: Namespace) -> None:
+    """Ask a case for natural frequencies, whatever its file says of time and outputs."""
+    if options.time is not None:
+        raise InputError("--modes and --time: give one of them")
+    if options.output or options.json or options.picture or options.state:
+        raise InputError("--modes prints a table; it writes no files")
+    case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
+
+
+def _set_outputs(outputs: Outputs, options: Namespace) -> None:
+    """Let the files of the options take the place of those of the input."""
+    for name in ("json", "picture", "state"):
+        if (path := getattr(options, name)) is not None:
+            setattr(outputs, name, path)
+    outputs.results, outputs.mode = options.output or outputs.results, options.vtu
+
+
+def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
+    """Return the time integration that the options and a file ask for."""
+    time = given
+    if options.time is not None:
+        step, steps, every = _steps(options.time)
+        time = (
+            replace(given, step=step, steps=steps, every=every, place="")
+            if given
+            else TimeIntegration(step, steps, every)
+        )
+    if time is None:
+        _refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
+        return None
+    _refuse(options, ("solver", "tolerance"), "is for statics; time integration chooses its own solver")
+    changes: dict[str, Any] = {}
+    if options.steps is not None:
+        changes["steps"] = whole_number(options.steps, "--steps")
+    if options.integrator:
+        from kratos_lite.io.readers.time import integrator_of  # it brings the readers of JSON
+
+        name, _, words = options.integrator.partition(":")
+        changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
+    if options.rayleigh:
+        changes["rayleigh"] = _rayleigh(options.rayleigh)
+    if options.lumped:
+        changes["lumped"] = True
+    if options.restart:
+        changes["restart"] = options.restart
+    return replace(time, **changes)
+
+
+def _steps(text: str) -> tuple[float, int, int]:
+    """Return step, number of steps and every how many a state is kept of ``STEP:STEPS[:EVERY]``.
+
+    >>> _steps("1e-3:200:10")
+    (0.001, 200, 10)
+    """
+    step, *counts = text.split(":")
+    if len(counts) not in (1, 2) or not all(count.isdecimal() for count in counts):
+        raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
+    steps, every = (int(count) for count in (*counts, "1")[:2])
+    return number(step, "--time"), steps, every
+
+
+def _numbers(text: str, option: str) -> list[float]:
+    return [number(word, option) for word in text.split(",")] if text else []
+
+
+def _rayleigh(text: str) -> tuple[float, float]:
+    values = _numbers(text, "--rayleigh")
+    if len(values) != 2 or min(values) < 0:
+        raise InputError(f"--rayleigh: ALPHA,BETA, both ≥ 0, in 1/s and s are needed; got {text!r}")
+    return values[0], values[1]
+
+
+def number(text: str, option: str) -> float:
+    """Return a finite number or say which option holds what instead."""
+    try:
+        value = float(text) if "_" not in text else float("nan")
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise InputError(f"{option}: {text!r} is not a finite number such as 1.5 or 2e9")
+    return value
+
+
+def vector(text: str, option: str) -> list[float]:
+    """Return three numbers.
+
+    >>> vector("0,0,-9.81", "--gravity")
+    [0.0, 0.0, -9.81]
+    """
+    words = text.split(",")
+    if len(words) != 3:
+        raise InputError(f"{option}: three numbers X,Y,Z are needed; got {text!r}")
+    return [number(word, option) for word in words]
+
+
+LOADS: dict[str, tuple[Callable[[str, Any], Load], Callable[[str, str], Any], str]] = {
+    "traction": (Traction, vector, "PART:X,Y,Z"),
+    "pressure": (Pressure, number, "PART:P"),
+    "point_load": (PointLoad, vector, "PART:X,Y,Z"),
+}
+
+
+def split_part(text: str, option: str, example: str) -> tuple[str, str]:
+    """Split ``PART:rest`` at the last colon."""
+    part, colon, rest = text.rpartition(":")
+    if not (part and colon and rest):
+        raise InputError(f"{option}: expected {example}; got {text!r}")
+    return part, rest
+
+
+def material(text: str) -> tuple[str | None, LinearMaterial]:
+    """Return part (or None) and material of ``[PART:][LAW:]constant=value,…``.
+
+    >>> material("steel:E=210e9,nu=0.3")
+    ('steel', Isotropic3D(E=210000000000.0, nu=0.3, density=0.0))
+    """
+    option = f"--material {text}"
+    *names, constants = text.split(":")
+    part, law = None, "Isotropic3D"
+    for name in names:
+        if name in MATERIALS:
+            law = name
+        elif part is None:
+            part = name
+        else:
+            laws = ", ".join(MATERIALS)
+            raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
+    kind: Any = MATERIALS[law]
+    known = list(kind.variables)
+    values: dict[str, float] = {}
+    for pair in constants.split(","):
+        key, equals, value = pair.partition("=")
+        field = {v: k for k, v in kind.variables.items()}.get(key.strip(), key.strip())
+        if not equals or field not in known:
+            raise InputError(f"{option}: constants of {law} are {', '.join(known)}; got {pair!r}")
+        if field in values:
+            raise InputError(f"{option}: {field} is given twice")
+        values[field] = number(value, option)
+    missing = [k for k in known if k not in values and k != "density"]
+    if missing:
+        raise InputError(f"{option}: {law} also needs {', '.join(missing)}")
+    return part, kind(**values)
+
+
+def _where(model: Model, part: str | None) -> str | int | None:
+    """Return what a word before the constants of a material means: a part, a property id, or all."""
+    if part is None or part in model.mesh.parts or (part[1:] in ("+", "-") and part[0] in "xyz"):
+        return part
+    if part.isdecimal():
+        return int(part)
+    laws, parts = ", ".join(MATERIALS), ", ".join(model.mesh.parts) or "none"
+    hint = nearest(part, [*MATERIALS, *model.mesh.parts])
+    raise InputError(f"--material: unknown law or part {part!r}; laws are {laws}, parts are {parts}.{hint}")
+
+
+def motion(model: Model, options: Namespace) -> Motion | None:
+    """Return the motion of the material that the options give, or None."""
+    turns, passes = options.rotation, options.translation
+    if (turns or passes) and model.motion is not None:
+        raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
+    if turns and passes:
+        raise InputError("--rotation and --translation: a model has one motion; give one of them")
+    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("boundaries", "translation")):
+        if getattr(options, option) and not getattr(options, owner):
+            raise InputError(f"--{option} belongs to --{owner}; give that too")
+    text, option = turns or passes, "--rotation" if turns else "--translation"
+    if not text:
+        if options.damping:
+            raise InputError("--damping belongs to --rotation or --translation; give one of them too")
+        return None
+    from kratos_lite.ale import Rotation, Translation  # a quick start without motion
+
+    rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
+    try:
+        if passes:
+            return Translation(*rates, boundaries=options.boundaries or "absorbing", damping=damping)
+        center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
+        return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
+    except InputError as error:
+        raise InputError(f"{option} {text}: {error}") from None
+
+
+def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
+    """Return axis, rate and acceleration of ``AXIS:RATE[:ACCELERATION]``.
+
+    >>> _rates("z:-30:2.5", "--rotation")
+    ('z', -30.0, 2.5)
+    """
+    axis, *numbers = text.split(":")
+    if not axis or len(numbers) not in (1, 2):
+        raise InputError(f"{option}: expected AXIS:RATE[:ACCELERATION] such as z:30; got {text!r}")
+    rate, acceleration = (number(word, option) for word in (*numbers, "0")[:2])
+    return vector(axis, option) if "," in axis else axis, rate, acceleration
+
+
+def apply(model: Model, options: Namespace, materials: list[tuple[str | None, LinearMaterial]]) -> None:
+    """Add the materials, supports, loads and motion of the command line to a model."""
+    # the special wins over the general
+    for part, law in sorted(materials, key=lambda pair: pair[0] is not None):
+        model.assign(law, _where(model, part))
+    for text in options.fix:
+        part, rest = split_part(text, "--fix", "PART:axes or PART:axes=value")
+        axes, equals, value = rest.partition("=")
+        model.fix(part, axes, number(value, "--fix") if equals else 0.0)
+    if options.gravity and any(isinstance(load, Gravity) for load in model.loads):
+        model.notes.append("--gravity is added to the gravity of the file")
+    for text in options.gravity:
+        model.add(Gravity(vector(text, "--gravity")))
+    for name, (load, read, example) in LOADS.items():
+        option = f"--{name.replace('_', '-')}"
+        for text in getattr(options, name):
+            part, rest = split_part(text, option, example)
+            model.add(load(part, read(rest, option)))
+    if (given_motion := motion(model, options)) is not None:
+        model.add(given_motion)
