@@ -207,7 +207,7 @@ class Motion(Attachment):
         structure.motion = self
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what is doubtful about the motion of a structure, but for its rate.
+        """Return the warnings about the motion of a structure, except those about its rate.
 
         Parameters
         ----------

@@ -87,7 +87,7 @@ class Rotation(Motion):
         return r, wave
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
-        """Return what is doubtful about the motion of a structure, but for its rate."""
+        """Return the warnings about the motion of a structure, except those about its rate."""
         found = super().warnings(structure, groups)
         if any(lame_constants(group.material.C) is None for group in groups):
             found.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")

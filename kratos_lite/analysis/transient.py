@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
+from kratos_lite.analysis.derived_quantities import result_of, velocity_of_material
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.modal import critical_rates
-from kratos_lite.analysis.outputs import result_of, velocity_of_material
 from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State

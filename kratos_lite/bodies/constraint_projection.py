@@ -1,4 +1,4 @@
-"""Closing: the reactions with which a step ends where the constraints want it.
+"""Constraint projection: the reactions with which a step ends on the constraints.
 
 What a step makes of an additional force is known only by taking it; how the ends of the constraints answer
 to their reactions, W = h H A^-1 H^T, is known well enough to correct the reactions until the gaps close.
@@ -77,7 +77,7 @@ def constrained_step(body: Body, h: float, qh: Array, advance: Advance, solver: 
 
 
 def project_velocity(body: Body, h: float) -> None:
-    """Let a body start as its constraints want it: an impulse takes away the velocities that they forbid.
+    """Make the velocities of a body satisfy its constraints by an impulse.
 
     Without it a point that is fixed would go on with the velocity it had, there and back, for ever.
 

@@ -16,7 +16,7 @@ from kratos_lite.errors import InputError, ModelError, SolveError
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.io.case import Case
-    from kratos_lite.io.document import Document
+    from kratos_lite.io.formats.document import Document
     from kratos_lite.mesh import Mesh
 
 EXIT_VALUE_MISSED = 3
@@ -49,7 +49,7 @@ def use_threads(count: int | None) -> None:
 
 
 def _solve(options: Namespace, clock: float) -> int:
-    from kratos_lite.cli.case import case_of
+    from kratos_lite.cli.apply_options import case_of
     from kratos_lite.io.run import run
 
     seconds = {"import": perf_counter() - clock}
@@ -101,8 +101,8 @@ def _document(options: Namespace) -> Document:
 
     if ending(options.input) not in (".json", ".py"):
         return read_document(options.input, strict=not options.lenient)
-    from kratos_lite.io.document import Note
     from kratos_lite.io.files import read_case
+    from kratos_lite.io.formats.document import Note
     from kratos_lite.io.kratos.to_document import document_from
 
     case = read_case(options.input)

@@ -1,4 +1,4 @@
-"""The options of each command: a new one is an `add_argument`, and its meaning in `cli.case`."""
+"""The options of each command: a new one is an `add_argument`, and its meaning in `cli.apply_options`."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.io.document import Data, Document
+from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.mesh import Block
 

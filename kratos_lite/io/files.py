@@ -117,7 +117,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.state import State
-    from kratos_lite.io.document import Document
+    from kratos_lite.io.formats.document import Document
     from kratos_lite.io.writers.results import write_result
     from kratos_lite.io.writers.state import write_state
     from kratos_lite.mesh import Mesh

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.document import Note
+from kratos_lite.io.formats.document import Note
 from kratos_lite.typing import Ints
 
 MAX_LINE = 1_000_000

@@ -139,7 +139,7 @@ def test_loads_and_supports_that_change(run, folder):
 def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
     table = {"value": [1e5, 0, 0], "amplitude": {"times": [0, 1], "values": [0.5, 1]}}
     write(traction={"z+": table}, time=None, json="a.json")
-    assert "loads and supports that change in time are those at t = 0" in run("solve", "run.json").rows[
+    assert "loads and supports that change in time are taken at t = 0" in run("solve", "run.json").rows[
         "note"
     ] + str(json.loads((folder / "a.json").read_text())["notes"])
     result = tower(kl.Traction("z+", (5e4, 0.0, 0.0))).solve()

@@ -11,8 +11,8 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.io.document import Data, Document, Properties
 from kratos_lite.io.formats import read_document
+from kratos_lite.io.formats.document import Data, Document, Properties
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import SHAPES, Pyramid13, Shape, Wedge15
 

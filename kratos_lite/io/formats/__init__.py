@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Document
+from kratos_lite.io.formats.document import Document
 
 ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import replacing
-from kratos_lite.io.document import Document, Note, Properties
+from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.typing import Ints

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
-from kratos_lite.io.document import Document, Properties
+from kratos_lite.io.formats.document import Document, Properties
 from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
 from kratos_lite.io.settings import Settings, is_number, shown

@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
-from kratos_lite.io.document import Properties
+from kratos_lite.io.formats.document import Properties
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import BodyForce, Gravity

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
-from kratos_lite.io.document import Document
 from kratos_lite.io.formats import read_document
+from kratos_lite.io.formats.document import Document
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of
@@ -63,7 +63,7 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
     notes = _check_solver(solver) + _check_root(settings)
     if not dynamic:
         notes.append(
-            f"{len(times) - 1} time step(s): supports, loads, motion are those at t = {times[-1]:g} s"
+            f"supports, loads and motion are taken at the end of the run: those at t = {times[-1]:g} s"
         )
     document = _read_mesh(solver, folder, allow_outside, notes)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)

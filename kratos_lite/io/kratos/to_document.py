@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Constraint, Data, Document, Note, Properties
+from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Properties
 from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import Problems, nearest
-from kratos_lite.io.document import Data, Document, Note
+from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids

@@ -18,8 +18,8 @@ from kratos_lite.io.readers.values import is_by_part, number_or_series, read_mat
 from kratos_lite.io.settings import Settings, find_file, inside, shown
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, TimeDependentLoad, Traction
+from kratos_lite.solvers.linear_solver import METHODS
 
-SOLVERS = ("auto", "dense", "direct", "amg")
 OUTPUTS = ("output", "json", "picture")
 LOADS: dict[str, Callable[[str, Any], Load]] = {
     "traction": Traction,
@@ -74,7 +74,7 @@ def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: boo
     problems.of(add_motion, model, settings)
     problems.raise_if_any()
     if time is None and _changes(model):
-        model.notes.append("loads and supports that change in time are those at t = 0")
+        model.notes.append("loads and supports that change in time are taken at t = 0")
     return Case(model, time, 0, solver, tolerance, outputs, files=settings.files)
 
 
@@ -115,8 +115,8 @@ def _solver(settings: Settings) -> tuple[str, float]:
     solver = settings.section("solver")
     solver.check_keys(("type", "tolerance"))
     kind = solver.text("type", "auto")
-    if kind not in SOLVERS:
-        raise solver.error("type", f"solver.type must be one of {', '.join(SOLVERS)}; got {kind!r}")
+    if kind not in METHODS:
+        raise solver.error("type", f"solver.type must be one of {', '.join(METHODS)}; got {kind!r}")
     if "tolerance" in settings and "tolerance" in solver:
         raise settings.error("tolerance", "tolerance is given twice, also in 'solver'; keep one")
     owner = settings if "tolerance" in settings else solver

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Document
+from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
 REFUSED = {

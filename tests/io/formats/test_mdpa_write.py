@@ -11,7 +11,7 @@ import pytest
 from scenes import case, present
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.document import Constraint, Data, Document, Properties
+from kratos_lite.io.formats.document import Constraint, Data, Document, Properties
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.io.formats.mdpa.writer import write_mdpa

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.document import Constraint, Document
+from kratos_lite.io.formats.document import Constraint, Document
 from kratos_lite.io.formats.elem import read_elem, write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.mdpa.writer import write_mdpa

@@ -6,8 +6,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from kratos_lite.io.document import Data, Properties
 from kratos_lite.io.formats.cells import already
+from kratos_lite.io.formats.document import Data, Properties
 from kratos_lite.io.formats.elem.files import FIX, INIT, MATRIX, VECTOR, ElemFiles
 from kratos_lite.io.formats.elem.grammar import Form, Run, Source
 from kratos_lite.mesh import Mesh

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.document import Note
+from kratos_lite.io.formats.document import Note
 from kratos_lite.io.formats.elem.grammar import Form, Run, Source
 
 ENDINGS = (".node", ".elem", ".cond", ".prop", ".init")

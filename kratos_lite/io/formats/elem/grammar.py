@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.errors import Problems, nearest
-from kratos_lite.io.document import Note
+from kratos_lite.io.formats.document import Note
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
 from kratos_lite.typing import Array, Ints, Mask

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from kratos_lite.io.document import Note
 from kratos_lite.io.formats.cells import already, repeated, repeated_nodes, wrong_nodes
+from kratos_lite.io.formats.document import Note
 from kratos_lite.io.formats.elem.files import ElemFiles
 from kratos_lite.io.formats.elem.grammar import Run, Source
 from kratos_lite.io.names import condition_shape, element_shape

@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.atomic import replacing
-from kratos_lite.io.document import Data, Document, Note
+from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.formats.elem.data import read_nodal_data, read_properties, use_properties
 from kratos_lite.io.formats.elem.files import ElemFiles, stem
 from kratos_lite.io.formats.elem.mesh import read_mesh

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from kratos_lite.io.document import Constraint
+from kratos_lite.io.formats.document import Constraint
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.text import integer, real
 from kratos_lite.typing import Ints

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from kratos_lite.io.document import Data
+from kratos_lite.io.formats.document import Data
 from kratos_lite.io.formats.mdpa.rows import TRUTH, Layout, Rows, read_rows, width_of_first_line
 from kratos_lite.io.formats.mdpa.scan import WORD, Frame, Source
 from kratos_lite.io.formats.mdpa.values import kind_of, note_unknown, value_at

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import nearest
-from kratos_lite.io.document import Document, Properties
 from kratos_lite.io.formats.cells import already, repeated
+from kratos_lite.io.formats.document import Document, Properties
 from kratos_lite.io.formats.mdpa.data import read_data
 from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.parts import PartReader

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
-from kratos_lite.io.document import Constraint, Data, Document, Note
+from kratos_lite.io.formats.document import Constraint, Data, Document, Note
 from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of

@@ -1,4 +1,4 @@
-"""Outputs of bodies in motion: the velocity of their material, and what their supports carry together."""
+"""Quantities derived from results: the velocity of the material, and the resultant of the reactions."""
 
 from __future__ import annotations
 
