@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,10 @@ from kratos_lite.cli import main
 collect_ignore = ["interop/kratos_driver.py"]
 """Scripts that tests run in other processes."""
 
+
+signal.signal(
+    signal.SIGINT, signal.default_int_handler
+)  # a shell in the background ignores it, and so would children
 
 SOURCES = ["fixtures", "shared"] if (SHARED / "cases").is_dir() else ["fixtures"]
 

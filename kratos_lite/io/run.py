@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
-from kratos_lite.errors import ModelError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Progress
 
 ANALYSES = {
@@ -52,9 +53,32 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     >>> print(f"{outcome.result.u[:, 2].max():.3g} m")
     0.001 m
     """
+    check_case(case)
     check_outputs(case)
     outcome: Outcome = runner_of(case).run(case, progress)
     return outcome
+
+
+def check_case(case: Case) -> None:
+    """Raise InputError for a case that cannot be run as it stands."""
+    if not isinstance(case, Case):
+        raise InputError(f"a case is run, such as kl.read_case or kl.Case gives; got {type(case).__name__}")
+    if not isinstance(case.outputs.results, list):
+        raise InputError(f"the results of a case are a list of paths; got {case.outputs.results!r}")
+    if case.modes and case.time is not None:
+        raise InputError("a case has natural frequencies or a time integration; give one of them")
+    if isinstance(case.subject, Structure):
+        return
+    from kratos_lite.bodies import Body  # a model at rest starts quicker without it
+
+    if not isinstance(case.subject, Body):
+        raise InputError(f"a case needs a model or a body; got {type(case.subject).__name__}")
+    if case.modes or case.time is None:
+        raise InputError(
+            "a body needs a time integration, and has no natural frequencies: kl.Case(body, time=…)"
+        )
+    if case.time.integrator is not None or any(case.time.rayleigh) or case.time.lumped:
+        raise InputError("a body has its own integrator, damping and mass: set them on the body")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.io.case import Outputs, TimeIntegration
 from kratos_lite.io.run import ANALYSES, prepare
 
 MATERIAL = {"E": 1e6, "nu": 0.3, "density": 1000.0}
@@ -135,3 +136,21 @@ def test_outputs_are_checked_before_any_work(folder):
     case.outputs.state = "a.csv"
     with pytest.raises(kl.InputError, match=r"a\.csv: is an input or another output"):
         kl.run(case)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda body: "run.json", "a case is run"),
+        (lambda body: kl.Case(None), "needs a model or a body"),
+        (kl.Case, "a body needs a time integration"),
+        (lambda body: kl.Case(body, modes=2), "a body needs a time integration"),
+        (lambda body: kl.Case(body, TimeIntegration(1e-3, 3, lumped=True)), "set them on the body"),
+        (lambda body: kl.Case(body, TimeIntegration(1e-3, 3, integrator="explicit")), "set them on the body"),
+        (lambda body: kl.Case(body, TimeIntegration(1e-3, 3), outputs=Outputs("q.vtu")), "list of paths"),
+    ],
+)
+def test_a_case_that_means_nothing_is_refused(make, text):
+    body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    with pytest.raises(kl.InputError, match=text):
+        kl.run(make(body))
