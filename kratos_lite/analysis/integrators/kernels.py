@@ -18,7 +18,7 @@ def compiled(name: str, *arguments: Any) -> Any:
         return NotImplemented
     try:
         return getattr(motion, name)(*arguments)
-    except TypeError:
+    except TypeError:  # how the bindings refuse arrays that are not C-contiguous float64: NumPy takes those
         return NotImplemented
 
 
