@@ -179,7 +179,7 @@ class Structure:
 
     @property
     def prestress(self) -> Array | None:
-        """Stress (m, 6) in Pa of unstrained elements, tension positive, read-only, or None; see `add_prestress`."""
+        """Stress (m, 6) in Pa of unstrained elements, tension positive, or None; see `add_prestress`."""
         return self._prestress
 
     def stress_free_at(self, displacement: ArrayLike) -> None:

@@ -15,7 +15,6 @@ from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, 
 from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
 from kratos_lite.typing import Array, Ints
 
-
 PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
 """Elements of Kratos today; they take the DISPLACEMENT of free nodes for a guess."""
 

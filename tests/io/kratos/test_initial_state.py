@@ -1,4 +1,4 @@
-"""Initial state of files: prestress with the sign of Kratos, and the displacement at which nothing is stressed."""
+"""Initial state of files: prestress with the sign of Kratos, and the displacement without stress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ def write(tmp_path):
     """Write a unit cube that stands on z = 0 and slides there; E = 1 MPa and nu = 0."""
 
     def write(properties="", data="", element="KinematicLinear3D8N", fixed="XYZ"):
-        text = f"Begin Properties 1\nYOUNG_MODULUS {E}\nPOISSON_RATIO 0\nDENSITY 1\n{properties}\nEnd Properties\n"
+        material = f"YOUNG_MODULUS {E}\nPOISSON_RATIO 0\nDENSITY 1"
+        text = f"Begin Properties 1\n{material}\n{properties}\nEnd Properties\n"
         rows = "".join(f"{i} {x} {y} {z}\n" for i, (x, y, z) in enumerate(BOX.points, 1))
         nodes = " ".join(map(str, BOX.blocks[0].nodes[0] + 1))
         text += f"Begin Nodes\n{rows}End Nodes\nBegin Elements {element}\n1 1 {nodes}\nEnd Elements\n"
@@ -35,6 +36,10 @@ def top(value, axis="Z"):
     rows = np.flatnonzero(BOX.points[:, 2] == 1) + 1
     lines = "".join(f"{node} 0 {value}\n" for node in rows)
     return f"Begin NodalData DISPLACEMENT_{axis}\n{lines}End NodalData\n"
+
+
+def forces(text):
+    return [float(word) for word in text[text.index("(") + 1 : text.index(")")].split(",")]
 
 
 STRETCH = np.where(BOX.points == 1, [0, 0, 1e-3], 0.0)
@@ -125,7 +130,7 @@ def test_the_value_of_a_fixed_node_stays_its_support(write):
 def test_a_model_in_time_starts_from_the_initial_displacement_and_stays(write, run):
     out = run("solve", write(data=top(1e-3)), "--time", "1e-3:3")
     assert "1.000000e-03 m" in out.rows["largest displacement"]
-    assert out.rows["total reaction"].strip().startswith("(0, 0, 0) N")
+    assert np.abs(forces(out.rows["total reaction"])).max() < 1e-10
 
 
 def test_a_written_model_is_free_of_stress_at_the_same_displacement(write, tmp_path):
