@@ -12,7 +12,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss, totals
+from kratos_lite.assembly.gauss_point_fields import at_gauss, by_element, totals
 from kratos_lite.assembly.nodal_values import averages
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
@@ -78,8 +78,13 @@ class Report:
         unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
         force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
         spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
+        center = []
+        if "center_velocity" in m:
+            velocity, gained = (vector(np.array(m[f"center_{k}"])) for k in ("velocity", "acceleration"))
+            center = [("center", f"velocity {velocity} m/s, acceleration {gained} m/s²")]
         return [
             (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
+            *center,
             (
                 "critical rate",
                 (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")
@@ -171,20 +176,9 @@ class Result:
 
     def _by_element(self, stress: bool) -> Any:
         """Return (m, g, 6), or a list of (g, 6) where elements have different numbers of points."""
-        points, m = self.mesh.points, self.mesh.n_elements
+        points = self.mesh.points
         parts = [at_gauss(points, group, self._strained, stress=stress) for group in self.groups]
-        if len(parts) == 1 and (self.groups[0].rows == np.arange(m)).all():
-            return parts[0]
-        if len({part.shape[1] for part in parts}) > 1:
-            rows: list[Any] = [None] * m
-            for group, part in zip(self.groups, parts, strict=True):
-                for row, value in zip(group.rows.tolist(), part, strict=True):
-                    rows[row] = value
-            return rows
-        out = np.zeros((m, *parts[0].shape[1:]))
-        for group, part in zip(self.groups, parts, strict=True):
-            out[group.rows] = part
-        return out
+        return by_element(self.groups, parts, self.mesh.n_elements)
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and nodal values (n, 6)."""

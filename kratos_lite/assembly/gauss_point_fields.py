@@ -103,6 +103,25 @@ def value_at(
     return group.material.stress(strain) + group.initial_stress(chunk) if stress else strain
 
 
+def by_element(groups: Sequence[ElementGroup], parts: Sequence[Array], n_elements: int) -> Any:
+    """Return values (m', g, ...) of groups as (m, g, ...) of all elements in the order of the mesh.
+
+    They are a list of (g, ...) where elements have different numbers of points.
+    """
+    if len(parts) == 1 and (groups[0].rows == np.arange(n_elements)).all():
+        return parts[0]
+    if len({part.shape[1] for part in parts}) > 1:
+        rows: list[Any] = [None] * n_elements
+        for group, part in zip(groups, parts, strict=True):
+            for row, value in zip(group.rows.tolist(), part, strict=True):
+                rows[row] = value
+        return rows
+    out = np.zeros((n_elements, *parts[0].shape[1:]))
+    for group, part in zip(groups, parts, strict=True):
+        out[group.rows] = part
+    return out
+
+
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
     """Return ∫ B^T σ dV of displacements u (n, 3) as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
