@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.ale import Motion
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.assembly.gauss_point_fields import by_element
+from kratos_lite.assembly.gauss_point_fields import in_order
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
@@ -165,7 +165,7 @@ def material_derivative(
         return out.reshape(values.shape)
     parts = [_at_gauss(e, number, still, carried) for number in range(len(e.groups))]
     shaped = [part.reshape(*part.shape[:2], *tail) for part in parts]
-    return by_element(e.groups, shaped, model.mesh.n_elements)
+    return in_order(e.groups, shaped)
 
 
 def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) -> Array:
