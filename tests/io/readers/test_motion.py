@@ -337,3 +337,12 @@ def test_modes_are_those_of_python(folder, capsys):
     assert rows[0][-2:] == ["growth", "1/s"]
     np.testing.assert_allclose(np.sort(found[:, 1]), np.sort(values.imag), rtol=1e-6)
     assert np.abs(found[:, 2]).max() < 1e-6 * np.abs(values).max()
+
+
+def test_a_free_rotor_of_many_unknowns_does_not_grow_in_the_table(folder, capsys):
+    kl.write("rotor.mdpa", kl.annulus(0.3, 1.0, 0.2, cells=(2, 16, 1)))
+    words = ("--material", "E=210e6,nu=0.3,density=7620", "--rotation", "z:30", "--stiffening")
+    assert run("rotor.mdpa", *words, "--modes", "8") == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if re.match(r" +\d+  ", line)]
+    assert len(rows) == 8
+    assert max(abs(float(row[-1])) for row in rows) < 2e-4
