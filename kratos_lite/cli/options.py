@@ -183,8 +183,11 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         ale,
         ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
         ("--center", "X,Y,Z", "a point of the axis in m (0,0,0)"),
+        ("--center-velocity", "X,Y,Z", "of the center of the rotation, in m/s"),
+        ("--center-acceleration", "X,Y,Z", "likewise, in m/s²"),
         ("--translation", "AXIS:RATE[:ACCELERATION]", "of the moving frame, in m/s and m/s²"),
         ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
+        ("--moving-part", "PART", "the part that moves; the others rest (all)"),
     )
     ale.add_argument(
         "--stiffening", action="store_true", help="add the geometric stiffness of the centrifugal stress"
