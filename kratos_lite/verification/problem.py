@@ -53,8 +53,13 @@ class Problem:
     takes: Of | None = every
 
     def __post_init__(self) -> None:
-        if self.source.partition(",")[0] not in SOURCES:
+        if self.cited not in SOURCES:
             raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
+
+    @property
+    def cited(self) -> str:
+        """The word of the source in `SOURCES`."""
+        return self.source.replace(":", ",").partition(",")[0]
 
     def error(self, value: float) -> float:
         """Return how far a value is from the reference."""
