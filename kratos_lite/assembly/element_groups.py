@@ -21,10 +21,6 @@ CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
 
 
-GEOMETRY = ("__init__", "_jacobian", "_gauss", "dV")
-"""Methods of an element that kernels of Gauss points stand for."""
-
-
 def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
     """Return the kernels of a name, or None where they do not stand for these methods of an element class.
 
