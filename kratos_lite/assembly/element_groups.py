@@ -126,6 +126,8 @@ def element_groups_of(
     ------
     ModelError, InputError
         For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
+    MaterialError
+        For a material whose stress is not C strain.
 
     Examples
     --------
@@ -141,6 +143,7 @@ def element_groups_of(
             continue
         element = element_class(mesh, block)
         for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+            materials[material].check_stress()
             rows = at.start + mine
             chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
