@@ -15,14 +15,14 @@ from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.own_steps import MECHANICS
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Gravity, Load
 from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 SLOWEST, QUICKEST = 1.0, 2e4
 """Speeds of waves in m/s: jelly is above the one, diamond below the other."""
@@ -294,6 +294,17 @@ def check_loads(
     if not forces[~supports.fixed].any() and not moved:
         return ["all loads act on fixed components, so nothing moves"]
     return []
+
+
+def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
+    """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
+    unused = np.flatnonzero(~used)
+    lost = unused[(forces[unused] != 0).any(axis=1)]
+    if len(lost):
+        raise ModelError(
+            f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element; load another node, or "
+            "give it an element"
+        )
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:
