@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.own_steps import MECHANICS
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
@@ -153,9 +154,12 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
 def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
     """Return how many zero-energy modes beyond the six rigid ones a rule leaves to the reference cell."""
     cell = element(element.nodes, rule)
-    B = np.vstack([cell.B(xi) for xi in rule.points])
-    values = np.linalg.svd(B, compute_uv=False)
-    rank = int((values > 1e-9 * values[0]).sum())
+    if element.inherits(*MECHANICS):
+        B = np.vstack([cell.B(xi) for xi in rule.points])
+        values = np.linalg.svd(B, compute_uv=False)
+        rank = int((values > 1e-9 * values[0]).sum())
+    else:
+        rank = int(np.linalg.matrix_rank(cell.stiffness(np.eye(6)), tol=1e-12, hermitian=True))
     return 3 * len(element.nodes) - 6 - rank
 
 
@@ -223,7 +227,8 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
             "element; move it to the origin"
         )
     stiff = [float(np.abs(group.material.C).max()) for group in groups]
-    lock = {b.element.__name__ for b in groups if _is_near_half(b.material.C)} - {"KinematicLinear3D10N"}
+    plain = [b for b in groups if b.element.inherits(*MECHANICS)]  # a strain of its own may be free of it
+    lock = {b.element.__name__ for b in plain if _is_near_half(b.material.C)} - {"KinematicLinear3D10N"}
     if lock:
         names = ", ".join(sorted(lock))
         warnings.append(
