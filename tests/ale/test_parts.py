@@ -80,6 +80,9 @@ def test_two_bodies_with_one_in_motion_are_two_models(element):
     assert results[0].report.warnings == results[1].report.warnings
     for key in ("critical_rate", "critical_rate_of_waves"):
         assert results[0].report.motion[key] == pytest.approx(results[1].report.motion[key], rel=1e-6)
+    for key in ("support_force", "support_moment"):
+        found, expected = (np.array(result.report.motion[key]) for result in results[:2])
+        np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
     velocity = kl.material_velocity(both, results[0].u)
     same(velocity, kl.material_velocity(wheel, results[1].u), np.zeros_like(results[2].u), tolerance=1e-10)
     assert not velocity[both.mesh.nodes("rail")].any()
