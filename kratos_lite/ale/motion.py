@@ -263,12 +263,12 @@ class Motion(Attachment):
         return leak(mesh, self.field, self.moving(mesh), self.open_faces(mesh))
 
     def attach(self, structure: Structure) -> None:
-        """Become the motion of a structure.
+        """Become the motion of a structure, and tie or fix its boundaries if asked for.
 
         Raises
         ------
         ModelError
-            It has a motion already, or is not a body that may move so.
+            It has a motion already, is not a body that may move so, or its boundaries cannot be tied.
         """
         if structure.motion is not None:
             raise ModelError("the model has a motion already; there is one")
@@ -278,7 +278,11 @@ class Motion(Attachment):
                 f"the body is not {self.alike[0]} the axis {self.direction.tolist()}: {share:.0%} of the "
                 f"velocity passes through its boundary; {self.cure}"
             )
+        self._bind(structure)
         structure.motion = self
+
+    def _bind(self, structure: Structure) -> None:
+        """Tie or fix boundaries."""
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
         """Return the warnings about the motion of a structure, except those about its rate.
