@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.boundaries import leak
 from kratos_lite.ale.parts import check_ties, moving_nodes
-from kratos_lite.ale.rate import Rate
+from kratos_lite.ale.rate import Rate, vector_rates
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
@@ -93,6 +93,7 @@ class Motion(Attachment):
         self.steady = self._rate.steady
         self.damping = number(damping, "a damping", least=0, unit="1/s")
         self.part = part
+        self._center = vector_rates((0.0, 0.0, 0.0), None, "a center")
         self.A, self.center, self.drift = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
 
     def __str__(self) -> str:
@@ -127,17 +128,18 @@ class Motion(Attachment):
         -------
         (3,) m/s and (3,) m/s².
         """
-        return np.zeros(3), np.zeros(3)
+        velocity, acceleration = np.transpose([one.at(time, step, steady) for one in self._center])
+        return velocity, acceleration
 
     @property
     def travels(self) -> bool:
         """Whether the body as a whole moves in space with its center."""
-        return False
+        return any(not one.steady or one.value(0.0) for one in self._center)
 
     @property
-    def is_carried_evenly(self) -> bool:
-        """Whether the acceleration of the center never changes."""
-        return True
+    def uniformly_accelerated(self) -> bool:
+        """Whether Z̈ never changes."""
+        return not any(one.is_changing for one in self._center)
 
     def moving(self, mesh: Mesh) -> Mask:
         """Return the nodes of the elements that move.
