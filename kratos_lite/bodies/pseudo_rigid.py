@@ -72,6 +72,7 @@ class PseudoRigidBody(AffineBody, Deformable):
                 raise InputError("a pseudo-rigid body is of one material; FiniteElementBody takes several")
             (material,) = material.values()
         material = checked_material(material)
+        self.mass_is_given = mass_properties is not None
         if mass_properties is None:
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
