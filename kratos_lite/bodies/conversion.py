@@ -95,7 +95,7 @@ def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
         settings.pop("modes", None)
     if type(body) is not kind:  # its default is that of the kind
         settings.pop("tolerance", None)
-    other = kind(body.mesh, body.material, **{**settings, **options})  # type: ignore[call-arg]
+    other = kind(body.mesh, body.material, **{**settings, **options})
     if "integrator" not in options:
         if integrator in other.integrators:
             other.integrator = integrator

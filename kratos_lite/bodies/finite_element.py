@@ -234,6 +234,10 @@ class FiniteElementBody(Deformable):
         """Return the nodal forces as (3n,); see `Body.generalized_nodal_force`."""
         return forces.ravel()
 
+    def generalized_nodal_tangent(self, entries: Entries) -> Entries:
+        """Return the entries as they are; see `FreeBody.generalized_nodal_tangent`."""
+        return entries
+
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `Body.convected`."""
         located = self._in_mesh(X[None])
@@ -311,9 +315,11 @@ class FiniteElementBody(Deformable):
         """
         return self.formulation.increment_solver(q, dq, damping, c)
 
-    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+    def solve_static(
+        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
+    ) -> tuple[Array, Array]:
         """Return step and multipliers; see `Deformable.solve_static`."""
-        return sparse_step(self.stiffness(), self.points, residual, entries, gap)
+        return sparse_step(self.stiffness(), self.points, residual, entries, gap, tangent)
 
     def extent(self) -> float:
         """Return the largest side of the undeformed body in m."""
