@@ -24,8 +24,8 @@ def folder(tmp_path, monkeypatch):
         "bar": kl.box((4.0, 0.5, 0.5), cells=(8, 1, 1)),
     }
     for name, mesh in meshes.items():
-        mesh.parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
-        kl.write(f"{name}.mdpa", mesh)
+        parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
+        kl.write(f"{name}.mdpa", mesh.replace(parts=parts))
     return tmp_path
 
 
