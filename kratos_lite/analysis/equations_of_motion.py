@@ -40,6 +40,7 @@ class EquationsOfMotion:
     rayleigh : α in 1/s and β in s of the damping α M + β K.
     free : whether supports may leave rigid motions free.
     steady : take a rate that changes as one that stays, unless the motion is given an acceleration.
+    massless : let materials have no density, where the mass is only looked at.
 
     Attributes
     ----------
@@ -63,6 +64,7 @@ class EquationsOfMotion:
         rayleigh: tuple[float, float] = (0.0, 0.0),
         free: bool = True,
         steady: bool = False,
+        massless: bool = False,
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -70,7 +72,7 @@ class EquationsOfMotion:
         self.rayleigh = _checked_rayleigh(rayleigh)
         self.groups, _, self.warnings = model.checked(free=free)
         for group in self.groups:
-            if not group.material.density > 0:
+            if not (massless or group.material.density > 0):
                 raise ModelError(
                     f"{type(group.material).__name__} has density {group.material.density:g}, but what moves "
                     "needs mass; give each material a density > 0 kg/m³"

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import solvers
-from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.errors import InputError, ModelError, SolveError

@@ -10,12 +10,13 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.validation import whole_number
 
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
@@ -153,6 +154,23 @@ def element_groups_of(
     if not found:
         raise ModelError("the model has no elements; nothing can be solved")
     return found
+
+
+def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
+    """Return the one element of an id as a group of its own.
+
+    Raises
+    ------
+    MeshError
+        There is no such element, or several have this id.
+    """
+    number = whole_number(id, "the id of an element", least=0, error=MeshError)
+    rows = np.flatnonzero(mesh.element_ids == number)
+    if len(rows) != 1:
+        found = f"{len(rows)} elements have" if len(rows) else "no element has"
+        ids = mesh.element_ids
+        raise MeshError(f"{found} the id {number}; ids run from {ids.min()} to {ids.max()}")
+    return next(group.take(group.rows == rows[0]) for group in groups if (group.rows == rows[0]).any())
 
 
 def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[int, int, Ints]]:

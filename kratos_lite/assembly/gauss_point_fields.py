@@ -95,6 +95,26 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
     return np.concatenate(parts)
 
 
+def in_order(groups: Sequence[ElementGroup], parts: Sequence[Array]) -> Any:
+    """Return values (m_i, g, ...) of groups as (m, g, ...) in the order of the mesh.
+
+    Where groups have different numbers of Gauss points, a list of m arrays (g, ...).
+    """
+    m = sum(map(len, groups))
+    if len(parts) == 1 and (groups[0].rows == np.arange(m)).all():
+        return parts[0]
+    if len({part.shape[1:] for part in parts}) > 1:
+        rows: list[Any] = [None] * m
+        for group, part in zip(groups, parts, strict=True):
+            for row, value in zip(group.rows.tolist(), part, strict=True):
+                rows[row] = value
+        return rows
+    out = np.zeros((m, *parts[0].shape[1:]))
+    for group, part in zip(groups, parts, strict=True):
+        out[group.rows] = part
+    return out
+
+
 def value_at(
     element: KinematicLinear, group: ElementGroup, u: Array, chunk: slice, stress: bool = True
 ) -> Array:

@@ -33,7 +33,12 @@ def case_of(options: Namespace) -> Case:
     """Return the case of an input and the options of the command line, which win where there is one value."""
     materials = [material(text) for text in options.material]
     everywhere = any(part is None for part, _ in materials)
-    case = read_case(options.input, materials=not everywhere, strict=not options.lenient)
+    case = read_case(
+        options.input,
+        materials=not everywhere,
+        strict=not options.lenient,
+        initial_displacement=not options.ignore_initial_displacement,
+    )
     if case.is_of_model:
         apply(case.model, options, materials)
         if options.solver:
@@ -43,6 +48,8 @@ def case_of(options: Namespace) -> Case:
     else:
         _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
+    if case.is_of_model and case.time is not None:
+        case.time = case.time.starting_from(case.model.supports, case.model.initial_displacement)
     _set_outputs(case.outputs, options)
     if options.modes is not None:
         _take_modes(case, options)

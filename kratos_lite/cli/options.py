@@ -141,6 +141,11 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
     )
+    given.add_argument(
+        "--ignore-initial-displacement",
+        action="store_true",
+        help="do not take the DISPLACEMENT of free nodes in the file for the state without stress",
+    )
 
 
 def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:

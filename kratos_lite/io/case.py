@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kratos_lite.errors import ModelError
 from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array
 from kratos_lite.validation import flag, positive_step, whole_number
 
@@ -57,6 +60,22 @@ class TimeIntegration:
         whole_number(self.steps, "steps")
         whole_number(self.every, "every")
         flag(self.lumped, "lumped")
+
+    def starting_from(self, supports: Supports, displacement: Array | None) -> TimeIntegration:
+        """Return the integration that starts from a displacement, unless it has a start of its own.
+
+        Parameters
+        ----------
+        supports : of the model, which hold what is prescribed.
+        displacement : (n, 3) m, or None.
+
+        Returns
+        -------
+        TimeIntegration
+        """
+        if displacement is None or self.displacement is not None:
+            return self
+        return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))
 
     def __str__(self) -> str:
         by = f" by {self.integrator}" if self.integrator else ""

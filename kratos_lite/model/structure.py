@@ -170,7 +170,7 @@ class Structure:
 
     @property
     def prestress(self) -> Array | None:
-        """Stress (m, 6) in Pa of unstrained elements, read-only, or None; see `add_prestress`."""
+        """Stress (m, 6) in Pa of unstrained elements, tension positive, or None; see `add_prestress`."""
         return self._prestress
 
     def stress_free_at(self, displacement: ArrayLike) -> None:
@@ -191,7 +191,9 @@ class Structure:
         self._changes += 1
 
     def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
-        """Add a stress that elements carry before they are strained.
+        """Add a stress that elements carry before they are strained: σ = C ε + stress, tension positive.
+
+        PRESTRESS and INSITU_STRESS in files of Kratos have the opposite sign: σ = C ε - PRESTRESS.
 
         Parameters
         ----------

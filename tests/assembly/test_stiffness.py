@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from own_elements import tetrahedron_of_seven_nodes
 
 import kratos_lite as kl
 from kratos_lite.assembly import element_groups, sparsity_pattern
@@ -17,7 +18,6 @@ from kratos_lite.assembly.stiffness import CONSTANT_JACOBIANS, assemble_dense, a
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS
 from kratos_lite.native import kernels
-from kratos_lite.shapes import SHAPES, Tetrahedron4
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9, 450.0)
@@ -157,30 +157,10 @@ def test_several_shapes_rules_and_materials(path):
 
 
 def test_an_element_of_a_user_with_seven_nodes(path):
-    edges = ((0, 1), (1, 2), (0, 2))
-    with SHAPES.temporary(), ELEMENTS.temporary():
-
-        class Tetrahedron7(Tetrahedron4):
-            nodes = np.vstack([Tetrahedron4.nodes, [Tetrahedron4.nodes[list(e)].mean(axis=0) for e in edges]])
-
-            @staticmethod
-            def dN(xi):
-                L, dL = Tetrahedron4.N(xi), Tetrahedron4.dN(xi)
-                middle = np.array([4 * (L[i] * dL[j] + L[j] * dL[i]) for i, j in edges])
-                corner = dL.copy()
-                for (i, j), d in zip(edges, middle, strict=True):
-                    corner[[i, j]] -= d / 2
-                return np.vstack([corner, middle])
-
-        class KinematicLinear3D7N(kl.KinematicLinear):
-            shape = Tetrahedron7
-            rule = kl.quadrature.tetrahedron(degree=2)
-
+    with tetrahedron_of_seven_nodes() as element:
         points, (tens,) = scene("KinematicLinear3D10N", (2, 2, 1), 0.01)
-        group = ElementGroup(
-            KinematicLinear3D7N, KinematicLinear3D7N.rule, STEEL, tens.nodes[:, :7], tens.rows
-        )
-        assert KinematicLinear3D7N.inherits(*STIFFNESS_STEPS)
+        group = ElementGroup(element, element.rule, STEEL, tens.nodes[:, :7], tens.rows)
+        assert element.inherits(*STIFFNESS_STEPS)
         assert_sum(points, [group])
 
 
@@ -249,7 +229,11 @@ def test_every_instruction_set_gives_the_same_to_rounding(isa):
         "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.02, material))\n"
         "print(t.MODULE.isa())"
     )
-    environment = {**os.environ, "KRATOS_LITE_ISA": isa, "PYTHONPATH": os.getcwd()}
+    environment = {
+        **os.environ,
+        "KRATOS_LITE_ISA": isa,
+        "PYTHONPATH": os.pathsep.join((os.getcwd(), "tests/fixtures")),
+    }
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment
     )

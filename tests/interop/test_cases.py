@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import OURS, case, present
 
-import kratos_lite as kl
+from benchmarks import cases
 from kratos_lite.assembly.stiffness import assemble_dense
 
 SOLVED = present(
@@ -25,29 +25,12 @@ SOLVED = present(
 
 
 def model_of(folder, case, reference, file):
-    """Return the model of a case: the file plus what case.json adds."""
-    materials = case.get("materials", [])
-    model = kl.read(folder / file, materials=not materials)
-    for m in materials:
-        model.assign(kl.Isotropic3D(m["E"], m["nu"], m["rho"]), m["part"])
-    for fix in case.get("fix", []):
-        for axis, value in zip("xyz", fix["value"], strict=True):
-            if value is not None:
-                model.fix(fix["part"], axis, value, override=True)
-    for plane in case.get("fix_plane", []):
-        model.fix("xyz"[plane["axis"]] + "-+"[plane["at"] == "max"], "xyz")
+    """Return the model of a case: the file, what case.json adds, and pins where it floats."""
+    model = cases.model_of(folder, {**case, "mdpa": file})
     if case.get("pin_minimal"):
         pins = reference["pins"]
         for node, axes in ((pins["a"], "xyz"), (pins["b"][0], "yz"), (pins["c"][0], "z")):
             model.fix(model.mesh.node_rows([node]), axes)
-    if "gravity" in case:
-        model.add(kl.Gravity(case["gravity"]))
-    for load in case.get("surface_load", []):
-        model.add(kl.Traction(load["part"], load["value"]))
-    for load in case.get("surface_pressure", []):
-        model.add(kl.Pressure(load["part"], load["value"], normal="nodes"))
-    for load in case.get("point_load", []):
-        model.add(kl.PointLoad(load["part"], load["value"]))
     return model
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from own_elements import tetrahedron_of_seven_nodes
 
 import kratos_lite as kl
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.blocks import Block
 from kratos_lite.native import kernels
-from kratos_lite.shapes import SHAPES, Tetrahedron4
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -287,35 +287,7 @@ def test_quadratic_elements_have_a_linear_level(path):
 
 
 def test_an_element_of_a_user_with_seven_nodes(path):
-    edges = ((0, 1), (1, 2), (0, 2))
-    with SHAPES.temporary(), ELEMENTS.temporary():
-
-        class Tetrahedron7(Tetrahedron4):
-            nodes = np.vstack([Tetrahedron4.nodes, [Tetrahedron4.nodes[list(e)].mean(axis=0) for e in edges]])
-
-            @staticmethod
-            def dN(xi):
-                L, dL = Tetrahedron4.N(xi), Tetrahedron4.dN(xi)
-                middle = np.array([4 * (L[i] * dL[j] + L[j] * dL[i]) for i, j in edges])
-                corner = dL.copy()
-                for (i, j), d in zip(edges, middle, strict=True):
-                    corner[[i, j]] -= d / 2
-                return np.vstack([corner, middle])
-
-            @staticmethod
-            def N(xi):
-                L = Tetrahedron4.N(xi)
-                middle = [4 * L[..., i] * L[..., j] for i, j in edges]
-                corner = [
-                    L[..., k] - sum(m / 2 for e, m in zip(edges, middle, strict=True) if k in e)
-                    for k in range(4)
-                ]
-                return np.stack([*corner, *middle], axis=-1)
-
-        class KinematicLinear3D7N(kl.KinematicLinear):
-            shape = Tetrahedron7
-            rule = kl.quadrature.tetrahedron(degree=2)
-
+    with tetrahedron_of_seven_nodes():
         mesh = box(kind="10N")
         seven = mesh_of(mesh.points, ("7N", mesh.blocks[0].nodes[:, :7]))
         assert_solved(clamped(seven))
