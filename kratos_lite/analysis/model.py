@@ -179,7 +179,7 @@ class Model(Structure):
         MeshError, ModelError, InputError
             If the model is broken, has no mass, or has fewer modes.
         SolveError
-            If the iteration does not converge.
+            If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import natural_modes
 
@@ -202,7 +202,7 @@ class Model(Structure):
         MeshError, ModelError, InputError
             If the model is broken, has no mass, or has fewer modes.
         SolveError
-            If the iteration does not converge.
+            If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import complex_modes
 

@@ -93,8 +93,13 @@ class Report:
         unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
         force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
         spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
+        center = []
+        if "center_velocity" in m:
+            velocity, gained = (vector(np.array(m[f"center_{k}"])) for k in ("velocity", "acceleration"))
+            center = [("center", f"velocity {velocity} m/s, acceleration {gained} m/s²")]
         return [
             (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
+            *center,
             (
                 "critical rate",
                 (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")

@@ -183,10 +183,7 @@ class StaticAnalysis:
             external = external_loads(mesh, self.groups, loads)
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
-            lost = np.flatnonzero(~self._used)
-            lost = lost[_any_axis(acts[lost])]
-            if len(lost):
-                raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")
+            checks.check_carried(mesh, forces, self._used)
             moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
             moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
         return LoadSet(list(loads), external, forces, moving, phase)

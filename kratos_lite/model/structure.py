@@ -72,7 +72,7 @@ class Structure:
         self._mesh = checks.checked_mesh(mesh)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
-        self.motion: Any = None
+        self.motion: Attachment | None = None
         self.notes: list[str] = []
         self.patterns = PatternCache()
         self._initial_displacement: Array | None = None
