@@ -97,7 +97,7 @@ class Motion(Attachment):
 
     def __str__(self) -> str:
         when = "" if self.steady else " at the time 0"
-        where = "" if self.part is None else f", part {self.part!r:.40}"
+        where = f", part {self.part!r}" if isinstance(self.part, (str, int)) else ""
         name = type(self).__name__
         return f"{name} {self.direction.tolist()}, rate {self.rate(0.0):g}{when}{where}"
 
