@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
@@ -125,7 +126,7 @@ def _steps(text: str) -> tuple[float, int, int]:
     (0.001, 200, 10)
     """
     step, *counts = text.split(":")
-    if len(counts) not in (1, 2) or not all(count.isdecimal() for count in counts):
+    if len(counts) not in (1, 2) or not all(re.fullmatch("[0-9]{1,18}", count) for count in counts):
         raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
     steps, every = (int(count) for count in (*counts, "1")[:2])
     return number(step, "--time"), steps, every
