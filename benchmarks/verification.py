@@ -10,7 +10,6 @@ import argparse
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +26,8 @@ from kratos_lite.verification.scenes import Scene
 from kratos_lite.verification.table import verify
 
 PAGE = ROOT / "docs" / "verification.md"
+RESULTS = ROOT / "benchmarks" / "results" / "verification.json"
+COMMAND = "python -m benchmarks.verification"
 PEERS = ("Kratos", "CalculiX", "scikit-fem")
 LU = json.dumps({"solver_type": "LinearSolversApplication.sparse_lu"})
 CURVED = 1e-9
@@ -124,7 +125,7 @@ def solved(program: str, python: str, jobs: list[dict[str, str]], folder: Path) 
     return str(told["version"])
 
 
-def beside(rows: list[Row], pythons: dict[str, str], folder: Path) -> tuple[list[Row], dict[str, str]]:
+def beside(rows: list[Row], python: str, folder: Path) -> tuple[list[Row], dict[str, str]]:
     """Return the rows with what other programs find, and the versions of these."""
     ready, versions = prepared(rows, folder), {}
     for program in PEERS:
@@ -134,7 +135,7 @@ def beside(rows: list[Row], pythons: dict[str, str], folder: Path) -> tuple[list
             for one in models
             if takes(program, one)
         }
-        version = solved(program, pythons.get(program, sys.executable), list(jobs.values()), folder)
+        version = solved(program, python, list(jobs.values()), folder)
         if not version:
             continue
         versions[program] = version
@@ -147,18 +148,38 @@ def beside(rows: list[Row], pythons: dict[str, str], folder: Path) -> tuple[list
     return rows, versions
 
 
+def keep(rows: list[Row], versions: dict[str, str]) -> None:
+    """Write what the other programs find, to four digits more than the page shows."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for row in rows:
+        if row.others:
+            values = {name: float(f"{value:.8g}") for name, value in row.others.items()}
+            found.setdefault(row.problem.name, {})[row.kind] = values
+    problems = ",\n".join(f"  {json.dumps(name)}: {json.dumps(kinds)}" for name, kinds in found.items())
+    text = f'{{\n "versions": {json.dumps(versions)},\n "problems": {{\n{problems}\n }}\n}}\n'
+    RESULTS.write_text(text, encoding="utf-8")
+
+
+def kept(rows: list[Row]) -> tuple[list[Row], dict[str, str]]:
+    """Return the rows with what the other programs found when they last ran."""
+    told = json.loads(RESULTS.read_text(encoding="utf-8"))
+    known = told["problems"]
+    rows = [replace(row, others=known.get(row.problem.name, {}).get(row.kind, {})) for row in rows]
+    return rows, told["versions"]
+
+
 def main() -> None:
     """Compute the table, let the other programs solve its problems, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="problems or families (all)")
-    parser.add_argument("--python", default=sys.executable, help="interpreter with the other programs")
-    parser.add_argument("-o", "--output", type=Path, default=PAGE)
+    parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
+    parser.add_argument("--python", help="let the programs of this interpreter solve the problems anew")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="kratos_lite_verify_") as folder:
-        rows = list(verify(options.names))
-        rows, versions = beside(rows, dict.fromkeys(PEERS, options.python), Path(folder))
-    command = "python -m benchmarks.verification"
-    options.output.write_text(page.markdown(rows, versions, command), encoding="utf-8")
+    rows = list(verify())
+    if options.python:
+        with tempfile.TemporaryDirectory(prefix="kratos_lite_verify_") as folder:
+            rows, versions = beside(rows, options.python, Path(folder))
+        keep(rows, versions)
+    rows, versions = kept(rows)
+    PAGE.write_text(page.markdown(rows, versions, COMMAND), encoding="utf-8")
     print(page.summary(rows))
 
 

@@ -104,9 +104,14 @@ def _problem(
     of: Callable[[str], float],
 ) -> Problem:
     return Problem(
-        name=f"time/{name}", quantity=quantity, source=source, reference=reference, tolerance=tolerance, of=of,
+        name=f"time/{name}",
+        quantity=quantity,
+        source=source,
+        reference=reference,
+        tolerance=tolerance,
+        of=of,
         takes=None,
-    )  # fmt: skip
+    )
 
 
 PROBLEMS: list[Problem] = [

@@ -248,9 +248,14 @@ def _problem(
     elements: bool = False,
 ) -> Problem:
     return Problem(
-        name=f"body/{name}", quantity=quantity, source=source, reference=float(reference), tolerance=tolerance,
-        of=of, takes=every if elements else None,
-    )  # fmt: skip
+        name=f"body/{name}",
+        quantity=quantity,
+        source=source,
+        reference=float(reference),
+        tolerance=tolerance,
+        of=of,
+        takes=every if elements else None,
+    )
 
 
 PROBLEMS: list[Problem] = [
