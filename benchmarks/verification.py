@@ -80,10 +80,7 @@ def given(model: kl.Model, kind: str, folder: Path, number: int) -> Given | None
     forces = scene.forces()
     model.loads.clear()
     model.add(kl.NodalForces(forces))
-    named = model.mesh.blocks[0].name
-    found = Given(scene, forces, write(scene, folder), is_curved(model.mesh))
-    model.mesh.blocks[0].name = named
-    return found
+    return Given(scene, forces, write(scene, folder), is_curved(model.mesh))
 
 
 def prepared(rows: list[Row], folder: Path) -> dict[int, list[Given]]:
