@@ -107,7 +107,7 @@ def octant(n: int, kind: str, outer: Place) -> Mesh:
 
 def on_plane(mesh: Mesh, axis: int, value: float) -> Mask:
     """Return a mask of the nodes with coordinate `value` along an axis."""
-    return np.abs(mesh.points[:, axis] - value) < 1e-9 * max(1.0, float(np.abs(mesh.points).max()))
+    return np.abs(mesh.points[:, axis] - value) < 1e-7 * float(np.ptp(mesh.points[:, axis]))
 
 
 def on_boundary(mesh: Mesh) -> Mask:

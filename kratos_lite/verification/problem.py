@@ -71,7 +71,7 @@ class Problem:
         error = self.error(value)
         if self.tolerance is not None and self.exact(element):
             return PASS if error <= self.tolerance else FAIL
-        return next((letter for limit, letter in GRADES if error <= limit), "F")
+        return next((letter for limit, letter in GRADES if error <= limit * (1 + 1e-9)), "F")
 
     def elements(self, wanted: tuple[str, ...] = ELEMENTS) -> tuple[str, ...]:
         """Return those of some elements that the problem is for; ("",) where it has none."""
