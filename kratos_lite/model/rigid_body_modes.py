@@ -28,7 +28,7 @@ SAMPLE = 48
 
 def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = faces or mesh.all_faces()
+    faces = faces or mesh.all_faces
     warnings = []
     one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
     if len(one):
@@ -105,7 +105,7 @@ class Bodies:
 
 def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
     """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    faces = faces or mesh.all_faces()
+    faces = faces or mesh.all_faces
     joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
     root = components(mesh.n_elements, joined)
     is_root = root == np.arange(len(root))
