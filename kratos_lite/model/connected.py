@@ -43,7 +43,7 @@ class Bodies:
 
 def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
     """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    faces = faces or mesh.all_faces()
+    faces = faces or mesh.all_faces
     joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
     root = components(mesh.n_elements, joined)
     is_root = root == np.arange(len(root))

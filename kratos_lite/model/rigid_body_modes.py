@@ -32,7 +32,7 @@ PASSES, PROBES = 12, 12
 
 def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = faces or mesh.all_faces()
+    faces = faces or mesh.all_faces
     warnings = []
     one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
     if len(one):

@@ -58,9 +58,7 @@ def test_a_chain_on_corners_can_turn_about_all_axes(n):
 def test_a_chain_that_nothing_holds_can_move_as_a_whole():
     model = staircase(400)
     model.fix(0, "xyz")
-    with pytest.raises(
-        kl.ModelError, match=r"the part of node 1 \(8 nodes\) can still move: rotation about x"
-    ):
+    with pytest.raises(kl.ModelError, match=r"the part of node 1 \(8 nodes\) can still move: rotation"):
         model.check()
 
 
@@ -86,7 +84,7 @@ def test_one_free_hinge_among_hundreds_of_held_cells_is_found():
 
 
 def ring(n):
-    """Return a closed ring of cubes on edges along y: n steps up to the right, down to the right, and back."""
+    """Return a closed ring of cubes on edges along y: n steps up, n down, and back."""
     turns = ((1, 1), (1, -1), (-1, -1), (-1, 1))
     corners = [(0, 0)]
     for dx, dz in turns:

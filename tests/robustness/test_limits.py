@@ -175,15 +175,6 @@ def test_a_state_with_numbers_that_are_none_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("ending", [".vtu", ".vtk", ".mdpa", ".elem", ".msh"])
-def test_a_mesh_with_a_coordinate_that_is_no_number_is_not_written(tmp_path, ending):
-    mesh = kl.box()
-    mesh.points[3, 1] = np.nan
-    with pytest.raises(kl.KratosLiteError, match="not finite"):
-        kl.write(tmp_path / f"a{ending}", mesh)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_field_that_is_not_finite_is_not_written(tmp_path):
     mesh = kl.box()
     with pytest.raises(kl.SolveError, match=r"a\.vtu: not written: T is not finite"):
