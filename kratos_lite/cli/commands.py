@@ -51,7 +51,9 @@ def use_threads(count: int | None) -> None:
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.io.run import run
+    from kratos_lite.solvers.blas import reserve_buffers
 
+    reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     case = case_of(options)
@@ -60,15 +62,16 @@ def _solve(options: Namespace, clock: float) -> int:
         outcome = run(case, progress)
     if outcome.result is not None:
         outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
-    written, expected = list[str](), list[str]()
-    try:  # a file that fails loses no summary, and a terminal that fails loses no file
+    try:
         if not options.quiet:
             _print(outcome.summary(verbose=options.verbose))
-    finally:
-        written = outcome.write()
-        expected = outcome.compare()
-        _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
-        _print(expected)
+    except Exception:
+        outcome.write()  # a terminal that fails loses no file
+        raise
+    written = outcome.write()
+    expected = outcome.compare()
+    _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
+    _print(expected)
     return EXIT_VALUE_MISSED if any(" failed " in line for line in expected) else 0
 
 
