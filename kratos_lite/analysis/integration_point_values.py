@@ -66,10 +66,14 @@ class GaussPoints:
     def energy_density(self) -> Array:
         """Return ½ ε:C:ε (m, g) in J/m³."""
         strain = self.strain()
-        return (strain * self.group.material.stress(strain)).sum(axis=-1) / 2
+        if self.group.element.inherits("stress"):
+            elastic = self.group.material.stress(strain)
+        else:
+            elastic = self.stress() - self.group.initial_stress(slice(None))
+        return (strain * elastic).sum(axis=-1) / 2
 
     def elasticity(self) -> Array:
-        """Return C (m, g, 6, 6) in Pa."""
+        """Return C (m, g, 6, 6) in Pa of the material."""
         return np.tile(self.group.material.C, (len(self.group), len(self.group.rule), 1, 1))
 
     def jacobian(self) -> Array:
@@ -94,7 +98,7 @@ class GaussPoints:
 
     def B(self) -> Array:
         """Return B (m, g, 6, 3k) in 1/m."""
-        return np.stack([self.element.B(xi) for xi in self.group.rule.points], axis=-3)
+        return self.element._B(self.group.material.C)
 
 
 QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {

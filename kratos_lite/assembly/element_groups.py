@@ -22,10 +22,6 @@ CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
 
 
-GEOMETRY = ("__init__", "_jacobian", "_gauss", "dV")
-"""Methods of an element that kernels of Gauss points stand for."""
-
-
 def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
     """Return the kernels of a name, or None where they do not stand for these methods of an element class.
 
@@ -131,6 +127,8 @@ def element_groups_of(
     ------
     ModelError, InputError
         For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
+    MaterialError
+        For a material whose stress is not C strain.
 
     Examples
     --------
@@ -146,6 +144,7 @@ def element_groups_of(
             continue
         element = element_class(mesh, block)
         for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+            materials[material].check_stress()
             rows = at.start + mine
             chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]

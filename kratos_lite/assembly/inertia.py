@@ -17,11 +17,12 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.tables import lumped, tabulate
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.tables import lumped
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 
-STEPS = ("__init__", "_jacobian", "_gauss", "dV", "gauss_points", "scalar_mass")
+STEPS = (*GEOMETRY, "gauss_points", "scalar_mass")
 """What an element class may redefine so that its matrices are not those of its tables."""
 REST = np.zeros((3, 4))
 
@@ -94,7 +95,7 @@ def _computed(element: KinematicLinear, density: float, names: Any, velocity: Ar
         along = (c[..., None, :] @ D)[..., 0, :]
         weights = (density * dV)[..., None, :]
         if "G" in names:
-            found["G"] = (tabulate(element.shape, element.rule)[0].T * weights) @ along
+            found["G"] = (element._N(element.rule).T * weights) @ along
         if "H" in names:
             found["H"] = (np.swapaxes(along, -1, -2) * weights) @ along
     return found
@@ -116,7 +117,7 @@ def lumped_mass(points: Array, groups: Sequence[ElementGroup]) -> Array:
 def _element_masses(points: Array, group: ElementGroup) -> Array:
     """Return the lumped masses (m, k) of the elements of a group in kg."""
     density, rule = group.material.density, group.element.mass_rule
-    module = compiled("gauss", group.element, "__init__", "_jacobian", "scalar_mass", "lumped_mass")
+    module = compiled("gauss", group.element, *GEOMETRY, "scalar_mass", "lumped_mass")
     if module is None:
         return group.at(points).lumped_mass(density)
     sums, diagonal = module.mass_sums(floats(points), *group.tables(rule))

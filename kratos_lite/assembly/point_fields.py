@@ -8,7 +8,8 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.own_steps import STRAIN
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located
@@ -21,7 +22,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
     Raises
     ------
     InputError
-        An element class has a strain of its own, but no B-operator.
+        An element class has a strain of its own, but no B-operator; or a stress of its own.
     """
     rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
     out = np.zeros((len(rows), 6))
@@ -34,6 +35,11 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         mine = number[rows[at]]
         X, displaced = (values[group.nodes[mine]] for values in (located.mesh.points, u))
         value = _strain(group, X, xi[at], displaced)
+        if stress and not group.element.inherits("stress"):
+            raise InputError(
+                f"{group.element.__name__} has its own stress, known at Gauss points alone; "
+                "ask for at='gauss'"
+            )
         if stress:
             value = group.material.stress(value)
             value = value if group.prestress is None else value + group.prestress[mine]
@@ -44,12 +50,12 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
 def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
     """Return the strain (k, 6) of elements X (k, n, 3) under u (k, n, 3), each at its own xi (k, 3)."""
     element = group.element
-    if element.inherits("__init__", *STIFFNESS_STEPS, "strain"):
+    if element.inherits(*GEOMETRY, *STRAIN):
         dN = element.dN(xi)
         J = np.swapaxes(X, -1, -2) @ dN
         D = dN @ (cofactors(J) / determinant(J)[..., None, None])
         return voigt.symmetric_gradient(np.swapaxes(u, -1, -2) @ D)
-    if element.inherits("B") and not element.inherits("strain"):
+    if element.inherits("B") and not element.inherits(*STRAIN):
         raise InputError(
             f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "
             "ask for at='gauss'"
