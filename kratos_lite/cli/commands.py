@@ -123,7 +123,10 @@ def _document(options: Namespace) -> Document:
     case = read_case(options.input)
     if not case.is_of_model:
         raise InputError(f"{options.input}: describes a body; only meshes and models are converted")
-    document = document_from(case.model)
+    try:
+        document = document_from(case.model)
+    except InputError as error:
+        raise InputError(f"{options.input}: {error}") from None
     document.notes += [Note(0, text) for text in case.model.notes]
     return document
 
