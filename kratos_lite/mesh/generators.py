@@ -103,9 +103,9 @@ def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
     """Raise InputError for more cells than int32 numbers, or than memory holds."""
     i, j, k = counts
     cells = i * j * k * len(SPLITS[shape.cell])
-    what = f"a mesh of {i} × {j} × {k} bricks"
+    what = f"a mesh of {i:.6g} × {j:.6g} × {k:.6g} bricks"
     if cells * len(shape.nodes) >= 2**31:
-        raise InputError(f"{what} has {cells:.3g} cells, more than the {2**31 // len(shape.nodes)} possible")
+        raise InputError(f"{what} has more than the {2**31 // len(shape.nodes)} cells possible; take fewer")
     # Measured: points, bricks, cells and the sorting of their edges take 54 bytes for each node of a cell.
     fits_memory(60.0 * cells * len(shape.nodes), what, "take fewer cells")
 

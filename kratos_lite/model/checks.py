@@ -229,7 +229,7 @@ def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
         if not material.density > 0:
             continue
         E = 1 / float(np.linalg.inv(material.C).diagonal()[:3].min())
-        speed = float(np.sqrt(E / material.density))
+        speed = float(np.sqrt(E) / np.sqrt(material.density))  # E/ρ may be too large
         if not SLOWEST <= speed <= QUICKEST:
             warnings.append(
                 f"the speed of waves sqrt(E/density) is {speed:.3g} m/s in {material}; solids have "

@@ -264,6 +264,7 @@ def test_periodic_ends_need_opposite_nodes(wheels):
     model = elsewhere(model, moved)
     with pytest.raises(ModelError, match="nodes that lie opposite one another; there are 4 and 4"):
         model.add(Translation("x", rate=1.0, boundaries="periodic"))
+    assert model.motion is None
 
 
 @pytest.mark.parametrize(

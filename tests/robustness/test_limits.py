@@ -64,7 +64,7 @@ def test_a_gzip_bomb_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch
 
 @pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D27N"])
 def test_a_box_that_no_memory_holds_is_refused_at_once(element):
-    with pytest.raises(kl.InputError, match=r"bricks has [16]e"):
+    with pytest.raises(kl.InputError, match="bricks has more than"):
         kl.box(cells=(10**6,) * 3, element=element)
     with pytest.raises(kl.InputError, match="bricks has"):
         kl.annulus(1.0, 2.0, 1.0, cells=(1e300, 3, 1))
