@@ -243,7 +243,8 @@ def odd(sample):
         "huge integers": [2**70] * 3, "list of words": ["a", "b"], "list of None": [None, 1], "true": True,
         "mask of another length": np.ones(5, bool), "objects": np.array([object(), 1]), "minus one": [-1],
         "objects of numbers": np.array([1, 2], object), "decimal": Decimal(1),
-        "four axes": np.zeros((1, 1, 1, 1)), "fractions": [Fraction(1, 2)] * 3, "huge": 1e308, "no columns": np.zeros((3, 0)),
+        "four axes": np.zeros((1, 1, 1, 1)), "fractions": [Fraction(1, 2)] * 3, "huge": 1e308,
+        "no columns": np.zeros((3, 0)),
         "dates": np.array(["2020-01-01"] * 3, "M8[D]"), "durations": np.array([1, 2, 3], "m8[s]"),
         "structured": np.zeros(3, [("x", float)]), "unicode": np.array(["1", "2", "3"]), "nan": float("nan"),
         "unsigned": np.uint64(2**63),
@@ -268,7 +269,8 @@ def odd(sample):
 
 def is_absurd(value):
     try:
-        with np.errstate(all="ignore"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             return not (np.abs(np.asarray(value, float)) < 1e10).all()
     except (TypeError, ValueError, OverflowError):
         return False
