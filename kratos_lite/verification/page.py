@@ -69,7 +69,7 @@ def line(row: Row) -> str:
     """Return a row for a terminal."""
     error = "" if row.note else f"{row.error:9.1e}"
     text = (
-        f"{row.problem.name:<42}{row.kind:<6}{found(row, row.value):>12}{number(row.problem.reference):>12}"
+        f"{row.problem.name:<49} {row.kind:<9}{found(row, row.value):>12}{number(row.problem.reference):>12}"
     )
     return f"{text}{error:>11}  {row.grade:<5}{row.note.splitlines()[0] if row.note else ''}".rstrip()
 
