@@ -169,7 +169,7 @@ def test_moments_that_do_not_fit_are_refused():
     off = moment.u.copy()
     off[0, 0] = 1.0
     for field, value, words in (
-        ("time", -5.0, "time and a number of steps ≥ 0; got -5 s"),
+        ("time", -5.0, "the time of a state must be one number ≥ 0, in s; got -5"),
         ("time", np.nan, "time of a state must be finite"),
         ("step", -4, "got 0.001 s and -4"),
         ("step", 1.5, "got 0.001 s and 1.5"),
@@ -226,7 +226,7 @@ def test_nonsense_is_told():
             wheel(kl.ale.Rotation("z", rate=value)).solve()
     transient = wheel().transient()
     (moment,) = kl.integrate(transient, 1e-3, 1)
-    with pytest.raises(kl.InputError, match="v of a state needs shape"):
+    with pytest.raises(kl.InputError, match="v of a model has shape"):
         replace(moment, values={**moment.values, "v": moment.v[:4]}).restore(transient)
     with pytest.raises(kl.InputError, match="a State of a model is needed"):
         transient.restore(None)
