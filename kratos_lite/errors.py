@@ -83,6 +83,15 @@ class Problems:
             raise self.kind(text)
 
 
+RENAMED = {
+    **{"scheme": "integrator", "form": "formulation", "factor": "amplitude", "factors": "values"},
+    **{"ends": "boundaries", "march": "time", "characteristics": "mass_properties", "link": "constrain"},
+    **{f"set_{what}": f"prescribed_{what}" for what in ("displacement", "velocity", "acceleration")},
+    **{"pvd": "output", "csv": "output", "npz": "output", "generalised_alpha": "generalized_alpha"},
+}
+"""Words that other programs, or earlier versions, have for what is known here by another word."""
+
+
 def _plain(word: str) -> str:
     """Return a word without what is often mistaken: capitals, and what joins its parts."""
     return word.lower().replace("-", "_").replace(" ", "_")
@@ -98,6 +107,9 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     """
     from difflib import get_close_matches
 
+    known = list(known)
+    if RENAMED.get(name) in known:
+        return f" It is called {RENAMED[name]} here."
     plain = {_plain(word): word for word in known}
     close = [plain[word] for word in get_close_matches(_plain(name), list(plain), n=count, cutoff=0.6)]
     return f" Did you mean {' or '.join(close)}?" if close else ""

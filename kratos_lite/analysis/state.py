@@ -92,8 +92,7 @@ class State:
         Raises
         ------
         InputError
-            The state is of another kind or size, not finite, or, of a model, not where the supports hold it at
-            that time.
+            The state is of another kind or size, not finite, or, of a model, not where the supports are then.
         """
         _check_subject(subject)
         if not isinstance(subject, Body):

@@ -56,7 +56,9 @@ def use_threads(count: int | None) -> None:
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.io.run import run
+    from kratos_lite.solvers.blas import reserve_buffers
 
+    reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     case = case_of(options)
@@ -121,7 +123,10 @@ def _document(options: Namespace) -> Document:
     case = read_case(options.input)
     if not case.is_of_model:
         raise InputError(f"{options.input}: describes a body; only meshes and models are converted")
-    document = document_from(case.model)
+    try:
+        document = document_from(case.model)
+    except InputError as error:
+        raise InputError(f"{options.input}: {error}") from None
     document.notes += [Note(0, text) for text in case.model.notes]
     return document
 

@@ -171,8 +171,8 @@ def test_moments_that_do_not_fit_are_refused():
     for field, value, words in (
         ("time", -5.0, "the time of a state must be one number ≥ 0, in s; got -5"),
         ("time", np.nan, "time of a state must be finite"),
-        ("step", -4, "got 0.001 s and -4"),
-        ("step", 1.5, "got 0.001 s and 1.5"),
+        ("step", -4, "the steps of a state must be a whole number ≥ 0; got -4"),
+        ("step", 1.5, "the steps of a state must be a whole number ≥ 0; got 1.5"),
         ("u", off, "at t = 0.001 s the state does not fit the supports: node 1 along x is 1 m off"),
         ("v", np.full_like(off, np.nan), "v of a state must be finite"),
         ("a", off.astype(complex), "a of a state must be made of real numbers"),

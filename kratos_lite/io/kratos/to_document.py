@@ -34,7 +34,7 @@ def document_from(model: Model) -> Document:
     }
     for what, given in unwritten.items():
         if given:
-            raise InputError(f"{what} cannot be written to .mdpa")
+            raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
@@ -63,7 +63,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
     known: list[tuple[LinearMaterial, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
-            raise InputError("a model with replaced quadrature rules cannot be written to .mdpa")
+            raise InputError("a model with replaced quadrature rules cannot be written to a file of a model")
         prestress = np.zeros((len(group.rows), 6)) if group.prestress is None else group.prestress
         different, which = np.unique(prestress, axis=0, return_inverse=True)
         for i, stress in enumerate(different):
@@ -78,7 +78,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
 def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
     name = type(material).__name__
     if name not in KRATOS_LAW:
-        raise InputError(f"material {name} has no name in Kratos; .mdpa files hold {', '.join(KRATOS_LAW)}")
+        raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
     constants = [item.name for item in constants_of(material)]  # type: ignore[arg-type]
     values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
