@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from kratos_lite import solvers
 from kratos_lite.ale import MotionMatrices
-from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.ale.symmetry import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -88,10 +87,9 @@ class EquationsOfMotion:
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
-        if model.motion is not None:  # by the rule of G and H: then G u = M (L A X) holds for u = L X
-            exact = Mass(*placed, False, lambda element: exact_rule(element.shape))
-            self.mass = Mass(*placed, True, exact.rule_of) if lumped else exact
-            self.terms = MotionMatrices(model.motion, *placed, exact)
+        if model.motion is not None:
+            consistent = Mass(*placed, False) if lumped else self.mass
+            self.terms = MotionMatrices(model.motion, *placed, consistent)
             check_materials(self.terms)
             self.warnings += model.motion.warnings(model, self.system.groups)
             if self.rayleigh[1]:

@@ -10,6 +10,7 @@ Source: KratosWiki, *Kinematic Linear Element*; Zienkiewicz & Taylor, vol. 1, ch
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
+from kratos_lite.elements.exact import AFFINE, exact_rule, geometries, has_rules
 from kratos_lite.elements.tables import (
     cofactors,
     determinant,
@@ -29,7 +31,7 @@ from kratos_lite.errors import MeshError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints, Mask
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""
@@ -63,7 +65,8 @@ class KinematicLinear:
 
     Notes
     -----
-    A subclass states `shape`, `rule` and, where the rule cannot integrate N N, `mass_rule`.
+    A subclass states `shape` and `rule`.  Mass and body forces take rules that are exact for the shape and
+    the geometry of each cell; a subclass that states a `mass_rule` takes that one for the mass of all cells.
     Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
 
     Examples
@@ -78,7 +81,7 @@ class KinematicLinear:
     shape: ClassVar[type[Shape]]
     nodes: ClassVar[Array]
     rule: Rule
-    mass_rule: Rule
+    mass_rule: ClassVar[Rule | None] = None
     aliases: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -86,8 +89,6 @@ class KinematicLinear:
         if not (hasattr(cls, "shape") and hasattr(cls, "rule")):
             return  # a family of elements, not an element
         cls.nodes = cls.shape.nodes
-        if not hasattr(cls, "mass_rule"):
-            cls.mass_rule = cls.rule
         suffix = cls.__name__.removeprefix("KinematicLinear")
         same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]
         ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same])
@@ -241,13 +242,15 @@ class KinematicLinear:
         return self._gauss[0]
 
     def volume(self) -> Array:
-        """Return the volume.
+        """Return the volume, exact for every geometry of the cell.
 
         Returns
         -------
         (...) float, m³
         """
-        return self.dV.sum(axis=-1)
+        if not self.inherits("_gauss", "dV"):
+            return self.dV.sum(axis=-1)
+        return self._integrate(lambda N, dV: dV.sum(axis=-1), factors=0)
 
     def gauss_points(self) -> Array:
         """Return the places X of the Gauss points.
@@ -306,7 +309,7 @@ class KinematicLinear:
         return (np.swapaxes(D, -1, -2) @ s).sum(axis=-3)
 
     def body_force(self, b: ArrayLike) -> Array:
-        """Return the load r_ext = Σ N b γ det J of a body force.
+        """Return the load r_ext = ∫ N b dV of a body force, by the rules of `scalar_mass`.
 
         Parameters
         ----------
@@ -319,7 +322,10 @@ class KinematicLinear:
         b = np.asarray(b, dtype=float)
         if b.ndim == self.X.ndim and b.shape[-2:] == self.nodes.shape:
             return self.scalar_mass() @ b
-        share = self.dV @ tabulate(self.shape, self.rule)[0]
+        if self.inherits("_gauss", "dV"):
+            share = self._integrate(lambda N, dV: dV @ N, factors=1)
+        else:
+            share = self.dV @ tabulate(self.shape, self.rule)[0]
         return share[..., :, None] * b[..., None, :]
 
     def stiffness(self, C: ArrayLike) -> Array:
@@ -418,7 +424,9 @@ class KinematicLinear:
     # ---- mass ----------------------------------------------------------------------------------
 
     def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
-        """Return the mass matrix of one axis, Σ ρ N N^T γ det J.
+        """Return the mass matrix of one axis, ∫ ρ N N^T dV, exact for every geometry of the cell.
+
+        A `mass_rule` of the class is used as it is.
 
         Parameters
         ----------
@@ -428,9 +436,46 @@ class KinematicLinear:
         -------
         (..., n, n) float, kg
         """
-        N, dN = tabulate(self.shape, self.mass_rule)
-        dV = determinant(self._jacobian(dN)) * self.mass_rule.weights * np.asarray(density)[..., None]
-        return (N.T * dV[..., None, :]) @ N
+        m = self._integrate(lambda N, dV: (N.T * dV[..., None, :]) @ N, factors=2)
+        return m * np.asarray(density, dtype=float)[..., None, None]
+
+    def _integrate(self, of: Callable[[Array, Array], Array], factors: int) -> Array:
+        """Return integrals of products of `factors` functions, made of N (g, n) and γ det J (..., g)."""
+        total: Array | None = None
+        for mine, rule in self.mass_rules(geometries(self.shape, self.X), factors):
+            N, dN = tabulate(self.shape, rule)
+            found = of(N, self.determinants(dN) * rule.weights)
+            if total is not None:
+                found[~mine] = total[~mine]
+            total = found
+        assert total is not None
+        return total
+
+    @classmethod
+    def mass_rules(cls, kinds: Ints, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
+        """Return the rules for products of shape functions over cells, each with a mask of its cells.
+
+        Parameters
+        ----------
+        kinds : (...) int, the geometry of each cell; see `geometries`.
+        factors : number of functions in the product.
+        flow : whether it is one of G or H; see `exact_rule`.
+
+        Returns
+        -------
+        list of (mask (...), Rule)
+            For the mass itself a `mass_rule` of the class; the own rule for cells of unknown degree.
+        """
+        stated = cls.mass_rule if factors == 2 and not flow else None
+        if stated is None and not has_rules(cls.shape):
+            stated = cls.rule
+        if stated is not None:
+            return [(np.ones(kinds.shape, dtype=bool), stated)]
+        rules: dict[Rule, Mask] = {}
+        for kind in np.unique(kinds).tolist() or [AFFINE]:
+            rule = exact_rule(cls.shape, factors, kind, flow)
+            rules[rule] = rules.get(rule, np.zeros(kinds.shape, dtype=bool)) | (kinds == kind)
+        return [(mask, rule) for rule, mask in rules.items()]
 
     def mass(self, density: ArrayLike) -> Array:
         """Return the consistent mass matrix.
@@ -463,5 +508,5 @@ class KinematicLinear:
         (..., n) float, kg
         """
         m = self.scalar_mass(density)
-        diagonal = np.diagonal(m, axis1=-2, axis2=-1)
-        return lumped(m.sum(axis=-1), diagonal, self.shape, self.mass_rule)
+        _, reference = self.mass_rules(geometries(self.shape, self.nodes), factors=2)[0]
+        return lumped(m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1), self.shape, reference)
