@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import ale, errors, scenes
+from benchmarks import ale, scenes
 from benchmarks.programs import HELPERS, PROGRAMS, Program
+from kratos_lite.verification import errors
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCHER = Path(__file__).with_name("launch.py")
@@ -160,7 +161,7 @@ class Driver:
             if run.task == "ale":
                 self.stems[run.place] = ale.write(self.folder, run.kind, run.n)
             elif run.n < LARGE:
-                self.stems[run.place] = scenes.make(*run.place).write(self.folder)
+                self.stems[run.place] = scenes.write(scenes.make(*run.place), self.folder)
             else:
                 words = [*map(str, run.place), str(self.folder)]
                 command = [sys.executable, "-m", "benchmarks.scenes", *words]

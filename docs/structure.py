@@ -22,7 +22,11 @@ FLOORS = [
     {"model": (1, "loads, supports, checks")},
     {"ale": (1, "material moves through mesh"), "bodies": (2, "rigid, pseudo-rigid, FE")},
     {"analysis": (1, "static, modal, integrators")},
-    {"io": (1, "file formats, cases, writers"), "testing": (3, "conformance kit")},
+    {
+        "io": (1, "file formats, cases, writers"),
+        "verification": (2, "problems with known answers"),
+        "testing": (3, "conformance kit"),
+    },
     {"cli": (1, "commands and options")},
     {"__main__": (1, "python -m kratos_lite")},
 ]

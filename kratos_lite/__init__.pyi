@@ -1,13 +1,17 @@
 """The public names, one a line; ``import kratos_lite`` reads them here."""
 
 from kratos_lite import ale as ale
-from kratos_lite.analysis.derived_quantities import material_velocity as material_velocity
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.integrators import HHT as HHT
 from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
+from kratos_lite.analysis.material_derivatives import material_acceleration as material_acceleration
+from kratos_lite.analysis.material_derivatives import material_derivative as material_derivative
+from kratos_lite.analysis.material_derivatives import material_velocity as material_velocity
+from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
+from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
 from kratos_lite.analysis.result import Result as Result

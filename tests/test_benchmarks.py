@@ -24,9 +24,6 @@ from benchmarks import (  # noqa: E402
     cases,
     curves,
     driver,
-    errors,
-    fields,
-    meshes,
     motion,
     report,
     scenes,
@@ -34,6 +31,7 @@ from benchmarks import (  # noqa: E402
     tables,
 )
 from benchmarks.programs import PROGRAMS  # noqa: E402
+from kratos_lite.verification import errors, fields  # noqa: E402
 
 E, NU = 1.0, 0.3
 RNG = np.random.default_rng(5)
@@ -322,7 +320,7 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [curves, tables, meshes, sets, report, command])
+@pytest.mark.parametrize("module", [curves, tables, sets, report, command])
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 

@@ -12,29 +12,31 @@ from kratos_lite.errors import ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import acoustic_tensor
 
 FLAT = 1e-6
 """Share of the length of the frame by which a cut face may be uneven."""
 
 
-def cut_nodes(mesh: Mesh, direction: Array) -> tuple[Ints, Ints]:
-    """Return the rows of the nodes on the lower and the upper cut face along a unit direction (3,)."""
+def cut_nodes(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
+    """Return the rows of the moving nodes (n,) on both cut faces, lower and upper, along a unit direction."""
     x = mesh.points @ direction
-    used = mesh.used_nodes()
-    low, high = float(x[used].min()), float(x[used].max())
+    low, high = float(x[moving].min()), float(x[moving].max())
     near = FLAT * (high - low)
-    return np.flatnonzero((x <= low + near) & used), np.flatnonzero((x >= high - near) & used)
+    return np.flatnonzero((x <= low + near) & moving), np.flatnonzero((x >= high - near) & moving)
 
 
-def leak(mesh: Mesh, velocity: Callable[[Array], Array], open_faces: Sequence[Ints] = ()) -> float:
+def leak(
+    mesh: Mesh, velocity: Callable[[Array], Array], moving: Mask, open_faces: Sequence[Ints] = ()
+) -> float:
     """Return the largest normal velocity at the boundary as a share of the largest velocity there.
 
     Parameters
     ----------
     mesh : the elements.
     velocity : of the material through the mesh at points (..., 3).
+    moving : (n,) nodes of the elements that move; they share none with others.
     open_faces : nodes of each plane face that the material may pass through.
     """
     normal, largest, is_open = 0.0, 0.0, np.zeros((len(open_faces) + 1, mesh.n_nodes), dtype=bool)
@@ -44,7 +46,8 @@ def leak(mesh: Mesh, velocity: Callable[[Array], Array], open_faces: Sequence[In
         if block.shape is None or not len(block):
             continue
         rule = face_rule(block.shape)
-        X = mesh.points[block.nodes[~is_open[:, block.nodes].all(axis=2).any(axis=0)]]
+        closed = ~is_open[:, block.nodes].all(axis=2).any(axis=0)
+        X = mesh.points[block.nodes[closed & moving[block.nodes[:, 0]]]]
         n = area_vectors(block.shape, X, rule)
         n = n / np.linalg.norm(n, axis=-1, keepdims=True)
         N = np.array([block.shape.N(xi) for xi in rule.points])
@@ -54,8 +57,8 @@ def leak(mesh: Mesh, velocity: Callable[[Array], Array], open_faces: Sequence[In
     return normal / largest if largest else 0.0
 
 
-def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem) -> BlockMatrix:
-    """Return the damping of absorbing boundaries, (3a, 3a) in N s/m; see `impedance`.
+def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem, moving: Mask) -> BlockMatrix:
+    """Return the damping of absorbing boundaries of moving nodes, (3a, 3a) in N s/m; see `impedance`.
 
     Source: Lysmer & Kuhlemeyer, J. Eng. Mech. Div. ASCE 95 (1969) 859-877.
     """
@@ -68,7 +71,7 @@ def dashpots(mesh: Mesh, direction: Array, system: ConstrainedSystem) -> BlockMa
     of_element = np.zeros((mesh.n_elements, 3, 3))
     for group in system.groups:
         of_element[group.rows] = impedance(group.material, direction)
-    for nodes in cut_nodes(mesh, direction):
+    for nodes in cut_nodes(mesh, direction, moving):
         faces = mesh.faces(nodes)
         if not faces:
             raise ModelError(
@@ -100,18 +103,18 @@ def impedance(material: LinearMaterial, direction: Array) -> Array:
     return np.asarray((ways * np.sqrt(material.density * squares)) @ ways.T)
 
 
-def periodic_pairs(mesh: Mesh, direction: Array) -> tuple[Ints, Ints]:
-    """Return the nodes of the upper cut face and the opposite ones of the lower.
+def periodic_pairs(mesh: Mesh, direction: Array, moving: Mask) -> tuple[Ints, Ints]:
+    """Return the moving nodes of the upper cut face and the opposite ones of the lower.
 
     Raises
     ------
     ModelError
         If the nodes of the two faces do not lie opposite one another.
     """
-    low, high = cut_nodes(mesh, direction)
+    low, high = cut_nodes(mesh, direction, moving)
     across = np.eye(3) - np.outer(direction, direction)
     a, b = mesh.points[low] @ across, mesh.points[high] @ across
-    size = float(np.ptp(mesh.points, axis=0).max())
+    size = float(np.ptp(mesh.points[moving], axis=0).max())
     if len(low) == len(high):
         distance = np.abs(a[:, None, :] - b[None]).max(axis=2)
         nearest = distance.argmin(axis=0)

@@ -46,7 +46,7 @@ def critical_rate_estimate(terms: MotionMatrices) -> float:
 
     It is for thick bodies: bending of thin ones is slower.
     """
-    return terms.motion.critical_rate(wave_speeds(terms)[2], terms.points)
+    return terms.motion.critical_rate(wave_speeds(terms)[2], terms.moving_points)
 
 
 def near_critical(motion: Motion, time: float, limit: float, of_mesh: bool) -> list[str]:

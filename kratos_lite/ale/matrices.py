@@ -12,8 +12,9 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.solvers.constrained_system import among
 from kratos_lite.solvers.mass import Mass
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import tensor
 
 
@@ -30,6 +31,7 @@ class MotionMatrices:
     groups : the elements.
     pattern : of the matrices.
     mass : of the same elements.
+    moving : (n,) nodes of the elements that move, which share none with others; all if not given.
 
     Attributes
     ----------
@@ -40,11 +42,55 @@ class MotionMatrices:
     """
 
     def __init__(
-        self, motion: Motion, points: Array, groups: Sequence[ElementGroup], pattern: Pattern, mass: Mass
+        self,
+        motion: Motion,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        pattern: Pattern,
+        mass: Mass,
+        moving: Mask | None = None,
     ) -> None:
-        self.motion, self.points, self.groups = motion, points, groups
+        self.motion, self.points = motion, points
         self.pattern, self.mass = pattern, mass
+        self.moving = np.ones(len(points), dtype=bool) if moving is None else moving
+        self.groups = among(groups, self.moving)
         self._made: dict[str, Array] = {}
+
+    @property
+    def moving_points(self) -> Array:
+        """The nodes that move, (k, 3) in m."""
+        return self.points[self.moving]
+
+    @cached_property
+    def _own(self) -> tuple[Pattern, Ints | None]:
+        """The pattern of the elements that move, and where its entries stand in the whole one."""
+        if self.moving.all():
+            return self.pattern, None
+        own, n = Pattern(len(self.points), [group.nodes for group in self.groups]), len(self.points)
+        keys, wanted = (p.rows().astype(np.int64) * n + p.indices for p in (self.pattern, own))
+        return own, np.searchsorted(keys, wanted)
+
+    def _spread(self, own: Array) -> Array:
+        """Return data on the pattern of what moves on the whole pattern."""
+        places = self._own[1]
+        if places is None:
+            return own
+        data = np.zeros(len(self.pattern.indices))
+        data[places] = own
+        return data
+
+    def of_moving(self, data: Array) -> Array:
+        """Return the entries of what moves of a matrix, and 0 for the others.
+
+        Parameters
+        ----------
+        data : (nnz,) on the pattern.
+
+        Returns
+        -------
+        (nnz,).
+        """
+        return data if self.moving.all() else np.where(self.moving[self.pattern.rows()], data, 0.0)
 
     def make(self, names: str) -> None:
         """Make G, H or both, of those not made before, in one pass over the elements.
@@ -57,13 +103,14 @@ class MotionMatrices:
         if missing:
             motion = self.motion  # points from the center on, where no digits are lost
             velocity = np.column_stack([motion.A, motion.field(motion.center)])
-            self._made |= inertia_matrices(
+            made = inertia_matrices(
                 self.points - motion.center,
                 self.groups,
-                self.pattern,
+                self._own[0],
                 missing,
                 velocity,
             )
+            self._made |= {name: self._spread(data) for name, data in made.items()}
 
     @property
     def G(self) -> Array:
@@ -129,8 +176,14 @@ class MotionMatrices:
         """-∫ ρ N A (X - X0) as nodal forces (n, 3) for the acceleration 1; 0 for a translation."""
         return self._inertia(-self.motion.A)
 
+    @cached_property
+    def nodal_mass(self) -> Array:
+        """∫ ρ N of what moves, (n,) in kg: minus the load of the acceleration 1 of the center."""
+        return np.where(self.moving, self.mass.nodal, 0.0)
+
     def _inertia(self, A: Array) -> Array:
-        return np.asarray(self.mass.scalar @ ((self.points - self.motion.center) @ A.T))
+        along = np.where(self.moving[:, None], (self.points - self.motion.center) @ A.T, 0.0)
+        return np.asarray(self.mass.scalar @ along)
 
     # ---- centrifugal stiffening ---------------------------------------------------------------------
 
@@ -145,11 +198,12 @@ class MotionMatrices:
         -------
         (nnz,) in N/m.
         """
-        data = np.zeros(len(self.pattern.indices))
+        pattern = self._own[0]
+        data = np.zeros(len(pattern.indices))
         for number, group in enumerate(self.groups):
             stress = tensor(gauss_point_fields.at_gauss(self.points, group, u0))
             for chunk in group.chunks():
                 dV, D = group.at(self.points, chunk)._gauss
                 weighted = stress[chunk] * dV[..., None, None]
-                self.pattern.add(data, number, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
-        return data
+                pattern.add(data, number, chunk, (np.swapaxes(D, -1, -2) @ weighted @ D).sum(axis=-3))
+        return self._spread(data)

@@ -7,6 +7,9 @@ derivative of a displacement is u' + rate (c · grad) u, which adds to M u'' + K
     2 rate G u' + (acceleration G - rate² H) u,
     G_ij = ∫ ρ N_i c·grad N_j,    H_ij = ∫ ρ (c·grad N_i)(c·grad N_j)
 
+A motion belongs to a whole model, or to a part of it; then only the elements of that part add to G and H, and
+boundaries are those of the part.
+
 Source: GetFEM user documentation, ALE support for objects having a large rigid body motion, with the signs of
 its loads and a factor 2 corrected; Nackenhorst, Comput. Methods Appl. Mech. Eng. 193 (2004) 4299-4322.
 """
@@ -14,21 +17,23 @@ its loads and a factor 2 corrected; Nackenhorst, Comput. Methods Appl. Mech. Eng
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.boundaries import leak
+from kratos_lite.ale.parts import check_ties, moving_nodes
+from kratos_lite.ale.rate import Rate
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.structure import Attachment, Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
-from kratos_lite.typing import Array, Ints
+from kratos_lite.time_series import Factor
+from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, number
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -41,14 +46,22 @@ TOO_LEAKY = 0.2
 class Motion(Attachment):
     """The rigid motion of the material through a mesh that does not take part in it.
 
+    Parameters
+    ----------
+    direction : ``"x"``, ``"y"``, ``"z"`` or (3,): the axis of a rotation or the direction of a translation.
+    rate : number, `TimeSeries` or function of time, in the unit of the motion.
+    acceleration : likewise; the derivative of the rate if not given, and 0 in a steady state.  A number or
+        `TimeSeries` changes a rate that is a number as time goes on.
+    damping : α in 1/s, mass-proportional damping relative to the rigid motion.
+    part : the elements that move, by part name, property id or rows; all if not given.
+
     Attributes
     ----------
-    direction : (3,) unit vector, the axis of a rotation or the direction of a translation.
+    direction : (3,) unit vector.
     rate, acceleration : functions of time in s.
     steady : whether they never change.
-    is_accelerated : whether the acceleration was given, and not taken from the rate.
-    damping : α in 1/s, mass-proportional damping relative to the rigid motion.
-    A, center : the velocity is A (X - center) for the rate 1, but for a constant one; (3, 3) and (3,).
+    A, center, drift : the velocity of the material through the mesh is A (X - center) + drift for the rate 1;
+        (3, 3), (3,) and (3,).
     skew : whether the skew part of G stands for G in the damping.
     stiffening : whether the centrifugal stress stiffens.
     kind, unit : the word for the motion, and the unit of its rate.
@@ -62,30 +75,90 @@ class Motion(Attachment):
     """Words for a body that may move so, and for the place where it must be even."""
     cure: ClassVar[str]
     leak_cure: ClassVar[str]
-    A: Array
-    center: Array
     skew = True
     stiffening = False
 
     def __init__(
-        self, direction: ArrayLike | str, rate: Factor, acceleration: Factor | None, damping: float
+        self,
+        direction: ArrayLike | str,
+        rate: Factor,
+        acceleration: Factor | None,
+        *,
+        damping: float = 0.0,
+        part: WhereElements = None,
     ) -> None:
         self.direction = _unit(direction)
-        self.is_accelerated = acceleration is not None
-        self.rate = function_of(rate, "a rate")
-        self.acceleration = slope_of(rate, "a rate")
-        if acceleration is not None:
-            self.acceleration = function_of(acceleration, "an acceleration")
-        self.steady = not (callable(rate) or callable(acceleration) or acceleration)
-        if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
-            self.rate = _accelerated(self.rate(0.0), acceleration)
+        self._rate = Rate(rate, acceleration)
+        self.rate, self.acceleration = self._rate.value, self._rate.slope
+        self.steady = self._rate.steady
         self.damping = number(damping, "a damping", least=0, unit="1/s")
+        self.part = part
+        self.A, self.center, self.drift = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
 
     def __str__(self) -> str:
         when = "" if self.steady else " at the time 0"
-        return f"{type(self).__name__} {self.direction.tolist()}, rate {self.rate(0.0):g}{when}"
+        where = "" if self.part is None else f", part {self.part!r:.40}"
+        name = type(self).__name__
+        return f"{name} {self.direction.tolist()}, rate {self.rate(0.0):g}{when}{where}"
 
-    @abstractmethod
+    def rates(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
+        """Return rate and acceleration at a time.
+
+        Parameters
+        ----------
+        time : s.
+        step : s, over which an acceleration that was not given is the mean; its slope for 0.
+        steady : take a rate that changes as one that stays, unless an acceleration was given.
+
+        Returns
+        -------
+        In the unit of the motion, and that per second.
+        """
+        return self._rate.at(time, step, steady)
+
+    def center_rates(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[Array, Array]:
+        """Return Ż and Z̈ of the whole body; 0 but for a rotation whose center moves.
+
+        Parameters
+        ----------
+        time, step, steady : as for `rates`.
+
+        Returns
+        -------
+        (3,) m/s and (3,) m/s².
+        """
+        return np.zeros(3), np.zeros(3)
+
+    @property
+    def travels(self) -> bool:
+        """Whether the body as a whole moves in space with its center."""
+        return False
+
+    @property
+    def is_carried_evenly(self) -> bool:
+        """Whether the acceleration of the center never changes."""
+        return True
+
+    def moving(self, mesh: Mesh) -> Mask:
+        """Return the nodes of the elements that move.
+
+        Parameters
+        ----------
+        mesh : that of the model.
+
+        Returns
+        -------
+        (n,) bool.
+
+        Raises
+        ------
+        MeshError
+            There is no such part.
+        ModelError
+            The part shares nodes with elements at rest.
+        """
+        return moving_nodes(mesh, self.part)
+
     def field(self, X: Array) -> Array:
         """Return the velocity c of the material through the mesh for the rate 1.
 
@@ -97,9 +170,10 @@ class Motion(Attachment):
         -------
         (..., 3), m for a rotation, without unit for a translation.
         """
+        return self.body_velocity(X) + self.drift
 
     def body_velocity(self, X: Array) -> Array:
-        """Return the velocity of the undeformed body in space for the rate 1.
+        """Return the velocity of the undeformed body in space, but for Ż, for the rate 1.
 
         Parameters
         ----------
@@ -186,7 +260,7 @@ class Motion(Attachment):
         -------
         The largest share, 0 … 1.
         """
-        return leak(mesh, self.field, self.open_faces(mesh))
+        return leak(mesh, self.field, self.moving(mesh), self.open_faces(mesh))
 
     def attach(self, structure: Structure) -> None:
         """Become the motion of a structure.
@@ -212,21 +286,20 @@ class Motion(Attachment):
         Parameters
         ----------
         structure : what moves.
-        groups : its elements.
+        groups : the elements that move.
 
         Returns
         -------
         One sentence each.
+
+        Raises
+        ------
+        ModelError
+            The center moves, but constraints tie the body to what rests.
         """
         share = self.leak(structure.mesh)
-        return [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []
-
-
-def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:
-    """Return the rate in time from its start."""
-    if isinstance(acceleration, TimeSeries):
-        return lambda time: start + acceleration.integral(0.0, time)
-    return lambda time: start + (acceleration or 0.0) * time
+        found = [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []
+        return found + check_ties(structure, self.moving(structure.mesh), self.field, self.travels)
 
 
 def _unit(direction: ArrayLike | str) -> Array:

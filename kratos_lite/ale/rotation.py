@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.motion import Motion
+from kratos_lite.ale.rate import vector_rates
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.tables import lame_constants
+from kratos_lite.mesh import WhereElements
 from kratos_lite.model.structure import Structure
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
@@ -17,21 +19,34 @@ from kratos_lite.validation import finite, flag
 
 
 class Rotation(Motion):
-    """A body of revolution that rotates about its axis while its mesh stands still.
+    """A body of revolution that rotates about its axis while its mesh stands still, or travels along.
 
     Geometry, density and material must be axisymmetric.  A positive rate turns clockwise about the axis, as
     seen from its tip: c = (X - X0) × e.
 
+    The center may travel by Z(t).  A material point that starts at Y in the undeformed body has turned to
+    X = R(t) Y, measured from the center, and is at x(t) = X + u(t, X) + Z(t).  So u and the mesh are given in
+    axes that travel with the center, but keep their directions, those of x, y and z in space.  With
+    X' = rate A X along the way of the material point
+
+        x'  = u'  + rate (c·grad) u + rate A X + Ż
+        x'' = u'' + 2 rate (c·grad) u' + acceleration (c·grad) u + rate² (c·grad)² u
+            + rate² A² X + acceleration A X + Z̈
+
+    In these axes Ż and Z̈ stand as they are; they would be Rᵀ Ż and Rᵀ Z̈ in axes that turn with the body.
+    Neither depends on X: Ż has no effect on u, and Z̈ adds the load -∫ ρ N Z̈, that of a gravity -Z̈.
+    Supports and loads travel with the center.
+
     Parameters
     ----------
     axis : ``"x"``, ``"y"``, ``"z"`` or (3,).
-    rate : rad/s; number, `TimeSeries` or function of time.
-    acceleration : rad/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A
-        number or `TimeSeries` changes a rate that is a number as time goes on.
+    rate, acceleration : rad/s and rad/s², numbers, `TimeSeries` or functions of time; see `Motion`.
     center : (3,) m, a point of the axis.
+    center_velocity : Ż, three components in m/s, each a number, `TimeSeries` or function of time.
+    center_acceleration : Z̈ in m/s², likewise; if not given the derivative of Ż, and 0 in a steady state.
     skew : take the skew part of G, which keeps the energy on every mesh.
     stiffening : add the stiffness that the centrifugal stress gives; a rotor that may rotate freely needs it.
-    damping : α in 1/s.
+    damping, part : α in 1/s, and the elements that move; see `Motion`.
 
     Raises
     ------
@@ -40,8 +55,12 @@ class Rotation(Motion):
 
     Examples
     --------
-    >>> Rotation("z", rate=30.0).field(np.array([1.0, 0.0, 5.0]))
+    >>> rotor = Rotation("z", rate=30.0, center_acceleration=(0.0, 0.0, 2.0))
+    >>> rotor.field(np.array([1.0, 0.0, 5.0]))
     array([ 0., -1.,  0.])
+    >>> velocity, acceleration = rotor.center_rates(3.0)
+    >>> velocity.tolist(), acceleration.tolist()
+    ([0.0, 0.0, 6.0], [0.0, 0.0, 2.0])
     """
 
     kind, unit, is_open = "rotation", "rad/s", False
@@ -56,18 +75,33 @@ class Rotation(Motion):
         acceleration: Factor | None = None,
         *,
         center: ArrayLike = (0.0, 0.0, 0.0),
+        center_velocity: Sequence[Factor] = (0.0, 0.0, 0.0),
+        center_acceleration: Sequence[Factor] | None = None,
         skew: bool = True,
         stiffening: bool = False,
         damping: float = 0.0,
+        part: WhereElements = None,
     ) -> None:
-        super().__init__(axis, rate, acceleration, damping)
+        super().__init__(axis, rate, acceleration, damping=damping, part=part)
         self.center = finite(center, "the center of a rotation", (3,))
+        self._center_rates = vector_rates(center_velocity, center_acceleration, "a center")
         self.skew, self.stiffening = flag(skew, "skew"), flag(stiffening, "stiffening")
         self.A = np.cross(np.eye(3), self.direction).T
 
-    def field(self, X: Array) -> Array:
-        """Return A (X - X0) = (X - X0) × e."""
-        return np.asarray((X - self.center) @ self.A.T)
+    @property
+    def travels(self) -> bool:
+        """Whether the center ever moves."""
+        return any(not one.steady or one.value(0.0) for one in self._center_rates)
+
+    @property
+    def is_carried_evenly(self) -> bool:
+        """Whether the acceleration of the center never changes."""
+        return not any(one.is_changing for one in self._center_rates)
+
+    def center_rates(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[Array, Array]:
+        """Return Ż and Z̈ (3,) at a time."""
+        velocity, acceleration = np.transpose([one.at(time, step, steady) for one in self._center_rates])
+        return velocity, acceleration
 
     def wave_directions(self) -> Array:
         """Return the directions x, y and z (3, 3)."""
@@ -91,8 +125,9 @@ class Rotation(Motion):
         found = super().warnings(structure, groups)
         if any(lame_constants(group.material.C) is None for group in groups):
             found.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
-        c = self.field(structure.mesh.points)
-        is_held = np.abs(c[structure.supports.fixed]).max(initial=0.0) > 1e-9 * np.abs(c).max()
+        moving = self.moving(structure.mesh)
+        c = self.field(structure.mesh.points[moving])
+        is_held = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
         if not self.stiffening and not is_held:
             found.append(
                 "nothing holds the rotation about the axis: in the linear theory a free rotor is unstable at "

@@ -46,7 +46,7 @@ def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
         measures = np.array([1.0, group.material.density, bulk, trace, every])
         for chunk in group.chunks():
             element = group.at(terms.points, chunk)
-            r, wave = terms.motion.phase(element.gauss_points(), terms.points)
+            r, wave = terms.motion.phase(element.gauss_points(), terms.moving_points)
             powers = [((element.dV * r * r) * wave**n).sum() for n in range(HARMONICS + 1)]
             found += measures[:, None] * powers
     return found

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.ale.boundaries import cut_nodes, dashpots, periodic_pairs
 from kratos_lite.ale.motion import Motion
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
@@ -28,12 +28,10 @@ class Translation(Motion):
     Parameters
     ----------
     direction : ``"x"``, ``"y"``, ``"z"`` or (3,): where the frame moves at a positive rate.
-    rate : m/s; number, `TimeSeries` or function of time.
-    acceleration : m/s², likewise; if not given the derivative of the rate, and 0 in a steady state.  A number
-        or `TimeSeries` changes a rate that is a number as time goes on.
+    rate, acceleration : m/s and m/s², numbers, `TimeSeries` or functions of time; see `Motion`.
     boundaries : what the two cut faces across the direction do: ``absorbing`` lets waves out (Lysmer's
         dashpots), ``periodic`` ties them, ``fixed`` holds them, ``natural`` leaves them to the supports.
-    damping : α in 1/s.
+    damping, part : α in 1/s, and the elements that move; see `Motion`.
 
     Raises
     ------
@@ -43,7 +41,7 @@ class Translation(Motion):
     Examples
     --------
     >>> Translation("x", rate=20.0, boundaries="periodic").field(np.zeros(3)).tolist()
-    [-1.0, -0.0, -0.0]
+    [-1.0, 0.0, 0.0]
     """
 
     kind, unit, is_open = "translation", "m/s", True
@@ -59,14 +57,11 @@ class Translation(Motion):
         *,
         boundaries: str = "absorbing",
         damping: float = 0.0,
+        part: WhereElements = None,
     ) -> None:
-        super().__init__(direction, rate, acceleration, damping)
+        super().__init__(direction, rate, acceleration, damping=damping, part=part)
         self.boundaries = choice(boundaries, "boundaries", BOUNDARIES)
-        self.A, self.center = np.zeros((3, 3)), np.zeros(3)
-
-    def field(self, X: Array) -> Array:
-        """Return -e."""
-        return np.broadcast_to(-self.direction, X.shape)
+        self.drift = -self.direction
 
     def wave_directions(self) -> Array:
         """Return the direction of the frame, (1, 3)."""
@@ -83,11 +78,13 @@ class Translation(Motion):
 
     def open_faces(self, mesh: Mesh) -> tuple[Ints, ...]:
         """Return the nodes of the two cut faces."""
-        return cut_nodes(mesh, self.direction)
+        return cut_nodes(mesh, self.direction, self.moving(mesh))
 
     def boundary_damping(self, mesh: Mesh, system: ConstrainedSystem) -> BlockMatrix | None:
         """Return the damping of absorbing boundaries, (3a, 3a) in N s/m, or None."""
-        return dashpots(mesh, self.direction, system) if self.boundaries == "absorbing" else None
+        if self.boundaries != "absorbing":
+            return None
+        return dashpots(mesh, self.direction, system, self.moving(mesh))
 
     def attach(self, structure: Structure) -> None:
         """Become the motion of a structure, and tie or fix its boundaries.
@@ -102,7 +99,8 @@ class Translation(Motion):
             for nodes in self.open_faces(structure.mesh):
                 structure.supports.fix(nodes, "xyz")
         elif self.boundaries == "periodic":
-            slaves, masters = periodic_pairs(structure.mesh, self.direction)
+            mesh = structure.mesh
+            slaves, masters = periodic_pairs(mesh, self.direction, self.moving(mesh))
             structure.supports.constraints += tuple(
                 MultiPointConstraint(3 * a + axis, (3 * b + axis,), (1.0,), symmetric=True)
                 for a, b in zip(slaves.tolist(), masters.tolist(), strict=True)

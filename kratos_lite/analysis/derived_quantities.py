@@ -1,4 +1,4 @@
-"""Quantities derived from results: the velocity of the material, and the resultant of the reactions."""
+"""Quantities derived from results: the resultant of the reactions, and the figures of a motion."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.ale import Motion
 from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
@@ -68,64 +70,12 @@ def reaction_resultant(
     rows = np.arange(model.mesh.n_nodes) if where is None else model.mesh.nodes(where)
     if not len(rows):
         raise ModelError(f"no node is chosen by {where!r}")
-    hub = np.zeros(3) if model.motion is None else model.motion.center
+    hub = model.motion.center if isinstance(model.motion, Motion) else np.zeros(3)
     point = hub if center is None else finite(center, "a center")
     if point.shape != (3,):
         raise InputError(f"a center must have shape (3,); got {point.shape}")
     forces = of.reactions[rows]
     return forces.sum(axis=0), np.cross(model.mesh.points[rows] - point, forces).sum(axis=0)
-
-
-def material_velocity(model: Structure, displacement: ArrayLike, time: float = 0.0) -> Array:
-    """Return the velocity of the material in space where nothing changes with the time.
-
-    It is rate (A (X - X0) + (c·grad) u), projected on the nodes: M v = rate (∫ ρ N A (X - X0) + G u).  A
-    moving frame has no first term: its body is at rest but for its waves.  That of a
-    `TransientAnalysis` adds u'.
-
-    Parameters
-    ----------
-    model : with a motion of the material.
-    displacement : (n, 3) m, such as `Result.u`.
-    time : s, of a rate that changes.
-
-    Returns
-    -------
-    (n, 3) in m/s.
-
-    Raises
-    ------
-    InputError
-        The model has no motion, or the displacement another shape.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> wheel = kl.Model(kl.annulus(0.2, 1.0, 0.1), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
-    >>> wheel.fix("inner")
-    >>> wheel.add(kl.ale.Rotation("z", rate=10.0))
-    >>> v = material_velocity(wheel, wheel.solve().u)
-    >>> print(f"{abs(v).max():.2f} m/s")
-    10.00 m/s
-    """
-    u = finite(displacement, "a displacement")
-    if model.motion is None:
-        raise InputError("the model has no motion of its material, so that it is at rest")
-    if u.shape != model.mesh.points.shape:
-        raise InputError(f"a displacement needs shape {model.mesh.points.shape}; got {u.shape}")
-    e = EquationsOfMotion(model)
-    local = e.system.gather(u)
-    return e.system.scatter(velocity_of_material(e, local, np.zeros_like(local), time))
-
-
-def velocity_of_material(e: EquationsOfMotion, u: Array, v: Array, time: float) -> Array:
-    """Return u' + rate (A (X - X0) + M^-1 G u), (3a,) in m/s."""
-    rate = e.rates(time)[0]
-    if e.terms is None or not rate:
-        return v.copy()
-    along = e.mass.solve(e.terms.times(e.terms.G, u.reshape(-1, 3)).ravel())
-    along = along + e.terms.motion.body_velocity(e.system.points).ravel()
-    return np.asarray(v + rate * along)
 
 
 def motion_summary(
@@ -146,9 +96,19 @@ def motion_summary(
         "critical_rate": critical,
         "critical_rate_of_waves": waves,
         "margin": 1 - abs(rate) / (critical or waves),
+        **_center(e, time),
         "support_force": force.tolist(),
         "support_moment": moment.tolist(),
     }
+
+
+def _center(e: EquationsOfMotion, time: float) -> dict[str, list[float]]:
+    """Return Ż and Z̈ of a center that moves, for a report."""
+    assert e.terms is not None
+    if not e.terms.motion.travels:
+        return {}
+    velocity, acceleration = e.center_rates(time)
+    return {"center_velocity": velocity.tolist(), "center_acceleration": acceleration.tolist()}
 
 
 def result_of(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import solvers
-from kratos_lite.ale import MotionMatrices
+from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.symmetry import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -39,6 +39,7 @@ class EquationsOfMotion:
     rayleigh : α in 1/s and β in s of the damping α M + β K.
     free : whether supports may leave rigid motions free.
     steady : take a rate that changes as one that stays, unless the motion is given an acceleration.
+    massless : let materials have no density, where the mass is only looked at.
 
     Attributes
     ----------
@@ -62,6 +63,7 @@ class EquationsOfMotion:
         rayleigh: tuple[float, float] = (0.0, 0.0),
         free: bool = True,
         steady: bool = False,
+        massless: bool = False,
         progress: Progress | None = None,
     ) -> None:
         self.model, self._steady = model, steady
@@ -69,7 +71,7 @@ class EquationsOfMotion:
         self.rayleigh = _checked_rayleigh(rayleigh)
         self.groups, _, self.warnings = model.checked(free=free)
         for group in self.groups:
-            if not group.material.density > 0:
+            if not (massless or group.material.density > 0):
                 raise ModelError(
                     f"{type(group.material).__name__} has density {group.material.density:g}, but what moves "
                     "needs mass; give each material a density > 0 kg/m³"
@@ -87,11 +89,12 @@ class EquationsOfMotion:
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
-        if model.motion is not None:
+        if isinstance(model.motion, Motion):
             consistent = Mass(*placed, False) if lumped else self.mass
-            self.terms = MotionMatrices(model.motion, *placed, consistent)
+            moving = model.motion.moving(model.mesh)[self.system.nodes]
+            self.terms = MotionMatrices(model.motion, *placed, consistent, moving)
             check_materials(self.terms)
-            self.warnings += model.motion.warnings(model, self.system.groups)
+            self.warnings += model.motion.warnings(model, self.terms.groups)
             if self.rayleigh[1]:
                 self.warnings.append(
                     "Rayleigh's β K u' damps in fixed axes, not along with the material that moves; take the "
@@ -119,15 +122,17 @@ class EquationsOfMotion:
         return self.applied(time) + self.inertia_load(time)
 
     def inertia_load(self, time: float) -> Array:
-        """Return the centrifugal and Euler load (3a,) of the motion at a time."""
+        """Return the load (3a,) of the inertia of the rigid motion at a time: centrifugal, Euler, -ρ Z̈."""
         if self.terms is None:
             return np.zeros(self.size)
-        rate, acceleration = self.rates(time)
+        (rate, acceleration), (_, of_center) = self.rates(time), self.center_rates(time)
         total = np.zeros_like(self.system.points)
         if rate:
             total += rate**2 * self.terms.centrifugal
         if acceleration:
             total += acceleration * self.terms.euler
+        if of_center.any():
+            total -= self.terms.nodal_mass[:, None] * of_center
         return total.ravel()
 
     # ---- matrices ----------------------------------------------------------------------------------------
@@ -157,8 +162,10 @@ class EquationsOfMotion:
 
     def damping_terms(self, time: float) -> Array | None:
         """Return what motion and mass-proportional damping add to C, data (nnz,), or None."""
-        alpha = self.rayleigh[0] + (self.terms.motion.damping if self.terms else 0.0)
-        out: Array | None = alpha * self.mass.data if alpha else None
+        out: Array | None = self.rayleigh[0] * self.mass.data if self.rayleigh[0] else None
+        if self.terms is not None and (alpha := self.terms.motion.damping):
+            own = alpha * self.terms.of_moving(self.mass.data)
+            out = own if out is None else out + own
         if self.terms is not None and (rate := self.terms.motion.rate(time)):
             gyroscopic = 2 * rate * self.terms.gyroscopic
             out = gyroscopic if out is None else out + gyroscopic
@@ -243,14 +250,13 @@ class EquationsOfMotion:
         """Return rate and acceleration of the motion at a time."""
         if self.terms is None:
             return 0.0, 0.0
-        motion = self.terms.motion
-        if motion.is_accelerated or not (self._steady or self.step):
-            return motion.rate(time), motion.acceleration(time)
-        if self._steady:
-            return motion.rate(time), 0.0
-        start = max(time - self.step / 2, 0.0)  # the mean over a step: in all the whole change
-        end = time + self.step / 2
-        return motion.rate(time), (motion.rate(end) - motion.rate(start)) / (end - start)
+        return self.terms.motion.rates(time, self.step, self._steady)
+
+    def center_rates(self, time: float) -> tuple[Array, Array]:
+        """Return Ż and Z̈ (3,) of the center of the motion at a time."""
+        if self.terms is None:
+            return np.zeros(3), np.zeros(3)
+        return self.terms.motion.center_rates(time, self.step, self._steady)
 
     @cached_property
     def free_motions(self) -> str:

@@ -8,10 +8,12 @@ import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.errors import InputError, SolveError
+from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.eigen import DENSE_MODES, modes
+from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes
 from kratos_lite.validation import whole_number
 
@@ -31,45 +33,19 @@ def complex_modes(model: Structure, count: int) -> tuple[Complexes, Complexes]:
     """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
     e = EquationsOfMotion(model, steady=True)
     M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    n = K.shape[0]
-    if whole_number(count, "count") > 2 * n:
-        raise InputError(f"this model has 1 … {2 * n} complex modes; got {count}")
-    if 2 * n <= DENSE_MODES or count > n // 4:
-        inverse = np.linalg.inv(M.toarray())
-        A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K.toarray(), -inverse @ C.toarray()]])
-        values, vectors = np.linalg.eig(A)
-    else:
-        values, vectors = _by_iteration(M, C, K, count)
-    order = np.argsort(np.abs(values), kind="stable")[:count]
-    return values[order], expanded(e, vectors[:n, order])
+    pencil = Pencil(M, C, K, neutral_motions(M, C, K, _rigid_motions(e)))
+    values, shapes = pencil.modes(whole_number(count, "count"))
+    return values, expanded(e, shapes)
 
 
-def _by_iteration(M: Any, C: Any, K: Any, count: int) -> tuple[Complexes, Complexes]:
-    """Return eigenvalues nearest to 0 by Arnoldi on the inverse pencil, which needs factors of K alone.
-
-    With x = (u, λ u) the inverse takes (p, q) to (-K^-1 (C p + M q), p).
-    """
-    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
-
-    n = K.shape[0]
-    factors = direct.factorize(K, symmetric=False)
-
-    def inverse(x: Array) -> Array:
-        p, q = x[:n], x[n:]
-        return np.concatenate([-factors.solve(C @ p + M @ q), p])
-
-    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(2 * n)
-    # Eigenvalues come in pairs, often nearly repeated: room for more of them, no tolerance below rounding.
-    wanted = min(count + 2, 2 * n - 2)
-    try:
-        values, vectors = eigs(operator, wanted, which="LM", v0=start, ncv=3 * wanted + 20, tol=1e-11)
-    except ArpackNoConvergence as error:
-        raise SolveError(
-            f"only {len(error.eigenvalues)} of {wanted} complex modes are found; ask for fewer, or for more "
-            "to have repeated ones in full"
-        ) from None
-    return 1 / values, vectors
+def _rigid_motions(e: EquationsOfMotion) -> Array:
+    """Return the rigid motions (q, k) that supports and constraints leave to the model as a whole."""
+    constraints = e.system.reduced
+    rigid = rigid_modes(e.system.points)
+    rigid = rigid / np.linalg.norm(rigid, axis=0)
+    missed = constraints.transform(rigid[constraints.free]) - rigid
+    _, values, directions = np.linalg.svd(missed, full_matrices=False)
+    return np.asarray(rigid[constraints.free] @ directions[values <= 1e-12].T)
 
 
 def critical_rate(model: Structure, count: int = 1) -> Array:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.model.loads import Load
@@ -12,6 +14,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
 
 if TYPE_CHECKING:
+    from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.transient import TransientAnalysis
 
 
@@ -176,7 +179,7 @@ class Model(Structure):
         MeshError, ModelError, InputError
             If the model is broken, has no mass, or has fewer modes.
         SolveError
-            If the iteration does not converge.
+            If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import natural_modes
 
@@ -199,8 +202,87 @@ class Model(Structure):
         MeshError, ModelError, InputError
             If the model is broken, has no mass, or has fewer modes.
         SolveError
-            If the iteration does not converge.
+            If the iteration does not converge, or what it finds does not satisfy the equations.
         """
         from kratos_lite.analysis.modal import complex_modes
 
         return complex_modes(self, count)
+
+    # ---- the equations themselves --------------------------------------------------------------
+
+    def matrices(
+        self, *, time: float = 0.0, lumped: bool = False, rayleigh: tuple[float, float] = (0.0, 0.0)
+    ) -> Matrices:
+        """Return K, M, C, f and what supports do, as SciPy matrices, to solve them in another way.
+
+        Parameters
+        ----------
+        time : s, of loads, supports and motion.
+        lumped : concentrate the mass at the nodes.
+        rayleigh : α in 1/s and β in s of the damping α M + β K.
+
+        Returns
+        -------
+        Matrices
+            u = T q + c and T' M T q'' + T' C T q' + T' K T q = T' (f - K c - M c'' - C c').  A motion of the
+            material adds its terms to K, C and f.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            If the model is broken; its supports may leave rigid-body modes free.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import kratos_lite as kl
+        >>> from scipy.sparse.linalg import spsolve
+        >>> model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0))
+        >>> model.fix("z-")
+        >>> model.fix("z+", "x", 1e-3)
+        >>> model.add(kl.Gravity((0, 0, -9.81)))
+        >>> K, T, f, c = (getattr(model.matrices(), name) for name in ("K", "T", "f", "c"))
+        >>> q = spsolve((T.T @ K @ T).tocsc(), T.T @ (f - K @ c))
+        >>> u = (T @ q + c).reshape(-1, 3)
+        >>> bool(np.abs(u - model.solve().u).max() < 1e-12 * np.abs(u).max())
+        True
+        """
+        from kratos_lite.analysis.matrices import matrices_of
+
+        return matrices_of(self, time, lumped, rayleigh)
+
+    def local_system(self, element: int, u: ArrayLike | None = None) -> LocalSystem:
+        """Return stiffness, residual and mass of an element, as ``CalculateLocalSystem`` of Kratos does.
+
+        With the material, rule and prestress of the element in this model, and the body loads on it
+        (`BodyForce`, `Gravity`, at the time 0): loads on faces and nodes are none of an element.  A motion of
+        the material is left out.
+
+        Parameters
+        ----------
+        element : id of the element.
+        u : (n, 3) in m, displacements of all nodes; 0 if not given.
+
+        Returns
+        -------
+        LocalSystem
+            K (3k, 3k) in N/m, r = r_ext - r_int (3k,) in N, M (3k, 3k) in kg, and dofs (3k,), where they
+            belong among those of the model.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            There is no such element, it has no material, or u has another shape.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+        >>> model.add(kl.Gravity((0, 0, -10.0)))
+        >>> K, r, M, dofs = model.local_system(1)
+        >>> K.shape, round(float(r.sum()), 6), round(float(M.sum()), 6)
+        ((24, 24), -10000.0, 3000.0)
+        """
+        from kratos_lite.analysis.matrices import local_system_of
+
+        return local_system_of(self, element, u)

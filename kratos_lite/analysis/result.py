@@ -4,96 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss, totals
+from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
+from kratos_lite.analysis.report import Report, vector
+from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
+from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.assembly.nodal_values import averages
+from kratos_lite.assembly.point_fields import at_located
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh, Where
-from kratos_lite.native import described
+from kratos_lite.mesh import Located, Mesh, Where
 from kratos_lite.typing import Array
+from kratos_lite.validation import choice
 
+At: TypeAlias = "str | ArrayLike | Located"
+"""Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
 PLACES = ("gauss", "element", "node")
-
-
-def peak_memory() -> int:
-    """Return the largest memory of this process so far, in bytes (0 where the system does not say)."""
-    try:
-        import resource
-        import sys
-    except ImportError:
-        return 0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else peak * 1024)
-
-
-@dataclass
-class Report:
-    """What was solved, how, and how well.
-
-    Attributes
-    ----------
-    unknowns : free degrees of freedom.
-    total_load, total_reaction : (3,) N.
-    solver, reason, iterations : how it was solved and why that way.
-    backward_error : |b - A x| / (|A| |x| + |b|), or None.
-    force_error, moment_error : what loads and reactions miss to equilibrium, relative; None where material
-        that moves through the mesh carries momentum, so that they need not balance.
-    seconds : per phase.
-    peak_memory : bytes.
-    warnings, notes : what the checks and the reader found.
-    skipped : what this solution did without, as it would have changed nothing.
-    kernels : what computed, compiled kernels and their threads or NumPy.
-    motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
-    """
-
-    unknowns: int
-    total_load: Array
-    total_reaction: Array
-    solver: str
-    reason: str
-    iterations: int
-    backward_error: float | None
-    force_error: float | None
-    moment_error: float | None
-    seconds: dict[str, float]
-    peak_memory: int = field(default_factory=peak_memory)
-    warnings: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-    kernels: str = field(default_factory=described)
-    motion: dict[str, Any] = field(default_factory=dict)
-
-    def motion_rows(self) -> list[tuple[str, str]]:
-        """Return the rows of the summary about the motion of the material; none without one."""
-        m = self.motion
-        if not m:
-            return []
-        unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
-        force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
-        spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
-        return [
-            (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
-            (
-                "critical rate",
-                (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")
-                + f"about {m['critical_rate_of_waves']:.4g} {unit} by wave speeds, margin {m['margin']:.1%}",
-            ),
-            ("force of supports", f"{force} N"),
-            ("moment of supports", f"{moment} N m"),
-        ]
-
-
-def vector(v: Array, size: float = 0.0) -> str:
-    """Return a vector for a summary; components that are rounding beside `size` are shown as 0."""
-    small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
-    return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"
 
 
 class Result:
@@ -134,17 +65,29 @@ class Result:
 
     # ---- nodal values --------------------------------------------------------------------------
 
-    def displacement(self, where: Where | None = None) -> Array:
-        """Return the displacements of nodes.
+    def displacement(self, where: Where | None = None, *, at: ArrayLike | Located | None = None) -> Array:
+        """Return the displacements of nodes, or at points anywhere in the mesh.
 
         Parameters
         ----------
         where : nodes by part, predicate, mask or rows; all if not given.
+        at : in their place, points (..., 3) in m of the undeformed mesh, or what ``mesh.locate`` has found.
 
         Returns
         -------
-        (n, 3) in m, or (k, 3) of some.
+        (n, 3) in m, (k, 3) of some, or (..., 3) at points.
+
+        Raises
+        ------
+        InputError
+            Both nodes and points are given, or points are not finite.
+        MeshError
+            A point lies outside the mesh, or there is no such part or node.
         """
+        if at is not None:
+            if where is not None:
+                raise InputError("ask for displacements of nodes (where) or at points (at), not both")
+            return self._located(at).interpolate(self.u)
         return self.u if where is None else self.u[self.mesh.nodes(where)]
 
     def reaction(self, where: Where | None = None) -> Array:
@@ -162,29 +105,22 @@ class Result:
 
     # ---- element values ------------------------------------------------------------------------
 
-    def _field(self, at: str, stress: bool) -> Any:
-        if at not in PLACES:
-            raise InputError(f"at must be one of {', '.join(PLACES)}; got {at!r}")
-        if at == "gauss":
-            return self._by_element(stress)
-        return self._averages(stress)[PLACES.index(at) - 1]
+    def _field(self, at: At, stress: bool) -> Any:
+        if not (at is None or isinstance(at, str)):
+            return at_located(self.groups, self._located(at), self._strained, stress=stress)
+        place = choice(at, "at", PLACES)
+        if place == "gauss":
+            points, u = self.mesh.points, self._strained
+            return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
+        return self._averages(stress)[PLACES.index(place) - 1]
 
-    def _by_element(self, stress: bool) -> Any:
-        """Return (m, g, 6), or a list of (g, 6) where elements have different numbers of points."""
-        points, m = self.mesh.points, self.mesh.n_elements
-        parts = [at_gauss(points, group, self._strained, stress=stress) for group in self.groups]
-        if len(parts) == 1 and (self.groups[0].rows == np.arange(m)).all():
-            return parts[0]
-        if len({part.shape[1] for part in parts}) > 1:
-            rows: list[Any] = [None] * m
-            for group, part in zip(self.groups, parts, strict=True):
-                for row, value in zip(group.rows.tolist(), part, strict=True):
-                    rows[row] = value
-            return rows
-        out = np.zeros((m, *parts[0].shape[1:]))
-        for group, part in zip(self.groups, parts, strict=True):
-            out[group.rows] = part
-        return out
+    def _located(self, at: ArrayLike | Located) -> Located:
+        """Return where points lie in the mesh; raise MeshError if one lies outside."""
+        if not isinstance(at, Located):
+            return self.mesh.locate(at, required=True)
+        if at.mesh.points.shape != self.mesh.points.shape or at.rows.max(initial=-1) >= self.mesh.n_elements:
+            raise InputError("the points are located in another mesh; take that of the result")
+        return at.require()
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and nodal values (n, 6)."""
@@ -201,26 +137,31 @@ class Result:
         means, nodal = self._averages(stress=True)
         return nodal, means
 
-    def strain(self, at: str = "gauss") -> Any:
+    def strain(self, at: At = "gauss") -> Any:
         """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
 
         Parameters
         ----------
         at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for
-            extrapolated and averaged values.
+            extrapolated and averaged values; or points (..., 3) in m anywhere in the undeformed mesh, or
+            what ``mesh.locate`` has found of them.
 
         Returns
         -------
-        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6); or (n, 6).
+        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6); (n, 6);
+        or (..., 6) at points, B(ξ) u of the element that contains the point.  On a face between elements,
+        where strains jump, that is the element in the lowest row.
 
         Raises
         ------
         InputError
-            There is no such place.
+            There is no such place, or points are not finite.
+        MeshError
+            A point lies outside the mesh.
         """
         return self._field(at, stress=False)
 
-    def stress(self, at: str = "gauss") -> Any:
+    def stress(self, at: At = "gauss") -> Any:
         """Return stresses in Voigt order xx yy zz xy yz zx.
 
         Parameters
@@ -234,9 +175,21 @@ class Result:
         Raises
         ------
         InputError
-            There is no such place.
+            There is no such place, or points are not finite.
+        MeshError
+            A point lies outside the mesh.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+        >>> stress = bar.solve().stress(at=[[0.2, 0.3, 0.9], [0.5, 0.5, 0.5]])
+        >>> stress[:, 2].round(9).tolist()
+        [5.0, 5.0]
         """
-        if at == "node":
+        if isinstance(at, str) and at == "node":
             return self._nodal_stress
         return self._field(at, stress=True)
 
@@ -244,7 +197,7 @@ class Result:
     def _nodal_stress(self) -> Array:
         return np.asarray(self._field("node", stress=True))
 
-    def von_mises(self, at: str = "gauss") -> Any:
+    def von_mises(self, at: At = "gauss") -> Any:
         """Return von Mises stresses.
 
         Parameters
@@ -253,17 +206,74 @@ class Result:
 
         Returns
         -------
-        (m, g), (m,) or (n,) in Pa.
+        (m, g), (m,), (n,) or (...) in Pa.
 
         Raises
         ------
         InputError
-            There is no such place.
+            There is no such place, or points are not finite.
+        MeshError
+            A point lies outside the mesh.
         """
         stress = self.stress(at)
         if isinstance(stress, list):
             return [voigt.von_mises(s) for s in stress]
         return voigt.von_mises(stress)
+
+    def at_integration_points(self, name: str, element: int | None = None) -> Any:
+        """Return a quantity at the integration points by its name in Kratos.
+
+        It is what ``CalculateOnIntegrationPoints`` of KinematicLinear or SmallDisplacementElement returns.
+        Strains are small: the Green-Lagrange strain is the linear one, and all stress measures agree.
+
+        Parameters
+        ----------
+        name : one of
+
+            - ``CAUCHY_STRESS_VECTOR``, ``PK2_STRESS_VECTOR``, ``STRESSES`` (6,), ``CAUCHY_STRESS_TENSOR``,
+              ``PK2_STRESS_TENSOR`` (3, 3), ``VON_MISES_STRESS``: Pa, with the prestress;
+            - ``GREEN_LAGRANGE_STRAIN_VECTOR``, ``STRAIN`` (6,), ``GREEN_LAGRANGE_STRAIN_TENSOR`` (3, 3);
+            - ``STRAIN_ENERGY``: ½ ε:C:ε in J/m³;
+            - ``CONSTITUTIVE_MATRIX``: C (6, 6) in Pa;
+            - ``STRAIN_INTERPOLATION_OPERATOR``: B (6, 3k) in 1/m of k nodes;
+            - ``JACOBIAN``, ``JACOBIAN_0``: det J in m³, ``INTEGRATION_WEIGHT``: weight times det J in m³;
+            - ``INTEGRATION_COORDINATES``, ``INTEGRATION_POINT_GLOBAL``: X (3,) in m,
+              ``INTEGRATION_POINT_LOCAL``: ξ (3,), ``DISPLACEMENT``: (3,) in m.
+
+            Vectors have the order xx yy zz xy yz xz of Kratos, strains engineering shear; strain tensors
+            hold half of it.
+        element : id of an element; all elements if not given.
+
+        Returns
+        -------
+        (g, ...) of one element with g points, points in the order of its rule; or (m, g, ...) of all, in the
+        order of the mesh; or a list of (g, ...) where elements have different rules.
+
+        Raises
+        ------
+        InputError
+            There is no such name.
+        MeshError
+            There is no such element, or several have this id.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+        >>> result = bar.solve()
+        >>> result.at_integration_points("CAUCHY_STRESS_VECTOR", element=2)[:, 2].round(9).tolist()
+        [5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0]
+        >>> weight = result.at_integration_points("INTEGRATION_WEIGHT")
+        >>> energy = (result.at_integration_points("STRAIN_ENERGY") * weight).sum()
+        >>> bool(abs(energy / result.energy() - 1) < 1e-12)
+        True
+        """
+        quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
+        groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
+        made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
+        return in_order(groups, made) if element is None else made[0][0]
 
     # ---- totals --------------------------------------------------------------------------------
 
@@ -304,40 +314,17 @@ class Result:
         top = int(length.argmax())
         energy, mises, row = self._totals
         kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block))
-
+        largest = f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m"
         forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
-        rows = [
+        return [
             ("nodes", f"{mesh.n_nodes}"),
             ("elements", kinds),
-            ("unknowns", f"{report.unknowns}"),
-            ("total load", f"{vector(report.total_load, forces)} N"),
-            ("total reaction", f"{vector(report.total_reaction, forces)} N"),
-            (
-                "largest displacement",
-                f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m",
-            ),
+            *report.load_rows(forces),
+            ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
-            ("solver", f"{report.solver}: {report.reason}"),
+            *report.solution_rows(),
         ]
-        if report.iterations:
-            rows.append(("iterations", str(report.iterations)))
-        if report.backward_error is not None:
-            rows.append(("backward error", f"{report.backward_error:.1e}"))
-        if report.force_error is not None:
-            balance = f"forces {report.force_error:.1e}, moments {report.moment_error:.1e}"
-            rows.append(("equilibrium", balance))
-        if report.seconds:
-            rows.append(("seconds", ", ".join(f"{name} {s:.3f}" for name, s in report.seconds.items())))
-        rows += [
-            ("peak memory", f"{report.peak_memory / 1e6:.0f} MB"),
-            ("kernels", report.kernels),
-        ]
-        rows += report.motion_rows()
-        if report.skipped:
-            rows.append(("skipped", "; ".join(report.skipped)))
-        rows += [("warning", text) for text in report.warnings]
-        return rows + [("note", text) for text in report.notes]
 
     def __str__(self) -> str:
         rows = self.table()

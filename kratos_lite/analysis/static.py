@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import solvers
-from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.errors import InputError, ModelError, SolveError
@@ -182,10 +183,7 @@ class StaticAnalysis:
             external = external_loads(mesh, self.groups, loads)
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
-            lost = np.flatnonzero(~self._used)
-            lost = lost[_any_axis(acts[lost])]
-            if len(lost):
-                raise ModelError(f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element")
+            checks.check_carried(mesh, forces, self._used)
             moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
             moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
         return LoadSet(list(loads), external, forces, moving, phase)

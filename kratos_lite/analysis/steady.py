@@ -7,7 +7,8 @@ from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
-from kratos_lite.analysis.result import Report, Result
+from kratos_lite.analysis.report import Report
+from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import Phases, check_arguments, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.structure import Structure
@@ -28,6 +29,8 @@ def solve_steady(
             changing = [
                 f"the rate changes; this is the steady state of {e.rates(0.0)[0]:g}, as at the time 0"
             ]
+        if e.terms is not None and not e.terms.motion.is_carried_evenly:
+            changing.append("the acceleration of the center changes; it is taken as at the time 0")
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.scatter(forces).copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from math import ceil
+from math import ceil, inf
 from typing import Protocol
 
 import numpy as np
@@ -13,13 +13,17 @@ from kratos_lite.analysis.body_motion import BodyMotion
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies.body import Body
-from kratos_lite.errors import SolveError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Progress
 from kratos_lite.validation import function_or_none, positive_step, whole_number
 
 _log = logging.getLogger("kratos_lite")
 SAFETY = 0.95
 """Share of the critical step that automatic substeps take."""
+
+
+MOST_SUBSTEPS = 1_000_000
+"""Parts of one step; more would take the time of a whole run until the first state."""
 
 
 class Motion(Protocol):
@@ -100,8 +104,13 @@ def integrate(
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":
         critical = motion.critical_step()
-        parts = max(1, ceil(h / (SAFETY * critical)))
+        parts = max(1, ceil(min(h / (SAFETY * critical) if critical > 0 else inf, 10.0 * MOST_SUBSTEPS)))
         _log.info("each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
+    if parts > MOST_SUBSTEPS:
+        stable = f"; the critical step is {motion.critical_step():.3g} s" if substeps == "auto" else ""
+        raise InputError(
+            f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; take shorter steps"
+        )
     motion.prepare(h, parts)
     return _states(motion, h, count, every, until, progress)
 

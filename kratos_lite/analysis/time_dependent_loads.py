@@ -9,10 +9,11 @@ import numpy as np
 
 from kratos_lite.analysis.static import initial_loads
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 
 class AppliedLoads:
@@ -29,7 +30,15 @@ class AppliedLoads:
         return total
 
     def _forces_of(self, load: Load) -> Array:
-        return self.system.gather(load.forces(self.model.mesh, self._groups))
+        forces = load.forces(self.model.mesh, self._groups)
+        check_carried(self.model.mesh, forces, self._used)
+        return self.system.gather(forces)
+
+    @cached_property
+    def _used(self) -> Mask:
+        used = np.zeros(self.system.n_nodes, dtype=bool)
+        used[self.system.nodes] = True
+        return used
 
     @cached_property
     def _constant(self) -> Array:

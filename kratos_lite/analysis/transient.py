@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
-from kratos_lite.analysis.derived_quantities import result_of, velocity_of_material
+from kratos_lite.analysis.derived_quantities import result_of
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
+from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
 from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
@@ -340,7 +341,7 @@ class TransientAnalysis:
         -------
         float, J.
         """
-        e, (u, v, time) = self.equations, self._at(state)
+        e, (u, v, _, time) = self.equations, self._at(state)
         return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2
 
     def material_velocity(self, state: State | None = None) -> Array:
@@ -354,15 +355,28 @@ class TransientAnalysis:
         -------
         (n, 3) float, m/s.
         """
-        e, (u, v, time) = self.equations, self._at(state)
-        return self._whole(velocity_of_material(e, u, v, time))
+        u, v, _, time = self._at(state)
+        return self._whole(velocity_of_material(self.equations, u, v, time))
 
-    def _at(self, state: State | None) -> tuple[Array, Array, float]:
-        """Return u, v (3a,) and the time, of now or of a state."""
+    def material_acceleration(self, state: State | None = None) -> Array:
+        """Return the acceleration of the material in space; see `kratos_lite.material_acceleration`.
+
+        Parameters
+        ----------
+        state : of this model; that of now if not given.
+
+        Returns
+        -------
+        (n, 3) float, m/s².
+        """
+        return self._whole(acceleration_of_material(self.equations, *self._at(state)))
+
+    def _at(self, state: State | None) -> tuple[Array, Array, Array, float]:
+        """Return u, v, a (3a,) and the time, of now or of a state."""
         if state is None:
-            return self.u, self.v, self.time
+            return self.u, self.v, self.a, self.time
         local = self.equations.system.gather
-        return local(state.u), local(state.v), state.time
+        return local(state.u), local(state.v), local(state.a), state.time
 
     def _whole(self, x: Array) -> Array:
         """Return vectors (3a,) as (n, 3) of all nodes."""

@@ -11,21 +11,16 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.elements.exact import AFFINE, CURVED, ROUNDING, STRAIGHT, geometries, interpolations
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.validation import whole_number
 
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
-
-
-GEOMETRY = ("__init__", "_jacobian", "_gauss", "dV")
-"""Methods of an element that kernels of Gauss points stand for."""
-MASS = ("__init__", "_jacobian", "determinants", "scalar_mass", "_integrate")
-"""Methods of an element that kernels of its mass and its body force stand for."""
 
 
 def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
@@ -100,9 +95,7 @@ class ElementGroup:
         return 0.0 if self.prestress is None else self.prestress[chunk, None, :]
 
 
-def by_mass_rule(
-    points: Array, group: ElementGroup, factors: int, flow: bool = False
-) -> list[ElementGroup]:
+def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
     """Cut a group into parts whose rule is exact for a product of shape functions over their cells.
 
     Parameters
@@ -161,6 +154,8 @@ def element_groups_of(
     ------
     ModelError, InputError
         For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
+    MaterialError
+        For a material whose stress is not C strain.
 
     Examples
     --------
@@ -176,6 +171,7 @@ def element_groups_of(
             continue
         element = element_class(mesh, block)
         for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+            materials[material].check_stress()
             rows = at.start + mine
             chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
@@ -184,6 +180,23 @@ def element_groups_of(
     if not found:
         raise ModelError("the model has no elements; nothing can be solved")
     return found
+
+
+def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
+    """Return the one element of an id as a group of its own.
+
+    Raises
+    ------
+    MeshError
+        There is no such element, or several have this id.
+    """
+    number = whole_number(id, "the id of an element", least=0, error=MeshError)
+    rows = np.flatnonzero(mesh.element_ids == number)
+    if len(rows) != 1:
+        found = f"{len(rows)} elements have" if len(rows) else "no element has"
+        ids = mesh.element_ids
+        raise MeshError(f"{found} the id {number}; ids run from {ids.min()} to {ids.max()}")
+    return next(group.take(group.rows == rows[0]) for group in groups if (group.rows == rows[0]).any())
 
 
 def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[int, int, Ints]]:

@@ -16,20 +16,35 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import GEOMETRY, ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
-from kratos_lite.errors import MaterialError
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.own_steps import MECHANICS, stiffness_of
+from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 
 SAME_SHAPE = 1e-10
 """Elements whose edges differ by less than this share of their size have one frequency."""
 
 
+def check_elements(groups: Sequence[ElementGroup]) -> None:
+    """Raise ModelError for elements whose strain, stress or load is not that of their gradients."""
+    for group in groups:
+        own = [name for name in MECHANICS if not group.element.inherits(name)]
+        if own:
+            raise ModelError(
+                f"{group.element.__name__} overrides {', '.join(own)}: a small-strain step.  Large "
+                "displacements take Green's strain from the gradients dN/dX alone; use "
+                'formulation="corotational" or "modal", or an element that inherits these steps'
+            )
+
+
 def _compiled(group: ElementGroup) -> Any:
     """Return the kernels if they stand for the geometry of an element class, else None."""
+    check_elements([group])
     return compiled("lagrange", group.element, *GEOMETRY)
 
 
@@ -186,7 +201,8 @@ def highest_frequency(
     for group in groups:
         if not group.material.density > 0:
             raise MaterialError("an angular frequency needs a density > 0; give the material its density")
-        part = _distinct(points, group) if q is None else group
+        alike = q is None and group.element.inherits(*GEOMETRY, *MECHANICS)  # own steps may depend on X
+        part = _distinct(points, group) if alike else group
         for chunk in part.chunks():
             largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))
     return float(np.sqrt(largest))
@@ -207,8 +223,9 @@ def _eigenvalues(points: Array, group: ElementGroup, chunk: slice, q: Array | No
     C, density = group.material.C, group.material.density
     if q is None:
         element = group.at(points, chunk)
-        K = element.stiffness_by_axis(C)
+        K = stiffness_of(element, C)
     else:
+        check_elements([group])
         element, at = _moved(points, group, chunk, q, None, 0.0)
         K = lagrange.stiffness_by_axis(element, C, at)
     m, k = len(K), K.shape[2]

@@ -13,8 +13,11 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import GEOMETRY, MASS, ElementGroup, add_nodal, by_mass_rule, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.mass import MASS
+from kratos_lite.elements.own_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -23,7 +26,7 @@ def compiled_law(group: ElementGroup, *methods: str, stress: bool = True) -> Any
     """Return the kernels if they stand for the strains, or the stresses, of a group, else None."""
     if stress and type(group.material).stress is not LinearMaterial.stress:
         return None
-    return compiled("gauss", group.element, *GEOMETRY, "strain", *methods)
+    return compiled("gauss", group.element, *GEOMETRY, *(STRESS if stress else STRAIN), *methods)
 
 
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
@@ -44,7 +47,7 @@ def clearly_positive(
     At every point of `dN` (g', k, 3) it is above 1e-9 of its mean at the first `g`, and above a thousand
     times what rounding of the coordinates makes of it.  Without kernels every element needs the closer look.
     """
-    module = compiled("gauss", element, "__init__", "_jacobian", "determinants")
+    module = compiled("gauss", element, "__init__", "dN", "J", "detJ", "_jacobian", "determinants")
     if module is None:
         return np.zeros(len(nodes), dtype=bool)
     weights = np.where(np.arange(len(dN)) < g, 1 / g, 0.0)
@@ -72,7 +75,7 @@ def volumes(points: Array, group: ElementGroup) -> Array:
 def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
     """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b (3,), or nodal (n, 3), in N/m³."""
     nodal, total = b.ndim == 2, np.zeros_like(points)
-    module = compiled("gauss", group.element, *MASS, *(() if nodal else GEOMETRY), "body_force")
+    module = compiled("gauss", group.element, *MASS, "body_force")
     for part in by_mass_rule(points, group, 2 if nodal else 1) if module else ():
         tables = floats(points), *part.tables()
         total += module.body_force(*tables, floats(b)) if nodal else module.shares(*tables) * b
@@ -93,12 +96,41 @@ def at_gauss(points: Array, group: ElementGroup, u: Array, *, stress: bool = Tru
     return np.concatenate(parts)
 
 
+def in_order(groups: Sequence[ElementGroup], parts: Sequence[Array]) -> Any:
+    """Return values (m_i, g, ...) of groups as (m, g, ...) in the order of the mesh.
+
+    Where groups have different numbers of Gauss points, a list of m arrays (g, ...).
+    """
+    m = sum(map(len, groups))
+    if len(parts) == 1 and (groups[0].rows == np.arange(m)).all():
+        return parts[0]
+    if len({part.shape[1:] for part in parts}) > 1:
+        rows: list[Any] = [None] * m
+        for group, part in zip(groups, parts, strict=True):
+            for row, value in zip(group.rows.tolist(), part, strict=True):
+                rows[row] = value
+        return rows
+    out = np.zeros((m, *parts[0].shape[1:]))
+    for group, part in zip(groups, parts, strict=True):
+        out[group.rows] = part
+    return out
+
+
 def value_at(
     element: KinematicLinear, group: ElementGroup, u: Array, chunk: slice, stress: bool = True
 ) -> Array:
     """Return stresses, or strains, (m, g, 6) of the placed elements of a chunk by their own methods."""
-    strain = element.strain(u[group.nodes[chunk]])
-    return group.material.stress(strain) + group.initial_stress(chunk) if stress else strain
+    displacements = u[group.nodes[chunk]]
+    if not stress:
+        return strain_of(element, displacements, group.material.C)
+    return _elastic(element, group, displacements) + group.initial_stress(chunk)
+
+
+def _elastic(element: KinematicLinear, group: ElementGroup, u: Array) -> Array:
+    """Return the stresses of nodal displacements (m, k, 3): by the element's own law, or by the material."""
+    if not group.element.inherits("stress"):
+        return stress_of(element, group.material.C, u)
+    return group.material.stress(strain_of(element, u, group.material.C))
 
 
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:
@@ -110,7 +142,8 @@ def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Ar
             continue
         for chunk in group.chunks():
             element = group.at(points, chunk)
-            add_nodal(total, group.nodes[chunk], element.internal_load(value_at(element, group, u, chunk)))
+            stress = value_at(element, group, u, chunk)
+            add_nodal(total, group.nodes[chunk], internal_load_of(element, stress, group.material.C))
     return total
 
 
@@ -133,8 +166,8 @@ def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[flo
 
 def _totals(points: Array, group: ElementGroup, u: Array, chunk: slice) -> tuple[float, float, int]:
     element = group.at(points, chunk)
-    value = element.strain(u[group.nodes[chunk]])
-    elastic = group.material.stress(value)
+    value = value_at(element, group, u, chunk, stress=False)
+    elastic = _elastic(element, group, u[group.nodes[chunk]])
     energy = float(((value * elastic).sum(axis=-1) * element.dV).sum()) / 2
     mises = voigt.von_mises(elastic + group.initial_stress(chunk)).max(axis=1)
     return energy, float(mises.max()), chunk.start + int(mises.argmax())

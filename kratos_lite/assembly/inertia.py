@@ -15,14 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import MASS, ElementGroup, add_nodal, by_mass_rule, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.exact import geometries
-from kratos_lite.elements.tables import lumped, tabulate
+from kratos_lite.elements.mass import MASS
+from kratos_lite.elements.tables import lumped
 from kratos_lite.typing import Array
 
-STEPS = (*MASS, "_gauss", "dV", "gauss_points")
+STEPS = (*MASS, "gauss_points")
 """What an element class may redefine so that its matrices are not those of its tables."""
 REST = np.zeros((3, 4))
 
@@ -104,8 +105,7 @@ def _convective(element: KinematicLinear, density: float, velocity: Array) -> tu
     c = element.gauss_points() @ velocity[:, :3].T + velocity[:, 3]
     along = (c[..., None, :] @ D)[..., 0, :]
     weights = (density * dV)[..., None, :]
-    N = tabulate(element.shape, element.rule)[0]
-    return (N.T * weights) @ along, (np.swapaxes(along, -1, -2) * weights) @ along
+    return (element._N(element.rule).T * weights) @ along, (np.swapaxes(along, -1, -2) * weights) @ along
 
 
 # ---- lumped mass -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The command line: ``kratos-lite solve | info | check | convert | bench``."""
+"""The command line: ``kratos-lite solve | info | check | convert | verify | bench``."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,17 +24,29 @@ OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
 OF_MODELS = (
     *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
-    *("rotation", "translation", "center", "stiffening", "boundaries", "damping"),
+    *("rotation", "translation", "center", "center_velocity", "center_acceleration", "stiffening"),
+    *("boundaries", "damping", "moving_part"),
     *("integrator", "rayleigh", "lumped"),
 )
 """Options that bodies do not have."""
+OWNERS = {
+    **dict.fromkeys(("center", "center_velocity", "center_acceleration", "stiffening"), ("rotation",)),
+    "boundaries": ("translation",),
+    **dict.fromkeys(("damping", "moving_part"), ("rotation", "translation")),
+}
+"""Options of a motion, and those that they belong to."""
 
 
 def case_of(options: Namespace) -> Case:
     """Return the case of an input and the options of the command line, which win where there is one value."""
     materials = [material(text) for text in options.material]
     everywhere = any(part is None for part, _ in materials)
-    case = read_case(options.input, materials=not everywhere, strict=not options.lenient)
+    case = read_case(
+        options.input,
+        materials=not everywhere,
+        strict=not options.lenient,
+        initial_displacement=not options.ignore_initial_displacement,
+    )
     if case.is_of_model:
         apply(case.model, options, materials)
         if options.solver:
@@ -43,6 +56,8 @@ def case_of(options: Namespace) -> Case:
     else:
         _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
+    if case.is_of_model and case.time is not None:
+        case.time = case.time.starting_from(case.model.supports, case.model.initial_displacement)
     _set_outputs(case.outputs, options)
     if options.modes is not None:
         _take_modes(case, options)
@@ -111,7 +126,7 @@ def _steps(text: str) -> tuple[float, int, int]:
     (0.001, 200, 10)
     """
     step, *counts = text.split(":")
-    if len(counts) not in (1, 2) or not all(count.isdecimal() for count in counts):
+    if len(counts) not in (1, 2) or not all(re.fullmatch("[0-9]{1,18}", count) for count in counts):
         raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
     steps, every = (int(count) for count in (*counts, "1")[:2])
     return number(step, "--time"), steps, every
@@ -218,22 +233,25 @@ def motion(model: Model, options: Namespace) -> Motion | None:
         raise InputError("--rotation, --translation: the file gives a motion already, and a model has one")
     if turns and passes:
         raise InputError("--rotation and --translation: a model has one motion; give one of them")
-    for option, owner in (("center", "rotation"), ("stiffening", "rotation"), ("boundaries", "translation")):
-        if getattr(options, option) and not getattr(options, owner):
-            raise InputError(f"--{option} belongs to --{owner}; give that too")
+    for name, owners in OWNERS.items():
+        if getattr(options, name) and not any(getattr(options, owner) for owner in owners):
+            belongs = f"--{name.replace('_', '-')} belongs to {' or '.join(f'--{owner}' for owner in owners)}"
+            raise InputError(f"{belongs}; give {'that' if len(owners) == 1 else 'one of them'} too")
     text, option = turns or passes, "--rotation" if turns else "--translation"
     if not text:
-        if options.damping:
-            raise InputError("--damping belongs to --rotation or --translation; give one of them too")
         return None
     from kratos_lite.ale import Rotation, Translation  # a quick start without motion
 
-    rates, damping = _rates(text, option), number(options.damping or "0", "--damping")
+    rates = _rates(text, option)
+    common: dict[str, Any] = {"damping": number(options.damping or "0", "--damping")}
+    common["part"] = options.moving_part
     try:
         if passes:
-            return Translation(*rates, boundaries=options.boundaries or "absorbing", damping=damping)
-        center = vector(options.center, "--center") if options.center else (0.0, 0.0, 0.0)
-        return Rotation(*rates, center=center, stiffening=options.stiffening, damping=damping)
+            return Translation(*rates, boundaries=options.boundaries or "absorbing", **common)
+        vectors = ("center", "center_velocity", "center_acceleration")
+        given = {name: getattr(options, name) for name in vectors}
+        common |= {name: vector(v, f"--{name.replace('_', '-')}") for name, v in given.items() if v}
+        return Rotation(*rates, stiffening=options.stiffening, **common)
     except InputError as error:
         raise InputError(f"{option} {text}: {error}") from None
 

@@ -216,6 +216,13 @@ def _counts(path: str, mesh: Mesh) -> str:
     return f"{mesh.n_nodes} nodes, {elements} elements{parts}"
 
 
+def verify(options: Namespace) -> int:
+    """Compare elements with what is known."""
+    from kratos_lite.cli.verification import run
+
+    return run(options)
+
+
 def bench(options: Namespace) -> int:
     """Run the benchmarks of a source checkout, in its folder, with all further words."""
     import subprocess

@@ -10,7 +10,7 @@ from kratos_lite import __version__
 
 EXIT_CODES = """exit codes:
   0    done
-  1    a defect of kratos-lite
+  1    a defect of kratos-lite, or a row of verify that fails
   2    bad input, or an output that cannot be written
   3    solved, but an expected value of the run file is missed
   130  interrupted with Ctrl-C"""
@@ -29,6 +29,8 @@ EXAMPLES = {
     "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
     "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
     "  kratos-lite check my_element.py",
+    "verify": "kratos-lite verify\n  kratos-lite verify patch macneal_harder --element 3D8N --element 3D20N\n"
+    "  kratos-lite verify my_element.py -o my_element.md",
     "convert": "kratos-lite convert beam.elem beam.mdpa\n  kratos-lite convert beam.mdpa beam.vtu",
 }
 INTEGRATORS = (
@@ -61,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     convert = _add(commands, "convert", "convert a model file to another format")
     convert.add_argument("input", help=MODEL)
     convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, chosen by the extension")
+    _add_verify(commands)
     # All its words, also --help, are for the program that it runs.
     bench = commands.add_parser("bench", help="run the benchmarks of a source checkout", add_help=False)
     bench.set_defaults(debug=False)
@@ -77,9 +80,10 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
     )
     # "-1,0,0" and "-z:30" are values, not options
     command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")
-    command.add_argument(
-        "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
-    )
+    if name != "verify":
+        command.add_argument(
+            "--lenient", action="store_true", help="accept .mdpa rows that are broken over lines"
+        )
     command.add_argument("--debug", action="store_true", help="show the traceback of an error")
     return command
 
@@ -99,6 +103,26 @@ def _add_solve(commands: Any) -> None:
     how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")
     how.add_argument("-v", "--verbose", action="store_true", help="also list what the solution skipped")
     how.add_argument("-q", "--quiet", action="store_true", help="print no summary")
+
+
+def _add_verify(commands: Any) -> None:
+    verify = _add(commands, "verify", "compare elements with closed forms and published values")
+    verify.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="problems, their families or patterns such as '*cylinder*' (all); a .py file defines elements "
+        "of your own, which are then those that are verified",
+    )
+    verify.add_argument(
+        "--element",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="only this one, such as 3D8N; may be given several times (all of the library)",
+    )
+    verify.add_argument("-o", "--output", metavar="OUT", help="write the table as .md or .json")
+    verify.add_argument("--list", action="store_true", help="list the problems and their sources instead")
 
 
 def _add_outputs(solve: argparse.ArgumentParser) -> None:
@@ -141,6 +165,11 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
     )
+    given.add_argument(
+        "--ignore-initial-displacement",
+        action="store_true",
+        help="do not take the DISPLACEMENT of free nodes in the file for the state without stress",
+    )
 
 
 def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) -> None:
@@ -154,8 +183,11 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
         ale,
         ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
         ("--center", "X,Y,Z", "a point of the axis in m (0,0,0)"),
+        ("--center-velocity", "X,Y,Z", "of the center of the rotation, in m/s"),
+        ("--center-acceleration", "X,Y,Z", "likewise, in m/s²"),
         ("--translation", "AXIS:RATE[:ACCELERATION]", "of the moving frame, in m/s and m/s²"),
         ("--damping", "ALPHA", "by mass, relative to the motion, in 1/s (0)"),
+        ("--moving-part", "PART", "the part that moves; the others rest (all)"),
     )
     ale.add_argument(
         "--stiffening", action="store_true", help="add the geometric stiffness of the centrifugal stress"

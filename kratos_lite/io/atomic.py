@@ -8,13 +8,18 @@ import os
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from math import prod
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
+from kratos_lite.validation import fits_memory
+
+if TYPE_CHECKING:
+    from zipfile import ZipFile
 
 
 def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
@@ -26,22 +31,54 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
     2.0
     """
     import zlib  # these two only where they are needed, for a quick start
-    from zipfile import BadZipFile
+    from zipfile import BadZipFile, ZipFile
 
-    try:  # from memory, as NumPy leaves a file open that it cannot read
-        with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
-            return {name: file[name] for name in names}
+    try:
+        with ZipFile(io.BytesIO(Path(path).read_bytes())) as file:
+            return {name: _array(file, name, str(path)) for name in names}
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
+    except InputError:
+        raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error, RuntimeError):
         raise InputError(f"{path}: not {what}, or not all of it") from None
 
 
+def _array(file: ZipFile, name: str, path: str) -> NDArray[Any]:
+    """Return an array of an .npz file; ValueError for one that states more numbers than there are."""
+    from numpy.lib.format import read_array, read_array_header_1_0, read_array_header_2_0, read_magic
+
+    entry = file.getinfo(f"{name}.npy")
+    fits_memory(2.0 * entry.file_size, f"{path}: {name}", "is the file damaged?")
+    data = io.BytesIO(file.read(entry))
+    header = {(1, 0): read_array_header_1_0, (2, 0): read_array_header_2_0}[read_magic(data)]
+    shape, _, dtype = header(data)
+    if prod(shape) * dtype.itemsize != entry.file_size - data.tell():
+        raise ValueError
+    data.seek(0)
+    array = read_array(data, allow_pickle=False)
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise InputError(f"{path}: {name} is not finite; write the state anew")
+    return array
+
+
 def write_arrays(path: str | Path, arrays: Mapping[str, Any]) -> None:
-    """Write named arrays or numbers to an .npz file, as a whole or not at all."""
+    """Write named arrays or numbers to an .npz file, as a whole or not at all; SolveError if one is NaN."""
+    for name, values in arrays.items():
+        refuse_nan(path, name, values)
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **arrays)
     write_whole(path, buffer.getvalue())
+
+
+def refuse_nan(path: str | Path, name: str, values: Any) -> None:
+    """Raise SolveError, before anything is written, for numbers that are not finite."""
+    array = np.asarray(values)
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise SolveError(
+            f"{path}: not written: {name} is not finite everywhere, beyond what a computer holds (1.8e308); "
+            "look for coordinates, loads, supports or constants in wrong units"
+        )
 
 
 def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> None:

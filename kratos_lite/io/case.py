@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from kratos_lite.errors import ModelError
+import numpy as np
+
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array
 from kratos_lite.validation import flag, positive_step, whole_number
 
@@ -17,6 +20,22 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
     from kratos_lite.bodies import Body
+
+
+MOST_STEPS = 1_000_000_000
+"""Steps of one run; more take weeks, and rather mean that the step is a slip of the pen."""
+
+
+def number_of_steps(value: Any) -> int:
+    """Return a number of steps; InputError for none, and for an absurd one.
+
+    >>> number_of_steps(100)
+    100
+    """
+    steps = whole_number(value, "steps")
+    if steps > MOST_STEPS:
+        raise InputError(f"{steps} steps are more than {MOST_STEPS}; take longer ones, or go on with restart")
+    return steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +73,25 @@ class TimeIntegration:
 
     def __post_init__(self) -> None:
         positive_step(self.step)
-        whole_number(self.steps, "steps")
+        number_of_steps(self.steps)
         whole_number(self.every, "every")
         flag(self.lumped, "lumped")
+
+    def starting_from(self, supports: Supports, displacement: Array | None) -> TimeIntegration:
+        """Return the integration that starts from a displacement, unless it has a start of its own.
+
+        Parameters
+        ----------
+        supports : of the model, which hold what is prescribed.
+        displacement : (n, 3) m, or None.
+
+        Returns
+        -------
+        TimeIntegration
+        """
+        if displacement is None or self.displacement is not None:
+            return self
+        return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))
 
     def __str__(self) -> str:
         by = f" by {self.integrator}" if self.integrator else ""

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from kratos_lite.mesh import Mesh
 
 
-def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Model:
+def read(
+    path: str | Path, *, materials: bool = True, strict: bool = True, initial_displacement: bool = True
+) -> Model:
     """Return the model that a file describes.
 
     Parameters
@@ -26,6 +28,8 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
         any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
+    initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
+        as KinematicLinear does in Kratos; False ignores it.
 
     Returns
     -------
@@ -36,14 +40,19 @@ def read(path: str | Path, *, materials: bool = True, strict: bool = True) -> Mo
     InputError
         With file, line and cure of everything that is wrong.
     """
-    case = read_case(path, materials=materials, strict=strict)
+    case = read_case(path, materials=materials, strict=strict, initial_displacement=initial_displacement)
     if not case.is_of_model:
         raise InputError(f"{path}: describes a body; read it with kl.read_case")
     return case.model
 
 
 def read_case(
-    path: str | Path, *, materials: bool = True, strict: bool = True, allow_outside: bool = False
+    path: str | Path,
+    *,
+    materials: bool = True,
+    strict: bool = True,
+    allow_outside: bool = False,
+    initial_displacement: bool = True,
 ) -> Case:
     """Return what an input means: model or body, analysis, outputs and expected values.
 
@@ -54,6 +63,8 @@ def read_case(
     materials : take the materials from a model file; False leaves them to the caller.
     strict : refuse `.mdpa` rows that do not stand on lines of their own.
     allow_outside : let a .json file name files outside its folder.
+    initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
+        False ignores it.
 
     Returns
     -------
@@ -69,20 +80,23 @@ def read_case(
     if ending(path) == ".json":
         from kratos_lite.io.settings import read_settings
 
-        return _case_of_json(read_settings(path), strict, allow_outside)
+        return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement)
     if ending(path) == ".py":
         from kratos_lite.io.readers.script import read_script
 
         return read_script(path)
-    return Case(model_from(read_document(path, strict=strict), materials=materials), files=[path])
+    document = read_document(path, strict=strict)
+    model = model_from(document, materials=materials, initial_displacement=initial_displacement)
+    return Case(model, files=[path])
 
 
-def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
+def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool) -> Case:
     """Return the case of a JSON file; the reader is chosen by its keys."""
     if "solver_settings" in settings or "problem_data" in settings:
         from kratos_lite.io.kratos.run_file import read_kratos_project
 
-        return read_kratos_project(settings, Path(settings.source).parent, outside)
+        folder = Path(settings.source).parent
+        return read_kratos_project(settings, folder, outside, initial_displacement=initial)
     if "properties" in settings and "model" not in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     if ("body" in settings or "mesh" in settings) and "model" not in settings:
@@ -91,7 +105,7 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool) -> Case:
         return read_body_file(settings, strict=strict)
     from kratos_lite.io.readers.run_file import read_run_file
 
-    return read_run_file(settings, strict=strict, allow_outside=outside)
+    return read_run_file(settings, strict=strict, allow_outside=outside, initial_displacement=initial)
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:

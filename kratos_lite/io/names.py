@@ -13,6 +13,8 @@ SOLIDS = {len(shape.nodes): shape for shape in SHAPES.values() if shape.nodes.sh
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
 CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
 """Words in the names of conditions that carry loads."""
+PRESTRESS = ("PRESTRESS", "INSITU_STRESS")
+"""Names of the initial stress in files, which Kratos subtracts: σ = C ε - PRESTRESS_FACTOR · PRESTRESS."""
 THIN = ("Shell", "Membrane", "Truss", "Beam", "Cable", "Spring", "Plate")
 """Words in the names of elements that are no solids."""
 

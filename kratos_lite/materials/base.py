@@ -19,6 +19,12 @@ MAX_FLOAT = float_info.max
 MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
 """Every material by its class name and by the names of Kratos."""
 
+SAME_STRESS = 1e-8
+"""Relative difference up to which a stress is C strain."""
+_DIRECTIONS = np.vstack([np.eye(6), -np.eye(6), [[1.0, -0.7, 0.4, 0.9, -0.3, 0.6]]])
+SAMPLES: Array = np.vstack([size * _DIRECTIONS for size in (1e-6, 1e-3, 1e-1)])
+"""Strains (k, 6), small and large, of both signs, at which the stress of a material is tried."""
+
 
 class LinearMaterial:
     """A linear elastic material: stress = C strain in Voigt order xx yy zz xy yz zx.
@@ -139,6 +145,40 @@ class LinearMaterial:
         (..., 6) float, Pa
         """
         return np.asarray(strain, dtype=float) @ self.C.T
+
+    def check_stress(self) -> None:
+        """Check that `stress` is C strain, once for each material; what is solved is C.
+
+        Raises
+        ------
+        MaterialError
+            If it is not, or does not take strains (..., 6).
+        """
+        if type(self).stress is not LinearMaterial.stress:
+            _ = self._stress_is_checked
+
+    @cached_property
+    def _stress_is_checked(self) -> bool:
+        name = type(self).__name__
+        try:
+            found = np.asarray(self.stress(SAMPLES), dtype=float)
+            if found.shape != SAMPLES.shape:
+                raise ValueError(f"it returned shape {found.shape}")
+        except (ValueError, TypeError, IndexError) as error:
+            text = f"{name}.stress(strain) must take strains (..., 6); of {SAMPLES.shape}: {error}"
+            raise MaterialError(text) from None
+        expected = SAMPLES @ self.C.T
+        miss = np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)
+        k = int(np.argmax(np.where(np.isnan(miss), np.inf, miss)))
+        if not miss[k] <= SAME_STRESS:
+            values = (", ".join(f"{x:.6g}" for x in row) for row in (SAMPLES[k], found[k], expected[k]))
+            strain, stress, linear = values
+            raise MaterialError(
+                f"{name}.stress is not C strain: at the strain ({strain}) it gives ({stress}) Pa, C gives "
+                f"({linear}) Pa; materials are linear: override elasticity() so that C is that of the "
+                "stress, or compliance(), and leave stress() as it is"
+            )
+        return True
 
     @classmethod
     def from_variables(cls, values: dict[str, Any]) -> LinearMaterial:

@@ -12,7 +12,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block, Mesh, Part
 from kratos_lite.shapes import Hexahedron8, Shape
 from kratos_lite.typing import Array, Ints
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, fits_memory
 
 
 def _kuhn() -> list[list[int]]:
@@ -95,8 +95,19 @@ def _cells(cells: Sequence[int]) -> tuple[int, int, int]:
     counts = finite(cells, "cells")
     if counts.shape != (3,) or (counts < 1).any() or (counts != counts.round()).any():
         raise InputError(f"cells must be three whole numbers ≥ 1; got {cells}")
-    i, j, k = counts.astype(int).tolist()
+    i, j, k = map(int, counts.tolist())
     return i, j, k
+
+
+def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
+    """Raise InputError for more cells than int32 numbers, or than memory holds."""
+    i, j, k = counts
+    cells = i * j * k * len(SPLITS[shape.cell])
+    what = f"a mesh of {i} × {j} × {k} bricks"
+    if cells * len(shape.nodes) >= 2**31:
+        raise InputError(f"{what} has {cells:.3g} cells, more than the {2**31 // len(shape.nodes)} possible")
+    # Measured: points, bricks, cells and the sorting of their edges take 54 bytes for each node of a cell.
+    fits_memory(60.0 * cells * len(shape.nodes), what, "take fewer cells")
 
 
 def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, type[Shape]]:
@@ -106,7 +117,9 @@ def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, ty
     shape = kind.shape
     if shape.cell not in SPLITS:
         raise InputError(f"{element} has cell {shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
-    points, bricks = _grid(_cells(cells), shape.cell == "pyramid")
+    counts = _cells(cells)
+    _check_size(counts, shape)
+    points, bricks = _grid(counts, shape.cell == "pyramid")
     split = np.array(SPLITS[shape.cell])
     corners = bricks[:, split].reshape(-1, split.shape[1])
     points, nodes = raise_order(points, corners, shape)

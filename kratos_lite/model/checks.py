@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.own_steps import MECHANICS
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, SolveError
+from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Gravity, Load
 from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 SLOWEST, QUICKEST = 1.0, 2e4
 """Speeds of waves in m/s: jelly is above the one, diamond below the other."""
@@ -153,9 +154,12 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
 def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
     """Return how many zero-energy modes beyond the six rigid ones a rule leaves to the reference cell."""
     cell = element(element.nodes, rule)
-    B = np.vstack([cell.B(xi) for xi in rule.points])
-    values = np.linalg.svd(B, compute_uv=False)
-    rank = int((values > 1e-9 * values[0]).sum())
+    if element.inherits(*MECHANICS):
+        B = np.vstack([cell.B(xi) for xi in rule.points])
+        values = np.linalg.svd(B, compute_uv=False)
+        rank = int((values > 1e-9 * values[0]).sum())
+    else:
+        rank = int(np.linalg.matrix_rank(cell.stiffness(np.eye(6)), tol=1e-12, hermitian=True))
     return 3 * len(element.nodes) - 6 - rank
 
 
@@ -223,7 +227,8 @@ def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
             "element; move it to the origin"
         )
     stiff = [float(np.abs(group.material.C).max()) for group in groups]
-    lock = {b.element.__name__ for b in groups if _is_near_half(b.material.C)} - {"KinematicLinear3D10N"}
+    plain = [b for b in groups if b.element.inherits(*MECHANICS)]  # a strain of its own may be free of it
+    lock = {b.element.__name__ for b in plain if _is_near_half(b.material.C)} - {"KinematicLinear3D10N"}
     if lock:
         names = ", ".join(sorted(lock))
         warnings.append(
@@ -289,6 +294,17 @@ def check_loads(
     if not forces[~supports.fixed].any() and not moved:
         return ["all loads act on fixed components, so nothing moves"]
     return []
+
+
+def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
+    """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
+    unused = np.flatnonzero(~used)
+    lost = unused[(forces[unused] != 0).any(axis=1)]
+    if len(lost):
+        raise ModelError(
+            f"node {mesh.node_ids[lost[0]]} carries a load but belongs to no element; load another node, or "
+            "give it an element"
+        )
 
 
 def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:

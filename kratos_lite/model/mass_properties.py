@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
@@ -262,13 +261,12 @@ def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Ar
     mass, volume = 0.0, 0.0
     first, second = np.zeros(3), np.zeros((3, 3))
     for group in (part for whole in groups for part in by_mass_rule(X, whole, 2)):
-        N, dN = tabulate(group.element.shape, group.rule)
         rho = group.material.density
         for chunk in group.chunks():
             element = group.at(X, chunk)
-            dV = element.determinants(dN) * group.rule.weights
+            dV = element._volumes(group.rule)
             _check_volumes(dV.sum(axis=1), group, chunk)
-            x, w = (N @ element.X).reshape(-1, 3), dV.ravel()
+            x, w = element.gauss_points().reshape(-1, 3), dV.ravel()
             wx = w[:, None] * x
             mass, volume = mass + rho * float(w.sum()), volume + float(w.sum())
             first += rho * wx.sum(axis=0)

@@ -74,7 +74,7 @@ class Structure:
         self.mesh = checks.checked_mesh(mesh)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
-        self.motion: Any = None
+        self.motion: Attachment | None = None
         self.notes: list[str] = []
         self.patterns = PatternCache()
         self._initial_displacement: Array | None = None
@@ -179,7 +179,7 @@ class Structure:
 
     @property
     def prestress(self) -> Array | None:
-        """Stress (m, 6) in Pa of unstrained elements, read-only, or None; see `add_prestress`."""
+        """Stress (m, 6) in Pa of unstrained elements, tension positive, or None; see `add_prestress`."""
         return self._prestress
 
     def stress_free_at(self, displacement: ArrayLike) -> None:
@@ -200,7 +200,9 @@ class Structure:
         self._changes += 1
 
     def add_prestress(self, stress: ArrayLike, where: WhereElements = None) -> None:
-        """Add a stress that elements carry before they are strained.
+        """Add a stress that elements carry before they are strained: σ = C ε + stress, tension positive.
+
+        PRESTRESS and INSITU_STRESS in files of Kratos have the opposite sign: σ = C ε - PRESTRESS.
 
         Parameters
         ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from operator import index
 
 from kratos_lite.typing import Array
 
@@ -24,6 +25,8 @@ class Rule:
     >>> from kratos_lite.quadrature import hexahedron
     >>> sum(gamma for xi, gamma in hexahedron(degree=3))
     8.0
+    >>> hexahedron(degree=1)[0]
+    (array([0., 0., 0.]), 8.0)
     """
 
     points: Array
@@ -40,6 +43,10 @@ class Rule:
 
     def __iter__(self) -> Iterator[tuple[Array, float]]:
         return iter(zip(self.points, self.weights.tolist(), strict=True))
+
+    def __getitem__(self, g: int) -> tuple[Array, float]:
+        """Return point (d,) and weight of number g, as iteration does."""
+        return self.points[index(g)], float(self.weights[index(g)])
 
     def __repr__(self) -> str:
         return f"Rule({self.name}: {len(self)} points, degree {self.degree})"

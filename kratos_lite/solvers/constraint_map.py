@@ -65,6 +65,15 @@ class ConstraintMap:
         u[self.free] = q
         return u
 
+    def transform_matrix(self) -> csr_array[Any, Any]:
+        """Return T (N, q) as a sparse matrix, whether or not there are slaves."""
+        from scipy.sparse import csr_array
+
+        if self.T is not None:
+            return self.T
+        q = len(self.free)
+        return csr_array((np.ones(q), (self.free, np.arange(q))), shape=(len(self.c), q))
+
     def expand(self, q: Array, c: Array | None = None) -> Array:
         """Return all displacements T q + c, (N,); `c` replaces that of the map."""
         u = self.transform(q)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
 from kratos_lite.typing import Array
 from kratos_lite.validation import whole_number
@@ -19,6 +19,14 @@ if TYPE_CHECKING:
 
 DENSE_MODES = 1200
 """Up to this many unknowns all modes at once take no longer than some by iteration."""
+SHIFTS = (1.0, 1e-2, 1e-4, 1e-6)
+"""Shares of the first shift that are tried."""
+RESTARTS = 40
+"""Restarts of Lanczos after which a lower shift is tried."""
+RESIDUAL = 1e-6
+"""Share of its terms that may be left of an equation."""
+ROUNDING = 1e-13
+"""Share of the norms of its matrices that may be."""
 
 
 def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[Array, Array]:
@@ -38,6 +46,8 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
     ------
     InputError
         If so many modes do not exist.
+    SolveError
+        If the iteration does not converge, or what it finds does not satisfy the equations.
 
     Examples
     --------
@@ -53,19 +63,64 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
         from scipy.linalg import eigh
 
         squares, shapes = eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
-        return np.sqrt(np.maximum(squares, 0.0)), shapes
-    return _by_iteration(K, M, count)
+    else:
+        squares, shapes = _by_iteration(K, M, count)
+    check_residuals([(np.ones(count), K), (-squares, M)], shapes)
+    return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
 def _by_iteration(K: Any, M: Any, count: int) -> tuple[Array, Array]:
-    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite."""
-    from scipy.sparse.linalg import LinearOperator, eigsh
+    """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite.
+
+    Frequencies far below the shift are hard to tell apart: then it comes down.
+    """
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
     n = K.shape[0]
-    shift = 1e-4 * K.diagonal().sum() / M.diagonal().sum()
-    factors = direct.factorize((K + shift * M).tocsr())
-    inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
-    squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start)
-    order = np.argsort(squares)
-    return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]
+    for share in SHIFTS:
+        shift = share * first_shift(K, M)
+        factors = direct.factorize((K + shift * M).tocsr())
+        inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
+        try:
+            squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start, maxiter=RESTARTS)
+        except ArpackNoConvergence:
+            continue
+        order = np.argsort(squares)
+        return squares[order], shapes[:, order]
+    raise not_converged(count)
+
+
+def first_shift(K: Any, M: Any) -> float:
+    """Return a square of a frequency in 1/s² that is low among those of a mesh."""
+    return max(1e-4 * float(K.diagonal().sum() / M.diagonal().sum()), float(np.finfo(float).tiny))
+
+
+def not_converged(count: int) -> SolveError:
+    """Return the error for modes that an iteration does not find."""
+    return SolveError(
+        f"{count} modes cannot be found by iteration; ask for fewer, or for more to have repeated ones in "
+        "full, and look for nearly free parts"
+    )
+
+
+def check_residuals(terms: list[tuple[Any, Any]], shapes: Any) -> None:
+    """Raise SolveError unless the sum of terms is 0 but for rounding, for each shape.
+
+    Parameters
+    ----------
+    terms : factors (count,), and the matrix (n, n) that they multiply.
+    shapes : (n, count).
+    """
+    parts = [factor * (A @ shapes) for factor, A in terms]
+    noise = sum(np.abs(factor) * float(abs(A).sum(axis=0).max()) for factor, A in terms)
+    left = np.linalg.norm(sum(parts), axis=0)
+    size = sum(np.linalg.norm(part, axis=0) for part in parts)
+    allowed = RESIDUAL * size + ROUNDING * noise * np.linalg.norm(shapes, axis=0)
+    if not (left <= allowed).all():  # nor if it is no number
+        worst = int(np.argmax(np.nan_to_num(left / allowed, nan=np.inf)))
+        raise SolveError(
+            f"mode {worst + 1} misses its equation by {left[worst] / size[worst]:.1e} of its terms, which is "
+            "more than rounding explains; ask for another number of modes, and look for very thin elements, "
+            "a large stiffness contrast or nearly free parts"
+        )

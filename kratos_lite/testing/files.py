@@ -55,7 +55,7 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
         for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
         library = _registered()
-        defined = vars(_execute(Path(path)))
+        defined = vars(run_module(Path(path)))
         kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
         found = _check_all(defined, kinds)
         for kind in kinds:
@@ -88,8 +88,8 @@ def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, li
     return found
 
 
-def _execute(path: Path) -> ModuleType:
-    """Return the module that the file makes; it can be imported only while it runs."""
+def run_module(path: Path) -> ModuleType:
+    """Return the module that a Python file makes; it can be imported only while it runs."""
     module = ModuleType(MODULE)
     module.__file__ = str(path)
     try:

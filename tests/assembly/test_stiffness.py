@@ -16,7 +16,8 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import CONSTANT_JACOBIANS, assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.kinematic_linear import STIFFNESS_STEPS
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.own_steps import MECHANICS
 from kratos_lite.native import kernels
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
@@ -160,7 +161,7 @@ def test_an_element_of_a_user_with_seven_nodes(path):
     with tetrahedron_of_seven_nodes() as element:
         points, (tens,) = scene("KinematicLinear3D10N", (2, 2, 1), 0.01)
         group = ElementGroup(element, element.rule, STEEL, tens.nodes[:, :7], tens.rows)
-        assert element.inherits(*STIFFNESS_STEPS)
+        assert element.inherits(*GEOMETRY, *MECHANICS)
         assert_sum(points, [group])
 
 

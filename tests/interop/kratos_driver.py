@@ -2,7 +2,7 @@
 
 It runs in a process of its own, since Kratos prints a lot and may abort.  A job is
 
-    {"mdpa": path, "solve": bool, "elasticity": 6 × 6 or null, "write": path or null}
+    {"mdpa": path, "solve": bool, "elasticity": 6 × 6 or null, "write": path or null, "values": names or null}
 """
 
 import json
@@ -91,6 +91,25 @@ def element(one, info):
     }
 
 
+def rows(value):
+    """Return what Kratos has at one point as numbers."""
+    if hasattr(value, "Size2"):
+        return matrix(value)
+    return value if isinstance(value, float) else list(value)
+
+
+def values(one, names, info):
+    """Return quantities at the Gauss points of a solved element, and its matrices."""
+    K, M, r = KM.Matrix(), KM.Matrix(), KM.Vector()
+    one.CalculateLocalSystem(K, r, info)
+    one.CalculateMassMatrix(M, info)
+    found = {"K": matrix(K), "M": matrix(M), "r": list(r)}
+    for name in names:
+        variable = KM.KratosGlobals.GetVariable(name)
+        found[name] = [rows(value) for value in one.CalculateOnIntegrationPoints(variable, info)]
+    return found
+
+
 def describe(part):
     fixed = [
         [node.Id, axis.lower(), node.GetSolutionStepValue(getattr(KM, f"DISPLACEMENT_{axis}"))]
@@ -130,6 +149,8 @@ def answer(job):
         solve(part)
         found["displacement"] = vectors(part, KM.DISPLACEMENT)
         found["reaction"] = vectors(part, KM.REACTION)
+    if job.get("values"):
+        found["values"] = {one.Id: values(one, job["values"], part.ProcessInfo) for one in part.Elements}
     return found
 
 

@@ -477,3 +477,44 @@ def test_we_read_what_kratos_writes(cubes, tmp_path):
     assert np.array_equal(again.supports.fixed, model.supports.fixed)
     again.add(kl.Gravity((3.0, -2.0, -9.81)))
     assert_close(again.solve().displacement(), model.solve().displacement(), 1e-8)
+
+
+# ---- elements of a solved model ------------------------------------------------------------------
+
+QUANTITIES = (
+    "CAUCHY_STRESS_VECTOR",
+    "CAUCHY_STRESS_TENSOR",
+    "PK2_STRESS_VECTOR",
+    "PK2_STRESS_TENSOR",
+    "VON_MISES_STRESS",
+    "GREEN_LAGRANGE_STRAIN_VECTOR",
+    "GREEN_LAGRANGE_STRAIN_TENSOR",
+    "STRAIN_ENERGY",
+    "CONSTITUTIVE_MATRIX",
+    "INTEGRATION_WEIGHT",
+)
+"""What SmallDisplacementElement offers of our quantities, apart from the places of the points."""
+
+
+@pytest.mark.parametrize("kind", SAME_RULE)
+def test_values_at_integration_points_and_local_systems_are_those_of_kratos(kind, tmp_path):
+    model = cube(kind, 2)
+    kl.write(tmp_path / "cube.mdpa", model)
+    names = ["INTEGRATION_COORDINATES", *QUANTITIES]
+    (found,) = ask(tmp_path, [{"mdpa": str(tmp_path / "cube.mdpa"), "solve": True, "values": names}])
+    result = model.solve()
+    for element in (1, model.mesh.n_elements):
+        theirs = found["values"][str(element)]
+        at = np.array(theirs["INTEGRATION_COORDINATES"])
+        ours = result.at_integration_points("INTEGRATION_COORDINATES", element=element)
+        order = np.abs(ours[None] - at[:, None]).max(axis=2).argmin(axis=1)  # ours of each point of theirs
+        assert_close(ours[order], at, 1e-12)
+        for name in QUANTITIES:
+            value = result.at_integration_points(name, element=element)[order]
+            assert_close(value, np.array(theirs[name]), 1e-9)
+        local = model.local_system(element, result.u)
+        assert_close(local.K, np.array(theirs["K"]), 1e-12)
+        assert_close(local.r, np.array(theirs["r"]), 1e-9)
+        assert (
+            abs(local.M.sum() / np.array(theirs["M"]).sum() - 1) < 1e-3
+        )  # by other rules on distorted cells

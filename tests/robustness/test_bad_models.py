@@ -307,3 +307,16 @@ def test_sound_meshes_of_every_kind_give_no_warning(nodes):
     wheel = kl.Model(kl.annulus(1.0, 2.0, 0.5, (1, 5, 1), kind(nodes)), STEEL)
     wheel.fix("inner")
     assert wheel.check() == []
+
+
+@pytest.mark.parametrize(
+    "use", [kl.Model.solve, kl.Model.matrices, lambda model: list(kl.integrate(model.transient(), 1e-3, 1))]
+)
+@pytest.mark.parametrize("amplitude", [None, 2.0])
+def test_a_load_on_a_node_without_elements_is_refused_by_every_analysis(use, amplitude):
+    cube = kl.box()
+    model = kl.Model(kl.Mesh(np.vstack([cube.points, [[5.0, 5.0, 5.0]]]), cube.blocks), STEEL)
+    model.fix(list(range(4)))
+    model.add(kl.PointLoad([8], (0.0, 0.0, 1.0)), amplitude=amplitude)
+    with pytest.raises(kl.ModelError, match="node 9 carries a load but belongs to no element"):
+        use(model)

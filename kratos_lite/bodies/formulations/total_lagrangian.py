@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.bodies.formulations.base import Formulation
 from kratos_lite.bodies.linear_algebra import Solve
+from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 
 
@@ -14,6 +18,12 @@ class TotalLagrangian(Formulation):
 
     name = "total_lagrangian"
     aliases = ("TL",)
+
+    def __init__(
+        self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None
+    ) -> None:
+        super().__init__(points, groups, mass, modes)
+        finite_strain.check_elements(groups)
 
     def load(self, q: Array) -> Array:
         """Return Σ F S grad N dV, (3n,) in N."""

@@ -5,10 +5,8 @@ meshio keeps cells in the node order of VTK, except that its linear wedge is tha
 
 from __future__ import annotations
 
-import io
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import replacing
+from kratos_lite.io.atomic import refuse_nan, replacing
 from kratos_lite.io.formats.document import Document, Note, Properties
+from kratos_lite.io.formats.foreign import Found, check_ending, guarded, read_foreign
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.typing import Ints
@@ -34,8 +33,6 @@ CELLS = {
 _NAMES = ("PointCondition3D{}N", "LineCondition3D{}N", "SurfaceCondition3D{}N", "KinematicLinear3D{}N")
 _PROPERTY_KEYS = ("gmsh:physical", "nastran:ref", "medit:ref", "PROPERTIES_ID")
 _INT32 = 2**31 - 1
-_OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
-"""Endings left to others: read by ourselves, pictures, or spread over several files."""
 _OPTIONS = {
     ".msh": {"file_format": "gmsh22"},
     ".xdmf": {"data_format": "XML"},
@@ -63,13 +60,11 @@ def read_meshio(path: str | Path) -> Document:
         The ending is unknown, the file cannot be read, or it holds no mesh in three dimensions.
     """
     path = Path(path)
-    check_ending(path)
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is no ordinary file; name a file")  # a pipe might never end
-    with _guarded(path, "read") as (meshio, output):
-        found = meshio.read(path)
+    found = read_foreign(path)
     _check(path, found)
-    return _Reading(path, found, output.getvalue()).document()
+    return _Reading(path, found).document()
 
 
 def write_meshio(
@@ -90,9 +85,14 @@ def write_meshio(
     ------
     InputError
         The ending is unknown, or the format cannot hold this mesh, or the file cannot be written.
+    SolveError
+        A number is not finite.
     """
     path = Path(path)
     check_ending(path)
+    refuse_nan(path, "a coordinate", mesh.points)
+    for name, values in (*(point_data or {}).items(), *(cell_data or {}).items()):
+        refuse_nan(path, name, values)
     types = {shape: name for name, shape in CELLS.items()}
     cells, slices = [], []
     for block, at in with_rows(mesh.blocks):
@@ -101,7 +101,7 @@ def write_meshio(
             slices.append(at)
     data = _gmsh_tags(path, cell_data or {}) if path.suffix.lower() == ".msh" else cell_data or {}
     cell_values = {name: [values[rows] for rows in slices] for name, values in data.items()}
-    with replacing(path) as temporary, _guarded(path, "written") as (meshio, _):
+    with replacing(path) as temporary, guarded(path, "written") as (meshio, _):
         whole = meshio.Mesh(mesh.points, cells, dict(point_data or {}), cell_values)
         meshio.write(temporary, whole, **_OPTIONS.get(path.suffix.lower(), {}))
         # Several writers of meshio leave out what their format cannot hold, and say nothing.
@@ -135,51 +135,20 @@ def _listed(counts: Counter[str]) -> str:
     return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "no cells"
 
 
-def check_ending(path: Path, own: str = ".mdpa .elem") -> None:
-    """Refuse an ending that meshio does not know, in words rather than by leaving the program."""
-    import meshio
-
-    endings = sorted(set(meshio.extension_to_filetypes) - _OURS)
-    if not path.name.lower().endswith(tuple(endings)):
-        raise InputError(f"{path}: unknown ending {path.suffix!r}; known are {own} {' '.join(endings)}")
-
-
-@contextmanager
-def _guarded(path: Path, done: str) -> Iterator[tuple[Any, io.StringIO]]:
-    """Give meshio and what it says; meshio prints and ends the program where others raise."""
-    import meshio
-    from meshio import _mesh
-
-    for missing in ("wedge15", "pyramid13"):  # meshio 5.3.5 knows both but fails on their dimension
-        _mesh.topological_dimension.setdefault(missing, 3)
-    output, listing = io.StringIO(), io.StringIO()
-    try:
-        with redirect_stderr(output), redirect_stdout(listing):
-            yield meshio, output
-    except ImportError as error:
-        raise InputError(f"{path}: {error}; this format needs it: pip install {error.name}") from error
-    except (InputError, MemoryError):
-        raise
-    except OSError as error:
-        if done == "written":
-            raise  # the disk, not the format
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (Exception, SystemExit) as error:
-        last = "" if isinstance(error, SystemExit) else repr(error)
-        reason = " ".join(f"{output.getvalue()} {listing.getvalue()} {last}".split())
-        cure = "is the file complete?" if done == "read" else ".vtu and .vtk hold every mesh"
-        raise InputError(f"{path}: cannot be {done} by meshio: {reason}; {cure}") from error
-
-
-def _check(path: Path, found: Any) -> None:
+def _check(path: Path, found: Found) -> None:
     """Refuse points that are no points in space, and cells that name points that are not there."""
     points = found.points
+    if points is None:
+        raise InputError(f"{path}: the points are no numbers; is the file complete?")
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"{path}: the points form {points.shape}; expected (n, 3); save a mesh in space")
     if len(bad := np.flatnonzero(~np.isfinite(points).all(axis=1))):
         raise InputError(f"{path}: point {bad[0] + 1} has coordinates {points[bad[0]]}; expected numbers")
     for cells in found.cells:
         if cells.type in CELLS and len(cells.data):
+            width, needs = cells.data.shape[1], len(SHAPES[CELLS[cells.type]].nodes)
+            if width != needs:
+                raise InputError(f"{path}: a {cells.type} has {width} nodes; expected {needs}")
             low, high = int(cells.data.min()) + 1, int(cells.data.max()) + 1
             if low < 1 or high > len(points):
                 text = f"a {cells.type} names point {high if low >= 1 else low}; the points are 1 … "
@@ -198,9 +167,9 @@ def _ids(given: list[Any], count: int) -> Ints | None:
 class _Reading:
     """One mesh of meshio on its way to a Document."""
 
-    def __init__(self, path: Path, found: Any, output: str) -> None:
+    def __init__(self, path: Path, found: Found) -> None:
         self.path, self.found = path, found
-        self.notes = [Note(0, " ".join(output.split()))] if output.strip() else []
+        self.notes = [Note(0, " ".join(found.output.split()))] if found.output.strip() else []
         self.used = set(_PROPERTY_KEYS)
         self.sets = self._sets()
         self.kinds: list[type[Shape] | None] = [
@@ -230,7 +199,7 @@ class _Reading:
     def _name(self, elements: list[Block]) -> Ints:
         """Give the elements the ids that our own files state, and return those of the nodes."""
         n, m = len(self.found.points), sum(map(len, elements))
-        node_ids = _ids([self.found.point_data.get("NODE_ID", [])], n)
+        node_ids = _ids([named] if (named := self.found.point_data.get("NODE_ID")) is not None else [], n)
         solids = [b for b, dim in enumerate(self.dims) if dim == 3]
         stated = self.found.cell_data.get("ELEMENT_ID")
         rows = np.concatenate([NO_ROWS, *(self.rows[b] for b in solids)])
@@ -258,7 +227,7 @@ class _Reading:
         }
         tags = found.cell_data.get("gmsh:physical")
         for name, tag_and_dim in found.field_data.items():  # Gmsh 2 files
-            if tags is not None and name not in sets and len(np.ravel(tag_and_dim)) == 2:
+            if tags and name not in sets and len(np.ravel(tag_and_dim)) == 2:
                 tag, dim = tag_and_dim
                 sets[name] = [
                     np.flatnonzero((values == tag) & (cells.dim == dim))
@@ -299,8 +268,17 @@ class _Reading:
             values = self.found.cell_data.get(key)
             solid = [v for v, d in zip(values or [], self.dims, strict=False) if d == 3]
             if values is not None and any(np.any(v != 0) for v in solid):
-                return np.asarray(values[b], dtype=np.int64).copy()
+                return self._whole(values[b], key)
         return np.ones(len(self.found.cells[b].data), dtype=np.int64)
+
+    def _whole(self, values: Any, key: str) -> Ints:
+        """Return property ids; InputError for others than whole numbers from 0 on."""
+        numbers = np.asarray(values)
+        fits = numbers.ndim == 1 and bool((np.abs(numbers) < 2.0**62).all() and (numbers >= 0).all())
+        if not fits or (numbers != np.round(numbers)).any():
+            shown = numbers[:3].tolist()
+            raise InputError(f"{self.path}: {key} must be one whole number ≥ 0 for each cell; got {shown}")
+        return numbers.astype(np.int64)
 
     def _orient_wedges(self, block: Block) -> None:
         """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects.
@@ -343,6 +321,8 @@ class _Reading:
             elements, conditions = (np.unique(np.concatenate(rows[solid])) for solid in (True, False))
             parts[name] = Part(np.unique(np.concatenate(nodes)), elements, conditions)
         for name, chosen in self.found.point_sets.items():
+            if chosen is None:
+                continue
             part = parts.setdefault(name, Part())
             part.nodes = np.unique(np.concatenate([part.nodes, np.asarray(chosen, dtype=np.int64)]))
         return parts

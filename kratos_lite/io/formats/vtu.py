@@ -14,7 +14,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import write_whole
+from kratos_lite.io.atomic import refuse_nan, write_whole
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import threads
 from kratos_lite.typing import Numbers
@@ -60,6 +60,8 @@ def write_vtu(
     InputError
         The mode is unknown, an array has the wrong number of rows or holds no real numbers, or the
         file cannot be written.
+    SolveError
+        A number is not finite.
 
     Examples
     --------
@@ -77,6 +79,9 @@ def write_vtu(
     if len(blocks) < len(mesh.blocks):
         keep = np.repeat([block.shape is not None for block in mesh.blocks], [len(b) for b in mesh.blocks])
         cells = [(name, array[keep]) for name, array in cells]
+    refuse_nan(path, "a coordinate", mesh.points)
+    for name, values in (*(point_data or {}).items(), *cells):
+        refuse_nan(path, name, values)
     groups = {
         "PointData": _checked(point_data or {}, mesh.n_nodes, "node"),
         "CellData": cells,

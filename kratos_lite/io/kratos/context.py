@@ -16,6 +16,7 @@ from kratos_lite.mesh import Mesh, Part
 FOREVER = 1e30
 """What Kratos takes for "End" of an interval."""
 MAX_STEPS = 1_000_000
+"""Steps of a run; each process lists those in which it acts."""
 
 
 @dataclass(frozen=True)

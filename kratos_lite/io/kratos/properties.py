@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Problems, nearest
 from kratos_lite.io.formats.document import Properties
-from kratos_lite.io.names import nearest_variable
+from kratos_lite.io.names import PRESTRESS, nearest_variable
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import BodyForce, Gravity
 from kratos_lite.typing import Array
@@ -61,11 +61,20 @@ def _apply_rule(model: Model, properties: Properties) -> None:
 
 
 def _apply_prestress(model: Model, properties: Properties) -> None:
-    factor = _numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number")
-    for name in ("INSITU_STRESS", "PRESTRESS"):
-        if name in properties.values:
-            stress = _numbers(properties, name, 0.0, (6,), "six components xx yy zz xy yz xz")
-            model.add_prestress(stress * float(factor), properties.id)
+    """Add the initial stress -PRESTRESS_FACTOR · PRESTRESS; INSITU_STRESS is another name of the same stress.
+
+    Source: Isotropic3D of KratosStructuralApplication, σ = C ε - PRESTRESS_FACTOR · PRESTRESS.
+    """
+    factor = float(_numbers(properties, "PRESTRESS_FACTOR", 1.0, (), "one number"))
+    found = {
+        name: _numbers(properties, name, 0.0, (6,), "six components xx yy zz xy yz xz")
+        for name in PRESTRESS
+        if name in properties.values
+    }
+    if len(found) == 2 and (found["PRESTRESS"] != found["INSITU_STRESS"]).any():
+        raise InputError("PRESTRESS and INSITU_STRESS are two names of one stress, but differ; keep one")
+    for stress in list(found.values())[:1]:
+        model.add_prestress(-factor * stress, properties.id)
 
 
 def _numbers(properties: Properties, name: str, default: Any, shape: tuple[int, ...], what: str) -> Array:

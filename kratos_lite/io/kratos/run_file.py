@@ -17,7 +17,7 @@ from kratos_lite.io.kratos.materials import materials_of
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, time_integration_of
-from kratos_lite.io.kratos.to_model import STATIC_ONLY, check_elements, model_from
+from kratos_lite.io.kratos.to_model import check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.readers.motion import add_motion
 from kratos_lite.io.settings import Settings, find_file, read_settings
@@ -43,7 +43,9 @@ OTHER_PHYSICS = (
 OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process")
 
 
-def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = False) -> Case:
+def read_kratos_project(
+    settings: Settings, folder: Path, allow_outside: bool = False, *, initial_displacement: bool = True
+) -> Case:
     """Return what a Kratos run file says.
 
     Parameters
@@ -51,6 +53,7 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
     settings : the run file.
     folder : its folder.
     allow_outside : let it name files outside the folder.
+    initial_displacement : as of `kratos_lite.read`; what moves starts from it.
 
     Raises
     ------
@@ -78,14 +81,18 @@ def read_kratos_project(settings: Settings, folder: Path, allow_outside: bool = 
         else:
             in_time.prepare(values)
 
-    model = model_from(document, materials=materials is None, processes=process)
+    model = model_from(
+        document,
+        materials=materials is None,
+        initial_displacement=initial_displacement and not dynamic,
+        processes=process,
+    )
     for number, material in (materials or {}).items():
         model.assign(material, number)
     add_motion(model, settings, None if dynamic else times[-1])
     model.notes += notes
     if in_time is None:
         return Case(model, expected=checks, files=settings.files)
-    model.notes = [note for note in model.notes if STATIC_ONLY not in note]
     in_time.finish(model)
     return Case(model, time_integration_of(settings, in_time), expected=checks, files=settings.files)
 

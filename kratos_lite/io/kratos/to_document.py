@@ -27,8 +27,6 @@ def document_from(model: Model) -> Document:
     all other loads become the point loads that they put on the nodes.
     """
     unwritten = {
-        "a prestress": model.prestress is not None,
-        "an initial displacement": model.initial_displacement is not None,
         "a motion of the material": model.motion is not None,
         "a support that moves in time": bool(model.supports.motions),
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
@@ -36,7 +34,7 @@ def document_from(model: Model) -> Document:
     for what, given in unwritten.items():
         if given:
             raise InputError(f"{what} cannot be written to .mdpa")
-    mesh = model.mesh
+    mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
     blocks = [
@@ -47,7 +45,7 @@ def document_from(model: Model) -> Document:
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
     ids, parts = mesh.node_ids, _parts(mesh)
     copy = Mesh(mesh.points, blocks, node_ids=ids, conditions=conditions, parts=parts, source=mesh.source)
-    data = [*_fixed(model), *data]
+    data = [*_fixed(model), *start, *data]
     document = Document(copy, properties, nodal_data=data, constraints=_constraints(model))
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
@@ -62,22 +60,25 @@ def _split_loads(model: Model) -> tuple[Array, list[Any]]:
 
 
 def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:
-    """Return the property id of each element, one per material, and the Properties."""
+    """Return the property id of each element, one per material and prestress, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
     found: dict[int, Properties] = {}
-    materials: list[LinearMaterial] = []
+    known: list[tuple[LinearMaterial, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
             raise InputError("a model with replaced quadrature rules cannot be written to .mdpa")
-        if group.material not in materials:
-            materials.append(group.material)
-        number = materials.index(group.material) + 1
-        numbers[group.rows] = number
-        found[number] = Properties(number, _values(group.material, gravity))
+        prestress = np.zeros((len(group.rows), 6)) if group.prestress is None else group.prestress
+        different, which = np.unique(prestress, axis=0, return_inverse=True)
+        for i, stress in enumerate(different):
+            kind = (group.material, stress.tolist())
+            known += [] if kind in known else [kind]
+            number = known.index(kind) + 1
+            numbers[group.rows[which.ravel() == i]] = number
+            found[number] = Properties(number, _values(group.material, gravity, stress))
     return numbers, found
 
 
-def _values(material: LinearMaterial, gravity: Array) -> dict[str, Any]:
+def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
     name = type(material).__name__
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; .mdpa files hold {', '.join(KRATOS_LAW)}")
@@ -88,7 +89,25 @@ def _values(material: LinearMaterial, gravity: Array) -> dict[str, Any]:
         values["ELASTICITY_TENSOR"] = material.C
     if gravity.any():
         values["VOLUME_ACCELERATION"] = gravity
+    if prestress.any():
+        values["PRESTRESS"] = 0.0 - prestress  # Kratos subtracts it
     return values
+
+
+def _initial_displacement(model: Model) -> list[Data]:
+    """Return the state without stress as the DISPLACEMENT of free nodes; InputError for supported ones."""
+    u0, fixed = model.initial_displacement, model.supports.fixed
+    if u0 is None:
+        return []
+    if u0[fixed].any():
+        what = "an initial displacement of prescribed degrees of freedom"
+        raise InputError(f"{what} cannot be written: their DISPLACEMENT in a file is what is prescribed")
+    found = []
+    for axis, letter in enumerate("XYZ"):
+        if len(rows := np.flatnonzero(u0[:, axis])):
+            free, ids = np.zeros(len(rows), dtype=bool), model.mesh.node_ids[rows]
+            found.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[rows, axis]))
+    return found
 
 
 def _fixed(model: Model) -> list[Data]:

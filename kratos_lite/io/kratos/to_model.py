@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import Problems, nearest
@@ -11,15 +13,17 @@ from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
-from kratos_lite.typing import Ints
+from kratos_lite.typing import Array, Ints
 
-STATIC_ONLY = "do not matter in linear statics"
+PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
+"""Elements of Kratos today; they take the DISPLACEMENT of free nodes for a guess."""
 
 
 def model_from(
     document: Document,
     *,
     materials: bool = True,
+    initial_displacement: bool = True,
     processes: Callable[[Variables], None] | None = None,
 ) -> Model:
     """Return the model that a document describes.
@@ -28,6 +32,7 @@ def model_from(
     ----------
     document : what was read.
     materials : take the materials from the Properties; False leaves them to the caller.
+    initial_displacement : elements are free of stress at the DISPLACEMENT of nodes that are not fixed.
     processes : called with the values of the document to change them, as a run file does.
 
     Raises
@@ -47,9 +52,12 @@ def model_from(
     problems.raise_if_any()
     values = Variables(document.mesh)
     _fill(values, document, model)
+    u0 = values.nodal.vector("DISPLACEMENT")
     if processes:
         processes(values)
     values.apply(model)
+    if initial_displacement:
+        _activate(model, u0)
     _constrain(model, document)
     return model
 
@@ -92,8 +100,6 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
             values.nodal.put(data.variable, rows[known], data.values[known])
         if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
-        elif data.variable.startswith("DISPLACEMENT") and data.values.any():
-            _note(model, data, f"initial values of {data.variable} {STATIC_ONLY}")
     for data in document.condition_data:
         rows = rows_of_ids(ids_of(mesh.conditions), data.ids)
         if data.values.size and _fits(data, model, problems, mesh.source):
@@ -101,6 +107,25 @@ def _fill(values: Variables, document: Document, model: Model) -> None:
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
     problems.raise_if_any()
+
+
+def _activate(model: Model, u0: Array) -> None:
+    """Make elements free of stress at the displacement that a file gives to nodes that it does not fix.
+
+    Source: KinematicLinear::Initialize of KratosStructuralApplication.  The present elements of Kratos take
+    it for a guess, which linear statics does not need.
+    """
+    u0 = np.where(model.supports.fixed, 0.0, u0)
+    count = int(u0.any(axis=1).sum())
+    names = [block.name for block in model.mesh.blocks if len(block)]
+    others = [name for name in names if name.startswith(PRESENT)]
+    if count and others:
+        text = f"initial DISPLACEMENT of {count} free nodes is not used: {others[0]} takes it for a guess"
+        model.notes.append(f"{text}, only KinematicLinear3D and its kin for the state without stress")
+    elif count:
+        model.stress_free_at(u0)
+        text = f"elements are free of stress at the initial DISPLACEMENT of {count} free nodes"
+        model.notes.append(f"{text}; --ignore-initial-displacement leaves it out")
 
 
 def _note(model: Model, data: Data, text: str) -> None:

@@ -6,13 +6,14 @@ from typing import Any
 
 from kratos_lite.ale import Motion, Rotation, Translation
 from kratos_lite.analysis.model import Model
-from kratos_lite.io.readers.values import number_or_series
+from kratos_lite.io.readers.values import number_or_series, vector_or_series
 from kratos_lite.io.settings import Settings
 from kratos_lite.time_series import TimeSeries
 
-COMMON = ("rate", "acceleration", "damping")
+COMMON = ("rate", "acceleration", "damping", "part")
+CENTER = ("center_velocity", "center_acceleration")
 KEYS = {
-    "rotation": ("axis", "center", "skew", "stiffening", *COMMON),
+    "rotation": ("axis", "center", *CENTER, "skew", "stiffening", *COMMON),
     "translation": ("direction", "boundaries", *COMMON),
 }
 
@@ -20,10 +21,9 @@ KEYS = {
 def add_motion(model: Model, settings: Settings, time: float | None = None) -> None:
     """Add the motion that the section ``ale`` of a run file gives to a model; nothing without one.
 
-    It is ``{"rotation": {"axis", "rate", "acceleration", "center", "skew", "stiffening", "damping"}}`` or
-    ``{"translation": {"direction", "rate", "acceleration", "boundaries", "damping"}}`` with the arguments of
-    `Rotation` and `Translation`; rate and acceleration may be ``{"times": […], "values": […]}``.  Given a
-    `time` in s, such tables stay what they are then.
+    It is ``{"rotation": {…}}`` or ``{"translation": {…}}`` with the arguments of `Rotation` or `Translation`;
+    rate and acceleration may be ``{"times": […], "values": […]}``, with vectors those of the center, too.
+    Given a `time` in s, such tables stay what they are then.
 
     Raises
     ------
@@ -50,9 +50,12 @@ def read_motion(section: Settings, kind: str, time: float | None = None) -> Moti
             given[key] = section.text(key) if isinstance(section.values[key], str) else section.vector(key)
         elif key == "center":
             given[key] = section.vector(key)
+        elif key in CENTER:
+            values = vector_or_series(section, key)
+            given[key] = [v(time) if isinstance(v, TimeSeries) and time is not None else v for v in values]
         elif key in ("skew", "stiffening"):
             given[key] = section.flag(key)
-        elif key == "boundaries":
+        elif key in ("boundaries", "part"):
             given[key] = section.text(key)
         else:
             value = section.number(key) if key == "damping" else number_or_series(section, key)

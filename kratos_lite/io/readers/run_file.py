@@ -29,7 +29,13 @@ LOADS: dict[str, Callable[[str, Any], Load]] = {
 KEYS = ("model", "material", "fix", "gravity", *LOADS, "ale", "time", "solver", "tolerance", *OUTPUTS)
 
 
-def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: bool = False) -> Case:
+def read_run_file(
+    settings: Settings,
+    *,
+    strict: bool = True,
+    allow_outside: bool = False,
+    initial_displacement: bool = True,
+) -> Case:
     """Return the case of a run file of kratos_lite.
 
     It has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
@@ -42,7 +48,7 @@ def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: boo
     Parameters
     ----------
     settings : the file; all files that it names lie in its folder.
-    strict : as of `kratos_lite.read`, for its mesh.
+    strict, initial_displacement : as of `kratos_lite.read`, for its mesh.
     allow_outside : let it name files elsewhere.
 
     Raises
@@ -62,7 +68,8 @@ def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: boo
     problems.raise_if_any()
     given = sections["material"]
     document = read_document(path, strict=strict)
-    model = model_from(document, materials=not given.values or is_by_part(given))
+    by_file = not given.values or is_by_part(given)
+    model = model_from(document, materials=by_file, initial_displacement=initial_displacement)
     _assign(model, given, problems)
     for part in sections["fix"].values:
         problems.of(_fix, model, sections["fix"], part)
@@ -75,6 +82,7 @@ def read_run_file(settings: Settings, *, strict: bool = True, allow_outside: boo
     problems.raise_if_any()
     if time is None and _changes(model):
         model.notes.append("loads and supports that change in time are taken at t = 0")
+    time = time and time.starting_from(model.supports, model.initial_displacement)
     return Case(model, time, 0, solver, tolerance, outputs, files=settings.files)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError, nearest
-from kratos_lite.io.case import TimeIntegration
+from kratos_lite.io.case import TimeIntegration, number_of_steps
 from kratos_lite.io.json_file import Object
 from kratos_lite.io.readers.values import number_or_series
 from kratos_lite.io.settings import Settings, find_file, is_number, shown
@@ -80,7 +80,7 @@ def _steps(section: Settings) -> dict[str, Any]:
     line, column = section.values.places["step"]
     return {
         "step": step,
-        "steps": _whole(section, "steps"),
+        "steps": section.placed("steps", number_of_steps, section.integer("steps")),
         "every": _whole(section, "every", 1),
         "place": f"{section.source}:{line}:{column}",
     }

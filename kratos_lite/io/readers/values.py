@@ -32,6 +32,19 @@ def number_or_series(section: Settings, key: str) -> float | TimeSeries:
     return section.placed(key, TimeSeries, table.numbers("times"), table.numbers("values"))
 
 
+def vector_or_series(section: Settings, key: str) -> list[float] | list[TimeSeries]:
+    """Return three numbers, or three time series of ``{"times": […], "values": [[x, y, z], …]}``."""
+    if not isinstance(section.get(key), Object):
+        return section.vector(key)
+    table = section.section(key)
+    table.check_keys(("times", "values"))
+    rows = table.get("values")
+    if not (isinstance(rows, list) and rows and all(map(_is_vector, rows))):
+        raise table.error("values", f"{table.name('values')} must be a list of [x, y, z]; got {shown(rows)}")
+    times = table.numbers("times")
+    return [section.placed(key, TimeSeries, times, list(column)) for column in zip(*rows, strict=True)]
+
+
 def read_material(section: Settings) -> LinearMaterial:
     """Return the material of an object with the name of its law and its constants."""
     law = section.text("law", "Isotropic3D")

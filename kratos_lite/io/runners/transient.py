@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.result import vector
+from kratos_lite.analysis.report import vector
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.analysis.transient import TransientAnalysis

@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike
 
 from kratos_lite import view, voigt
 from kratos_lite.analysis.result import Result
+from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.writers.results import fields
 from kratos_lite.mesh import Mesh
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
+from kratos_lite.validation import short
 
 NAMES = {"VON_MISES_STRESS": "von Mises stress"}
 """Titles where the words of the variable do not do."""
@@ -87,19 +89,22 @@ def _field(result: Result, name: str) -> tuple[Array, str]:
     return field, NAMES.get(name, name.replace("_", " ").lower())
 
 
-def draw_element(path: str | Path, shape: type[Shape], points: ArrayLike | None = None) -> None:
+def draw_element(
+    path: str | Path, shape: type[Shape] | type[KinematicLinear], points: ArrayLike | None = None
+) -> None:
     """Draw a reference cell with its node numbers (from 0), and Gauss points as crosses.
 
     Parameters
     ----------
     path : picture to write; .png, .pdf or .svg.
-    shape : the cell.
+    shape : the cell, or an element class, whose Gauss points are marked.
     points : (g, d) reference coordinates to mark.
 
     Raises
     ------
     InputError
-        `points` has the wrong shape, or the file cannot be written.
+        `shape` is neither a shape nor an element class, `points` has the wrong shape, or the file cannot be
+        written.
     KratosLiteError
         matplotlib is missing.
 
@@ -108,6 +113,14 @@ def draw_element(path: str | Path, shape: type[Shape], points: ArrayLike | None 
     >>> from kratos_lite.shapes import Wedge15
     >>> draw_element(getfixture("tmp_path") / "wedge.png", Wedge15)
     """
+    if isinstance(shape, type) and issubclass(shape, KinematicLinear) and hasattr(shape, "shape"):
+        points = shape.rule.points if points is None else points
+        shape = shape.shape
+    if not (isinstance(shape, type) and issubclass(shape, Shape) and hasattr(shape, "nodes")):
+        raise InputError(
+            "draw_element takes a shape or an element class, such as Hexahedron8 or KinematicLinear3D8N; "
+            f"got {short(shape)}"
+        )
     save_figure(path, view.element_figure(shape, points))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import write_arrays, write_whole
+from kratos_lite.io.atomic import refuse_nan, write_arrays, write_whole
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded
@@ -64,7 +64,9 @@ class Table(Writer):
 
     def add(self, state: Any) -> None:
         """Take the row of a state."""
-        self.rows.append(self.subject.row(state))
+        row = self.subject.row(state)
+        refuse_nan(self.path, f"a number at t = {row[0]:g} s", row)
+        self.rows.append(row)
 
     def write(self) -> None:
         """Write the lines."""

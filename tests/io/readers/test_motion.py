@@ -212,6 +212,97 @@ def test_a_rate_may_be_a_table(folder):
     assert not motion.steady
 
 
+def test_the_center_of_a_rotor_travels_in_files_and_in_words_as_in_python(folder):
+    pull = [2.0, -3.0, 1.0]
+    model = wheel(axis="z", rate=6.0, center_velocity=(1.0, 0.0, 0.0), center_acceleration=pull)
+    expected = model.solve()
+    words = ("--center-velocity", "1,0,0", "--center-acceleration", "2,-3,1", "--json", "words.json")
+    assert run("wheel.mdpa", *WORDS, "--rotation", "z:6", *words) == 0
+    motion = {"axis": "z", "rate": 6.0, "center_velocity": [1, 0, 0], "center_acceleration": pull}
+    held = {"model": "wheel.mdpa", "fix": {"inner": "xyz"}, "pressure": {"outer": 1e3}}
+    assert run(str(write(folder, **held, ale={"rotation": motion}, json="file.json")), "-q") == 0
+    for name in ("words.json", "file.json"):
+        result = json.loads((folder / name).read_text())
+        found = np.array(list(result["displacement"].values()))
+        np.testing.assert_allclose(found, expected.u, rtol=0, atol=1e-10 * np.abs(expected.u).max())
+        assert result["motion"]["center_velocity"] == [1.0, 0.0, 0.0]
+        assert result["motion"]["center_acceleration"] == pull
+
+
+def test_the_velocity_of_a_center_may_be_a_table(folder):
+    table = {"times": [0, 2], "values": [[0, 1, 2], [10, 1, -2]]}
+    ale = {"rotation": {"rate": 5, "center_velocity": table}}
+    motion = read_case(write(folder, model="wheel.mdpa", ale=ale)).model.motion
+    velocity, acceleration = motion.center_rates(1.0)
+    assert (velocity.tolist(), acceleration.tolist()) == ([5.0, 1.0, 0.0], [5.0, 0.0, -2.0])
+
+
+def test_a_part_that_moves_beside_one_at_rest_in_files_and_in_words(folder):
+    wheel_mesh, block = kl.annulus(0.3, 1.0, 0.1, cells=(1, 12, 1)), kl.box((0.5, 0.5, 0.1))
+    blocks = [*wheel_mesh.blocks]
+    blocks += [
+        kl.Block(b.name, b.nodes + wheel_mesh.n_nodes, b.ids + 12, b.properties, b.shape)
+        for b in block.blocks
+    ]
+    mesh = kl.Mesh(np.vstack([wheel_mesh.points, np.add(block.points, (2, 0, 0))]), blocks)
+    n = wheel_mesh.n_nodes
+    mesh.parts = {
+        "wheel": kl.Part(nodes=np.arange(n), elements=np.arange(12)),
+        "hub": kl.Part(nodes=wheel_mesh.nodes("inner")),
+        "block": kl.Part(nodes=np.arange(n, n + 8)),
+    }
+    kl.write("two.mdpa", mesh)
+    model = kl.Model(mesh, kl.Isotropic3D(**RUBBER))
+    for part in ("hub", "block"):
+        model.fix(part)
+    model.add(kl.ale.Rotation("z", rate=6.0, part="wheel"))
+    expected = model.solve().u
+    held = ("--material", "E=1e6,nu=0.3,density=1000", "--fix", "hub:xyz", "--fix", "block:xyz", "-q")
+    moved = ("--rotation", "z:6", "--moving-part", "wheel", "--json", "words.json")
+    assert run("two.mdpa", *held, *moved) == 0
+    ale = {"rotation": {"axis": "z", "rate": 6.0, "part": "wheel"}}
+    fix = {"hub": "xyz", "block": "xyz"}
+    assert run(str(write(folder, model="two.mdpa", fix=fix, ale=ale, json="file.json")), "-q") == 0
+    for name in ("words.json", "file.json"):
+        found = np.array(list(json.loads((folder / name).read_text())["displacement"].values()))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--center-velocity", "1,0,0"), "--center-velocity belongs to --rotation; give that too"),
+        (
+            ("--moving-part", "x-"),
+            "--moving-part belongs to --rotation or --translation; give one of them too",
+        ),
+        (("--rotation", "z:1", "--moving-part", "nowhere"), "there is no part 'nowhere'"),
+        (("--rotation", "z:1", "--center-velocity", "1,2"), "--center-velocity"),
+    ],
+)
+def test_options_of_the_center_and_of_the_part_that_are_wrong(folder, capsys, words, message):
+    assert run("wheel.mdpa", *WORDS, *words) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("center_velocity", 3, "must be a list of three numbers"),
+        ("center_velocity", {"times": [0, 1], "values": [1, 2]}, "must be a list of [x, y, z]"),
+        ("center_acceleration", {"times": [0], "values": [[1, 2, 3], [1, 2, 3]]}, "as many values as times"),
+        ("part", 3, "must be a string"),
+        ("part", "nowhere", "there is no part 'nowhere'"),
+    ],
+)
+def test_a_wrong_center_or_part_is_refused_with_its_line(folder, key, value, message):
+    ale = {"rotation": {"axis": "z", "rate": 1.0, key: value}}
+    path = write(folder, model="wheel.mdpa", fix={"inner": "xyz"}, ale=ale)
+    with pytest.raises(kl.KratosLiteError, match=r"run\.json:\d+:\d+") as caught:
+        read_case(path)
+    assert message in str(caught.value)
+
+
 def test_a_rate_table_is_taken_at_the_time_of_the_solution(folder):
     """Kratos run files are solved at their end; a rate that is still changing then is taken as it is."""
     table = {"times": [0.0, 1.0], "values": [0.0, 8.0]}
@@ -246,3 +337,12 @@ def test_modes_are_those_of_python(folder, capsys):
     assert rows[0][-2:] == ["growth", "1/s"]
     np.testing.assert_allclose(np.sort(found[:, 1]), np.sort(values.imag), rtol=1e-6)
     assert np.abs(found[:, 2]).max() < 1e-6 * np.abs(values).max()
+
+
+def test_a_free_rotor_of_many_unknowns_does_not_grow_in_the_table(folder, capsys):
+    kl.write("rotor.mdpa", kl.annulus(0.3, 1.0, 0.2, cells=(2, 16, 1)))
+    words = ("--material", "E=210e6,nu=0.3,density=7620", "--rotation", "z:30", "--stiffening")
+    assert run("rotor.mdpa", *words, "--modes", "8") == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if re.match(r" +\d+  ", line)]
+    assert len(rows) == 8
+    assert max(abs(float(row[-1])) for row in rows) < 2e-4

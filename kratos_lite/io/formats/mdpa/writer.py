@@ -19,7 +19,7 @@ from kratos_lite.io.formats.document import Constraint, Data, Document, Note
 from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME
 from kratos_lite.io.formats.mdpa.values import Table, kind_of
-from kratos_lite.io.names import kratos_name
+from kratos_lite.io.names import PRESTRESS, kratos_name
 from kratos_lite.mesh import Block, Mesh, ids_of
 
 Lines = Iterator[str]
@@ -30,7 +30,8 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
     Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
     ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
-    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``.
+    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``; elements keep theirs where a prestress
+    or the displacement of free nodes is their initial state, which the present elements of Kratos ignore.
     A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
     variable of each master from the word before in the header, so it reads such a constraint differently.
 
@@ -62,16 +63,27 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
         data = gzip.compress(data, mtime=0)
     write_whole(path, data)
-    return _unknown_to_kratos(document.mesh)
+    return _unknown_to_kratos(document)
 
 
-def _unknown_to_kratos(mesh: Mesh) -> list[Note]:
+def _has_initial_state(document: Document) -> bool:
+    """Whether a document has a prestress, or a displacement of free nodes."""
+    stresses = (p.values.get(name) for p in document.properties.values() for name in PRESTRESS)
+    return any(np.any(stress) for stress in stresses if stress is not None) or any(
+        data.variable.startswith("DISPLACEMENT") and data.values[~data.fixed].any()
+        for data in document.nodal_data
+    )
+
+
+def _unknown_to_kratos(document: Document) -> list[Note]:
     """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
-    counts: Counter[str] = Counter()
-    for block in (*mesh.blocks, *mesh.conditions):
-        name = kratos_name(block.name)
+    counts, keep = Counter[str](), _has_initial_state(document)
+    blocks = [(block, keep) for block in document.mesh.blocks]
+    for block, kept in [*blocks, *((block, False) for block in document.mesh.conditions)]:
+        name = block.name if kept else kratos_name(block.name)
         own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith("KinematicLinear3D")
-        if own or "ContactFace" in name or re.search(r"3D\d+$", name):
+        old = name.startswith(("KinematicLinear", "TotalLagrangian3D"))
+        if own or old or "ContactFace" in name or re.search(r"3D\d+$", name):
             counts[name] += len(block)
     text = "{} {} are written, but Kratos 10 does not know them"
     return [Note(0, text.format(n, name)) for name, n in counts.items() if n]
@@ -79,7 +91,7 @@ def _unknown_to_kratos(mesh: Mesh) -> list[Note]:
 
 def _lines(document: Document) -> Lines:
     """Give the lines of the file in the order that Kratos needs: what is referred to comes first."""
-    mesh = document.mesh
+    mesh, keep = document.mesh, _has_initial_state(document)
     if document.model_data:
         yield from _block("ModelPartData", _values(document.model_data))
     for number, table in document.tables.items():
@@ -90,7 +102,8 @@ def _lines(document: Document) -> Lines:
         ("Geometries", document.geometries), ("Elements", mesh.blocks), ("Conditions", mesh.conditions),
     ):  # fmt: skip
         for block in blocks:
-            yield from _cells(kind, block, mesh)
+            is_kept = kind == "Geometries" or (kind == "Elements" and keep)
+            yield from _cells(kind, block, mesh, block.name if is_kept else kratos_name(block.name))
     yield from _constraints(document.constraints)
     for kind, entries in (
         ("NodalData", document.nodal_data),
@@ -175,12 +188,11 @@ def _table(header: str, table: Any) -> Lines:
     yield from _block(f"{header} {_name(table.x)} {_name(table.y)}", rows)
 
 
-def _cells(kind: str, block: Block, mesh: Mesh) -> Lines:
-    name = _name(block.name if kind == "Geometries" else kratos_name(block.name))
+def _cells(kind: str, block: Block, mesh: Mesh, name: str) -> Lines:
     columns = [block.ids[:, None], mesh.node_ids[block.nodes]]
     if kind != "Geometries":
         columns.insert(1, np.asarray(block.properties)[:, None])
-    yield from _block(f"{kind} {name}", _rows(np.hstack(columns)))
+    yield from _block(f"{kind} {_name(name)}", _rows(np.hstack(columns)))
 
 
 def _constraints(constraints: list[Constraint]) -> Lines:

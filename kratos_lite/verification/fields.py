@@ -2,7 +2,8 @@
 
 Sources: method of manufactured solutions (Roache, J. Fluids Eng. 124 (2002) 4-10); Timoshenko & Goodier,
 Theory of Elasticity, sections 102 (pure bending) and 142 (Lamé sphere); Goodier, J. Appl. Mech. 1 (1933)
-39-44 (spherical cavity); Carstensen, Dolzmann, Funken & Helm, CMAME 190 (2001) 1885-1900 (L-domain).
+39-44 (spherical cavity); Kirsch, Zeitschrift des VDI 42 (1898) 797-807
+(hole); Carstensen, Dolzmann, Funken & Helm, CMAME 190 (2001) 1885-1900 (L-domain).
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from kratos_lite.typing import Array
+
 Field = Callable[[Array], Array]
 STEP = 1e-5
 """Step of the central differences below in m: their relative error is about 1e-10."""
@@ -145,5 +146,20 @@ def cavity(E: float, nu: float, a: float, tension: float) -> Field:
         outward = radial * s + polar * c
         unit = X[..., :2] / np.where(rho > 0, rho, 1.0)[..., None]
         return np.concatenate([outward[..., None] * unit, (radial * c - polar * s)[..., None]], axis=-1)
+
+    return field
+
+
+def hole(E: float, nu: float, a: float, tension: float) -> Field:
+    """Return the field (plane strain) around a hole of radius a under tension along x far away."""
+    k, scale = 3 - 4 * nu, tension * a * (1 + nu) / (4 * E)
+
+    def field(X: Array) -> Array:
+        x, y, _ = np.moveaxis(X, -1, 0)
+        r, angle = np.hypot(x, y) / a, np.arctan2(y, x)
+        c, s, c3, s3 = np.cos(angle), np.sin(angle), np.cos(3 * angle), np.sin(3 * angle)
+        u = r * (k + 1) * c + 2 / r * ((1 + k) * c + c3) - 2 / r**3 * c3
+        v = r * (k - 3) * s + 2 / r * ((1 - k) * s + s3) - 2 / r**3 * s3
+        return scale * np.stack([u, v, np.zeros_like(r)], axis=-1)
 
     return field

@@ -1,17 +1,19 @@
-"""One routine for the error of all programs, from nodal displacements alone."""
+"""One routine for the error of a solution, from nodal displacements alone."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
-from benchmarks import fields
-from benchmarks.scenes import Scene
+import numpy as np
+
+from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import rule_for
+from kratos_lite.typing import Array, Rows
+from kratos_lite.verification import fields
+from kratos_lite.verification.scenes import Scene
 
-Array = NDArray[np.float64]
 DEGREE, FINE_DEGREE = 8, 5
 """Of the rule for the integrals of the error; the lower one for linear elements on fine meshes."""
 FINE = 20_000
@@ -32,27 +34,33 @@ def errors(scene: Scene, u: Array) -> dict[str, float]:
         off = abs(float((scene.forces() * u).sum()) / 2 / scene.energy - 1)
         return {"displacement": off, "energy": off**0.5}
     exact = scene.exact(scene.model.mesh.points)
-    found = np.zeros(4)
-    for group in scene.model.element_groups():
-        for start in range(0, len(group), 1000):
-            found += _integrals(scene, group, group.nodes[start : start + 1000], u)
-    l2, energy = np.sqrt(found[0] / found[1]), np.sqrt(found[2] / found[3])
+    l2, energy = norms(scene.exact, scene.model.mesh.points, scene.model.element_groups(), u)
     nodal = np.abs(u - exact).max() / np.abs(exact).max()
-    return {"displacement": float(l2), "energy": float(energy), "nodal": float(nodal)}
+    return {"displacement": l2, "energy": energy, "nodal": float(nodal)}
 
 
-def _integrals(scene: Scene, group: ElementGroup, nodes: NDArray[np.int32], u: Array) -> Array:
+def norms(
+    field: fields.Field, points: Array, groups: Sequence[ElementGroup], u: Array
+) -> tuple[float, float]:
+    """Return the relative errors of nodal displacements u (n, 3): L2 norm, and energy norm."""
+    found = np.zeros(4)
+    for group in groups:
+        for start in range(0, len(group), 1000):
+            found += _integrals(points, field, group, group.nodes[start : start + 1000], u)
+    return float(np.sqrt(found[0] / found[1])), float(np.sqrt(found[2] / found[3]))
+
+
+def _integrals(points: Array, field: fields.Field, group: ElementGroup, nodes: Rows, u: Array) -> Array:
     """Return ∫ |u_h - u|², ∫ |u|², ∫ e:C:e of the error and of the exact strain, over some elements."""
     shape = group.element.shape
     fine = len(group) >= FINE and len(shape.nodes) == shape.corners
     rule = rule_for(shape.cell, FINE_DEGREE if fine else DEGREE)
     N, _ = tabulate(shape, rule)
-    placed = group.element(scene.model.mesh.points[nodes], rule)
-    X, dV = N @ scene.model.mesh.points[nodes], placed.dV
-    exact = scene.exact(X)
-    strain = _strain(fields.gradient(scene.exact, X))
+    placed = group.element(points[nodes], rule)
+    X, dV = N @ points[nodes], placed.dV
+    exact, C = field(X), group.material.C
+    strain = voigt.symmetric_gradient(fields.gradient(field, X))
     off = placed.strain(u[nodes]) - strain
-    C = group.material.C
     return np.array(
         [
             (((N @ u[nodes] - exact) ** 2).sum(axis=-1) * dV).sum(),
@@ -61,10 +69,3 @@ def _integrals(scene: Scene, group: ElementGroup, nodes: NDArray[np.int32], u: A
             (((strain @ C) * strain).sum(axis=-1) * dV).sum(),
         ]
     )
-
-
-def _strain(G: Array) -> Array:
-    """Return the strain vectors xx yy zz xy yz zx of displacement gradients (..., 3, 3)."""
-    normal = [G[..., i, i] for i in range(3)]
-    shear = [G[..., i, j] + G[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0))]
-    return np.stack([*normal, *shear], axis=-1)

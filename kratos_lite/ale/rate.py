@@ -1,0 +1,82 @@
+"""Rate: how fast a motion is at each time, and the derivative of that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from kratos_lite.errors import InputError
+from kratos_lite.time_series import Factor, TimeSeries, function_of, slope_of
+
+
+class Rate:
+    """A rate in time and its acceleration.
+
+    Parameters
+    ----------
+    rate : number, `TimeSeries` or function of time.
+    acceleration : likewise; the derivative of the rate if not given, and 0 in a steady state.  A number or
+        `TimeSeries` changes a rate that is a number as time goes on.
+    what : the word for the rate in messages, such as ``rate`` of ``a rate``.
+
+    Attributes
+    ----------
+    value, slope : rate and acceleration as functions of time in s.
+    steady : whether the rate never changes.
+    is_accelerated : whether the acceleration was given, and not taken from the rate.
+    is_changing : whether the acceleration may change.
+    """
+
+    def __init__(self, rate: Factor, acceleration: Factor | None, what: str = "a rate") -> None:
+        self.is_accelerated = acceleration is not None
+        self.value = function_of(rate, what)
+        self.slope = slope_of(rate, what)
+        if acceleration is not None:
+            self.slope = function_of(acceleration, "an acceleration")
+        self.steady = not (callable(rate) or callable(acceleration) or acceleration)
+        self.is_changing = callable(rate if acceleration is None else acceleration)
+        if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
+            self.value = _accelerated(self.value(0.0), acceleration)
+
+    def at(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
+        """Return rate and acceleration at a time in s.
+
+        An acceleration that was not given is the mean over a step in s, so that steps add up to the whole
+        change of the rate; the slope for the step 0.  A steady state takes a rate as one that stays.
+        """
+        if self.is_accelerated or not (steady or step):
+            return self.value(time), self.slope(time)
+        if steady:
+            return self.value(time), 0.0
+        start, end = max(time - step / 2, 0.0), time + step / 2
+        return self.value(time), (self.value(end) - self.value(start)) / (end - start)
+
+
+def vector_rates(
+    velocity: Sequence[Factor], acceleration: Sequence[Factor] | None, what: str
+) -> tuple[Rate, Rate, Rate]:
+    """Return the rates of three components, each a number, `TimeSeries` or function of time."""
+    accelerations = (
+        (None, None, None) if acceleration is None else _three(acceleration, f"{what} acceleration")
+    )
+    pairs = zip(_three(velocity, f"{what} velocity"), accelerations, strict=True)
+    x, y, z = (Rate(one, other, f"{what} velocity") for one, other in pairs)
+    return x, y, z
+
+
+def _three(values: Sequence[Factor], what: str) -> list[Factor]:
+    try:
+        found = list(values)
+    except TypeError:
+        found = []
+    if len(found) != 3 or isinstance(values, str):
+        raise InputError(
+            f"{what} has three components, each a number, TimeSeries or function of time; got {values!r:.80}"
+        )
+    return found
+
+
+def _accelerated(start: float, acceleration: float | TimeSeries | None) -> Callable[[float], float]:
+    """Return the rate in time from its start."""
+    if isinstance(acceleration, TimeSeries):
+        return lambda time: start + acceleration.integral(0.0, time)
+    return lambda time: start + (acceleration or 0.0) * time

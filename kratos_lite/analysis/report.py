@@ -1,0 +1,116 @@
+"""Report: what was solved, how, and how well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.native import described
+from kratos_lite.typing import Array
+
+
+def peak_memory() -> int:
+    """Return the largest memory of this process so far, in bytes (0 where the system does not say)."""
+    try:
+        import resource
+        import sys
+    except ImportError:
+        return 0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else peak * 1024)
+
+
+@dataclass
+class Report:
+    """What was solved, how, and how well.
+
+    Attributes
+    ----------
+    unknowns : free degrees of freedom.
+    total_load, total_reaction : (3,) N.
+    solver, reason, iterations : how it was solved and why that way.
+    backward_error : |b - A x| / (|A| |x| + |b|), or None.
+    force_error, moment_error : what loads and reactions miss to equilibrium, relative; None where material
+        that moves through the mesh carries momentum, so that they need not balance.
+    seconds : per phase.
+    peak_memory : bytes.
+    warnings, notes : what the checks and the reader found.
+    skipped : what this solution did without, as it would have changed nothing.
+    kernels : what computed, compiled kernels and their threads or NumPy.
+    motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
+    """
+
+    unknowns: int
+    total_load: Array
+    total_reaction: Array
+    solver: str
+    reason: str
+    iterations: int
+    backward_error: float | None
+    force_error: float | None
+    moment_error: float | None
+    seconds: dict[str, float]
+    peak_memory: int = field(default_factory=peak_memory)
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
+    kernels: str = field(default_factory=described)
+    motion: dict[str, Any] = field(default_factory=dict)
+
+    def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
+        """Return the rows of the summary about unknowns and loads, forces of `size` N in all."""
+        return [
+            ("unknowns", f"{self.unknowns}"),
+            ("total load", f"{vector(self.total_load, size)} N"),
+            ("total reaction", f"{vector(self.total_reaction, size)} N"),
+        ]
+
+    def solution_rows(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary about how it was solved, and all that was noticed."""
+        rows = [("solver", f"{self.solver}: {self.reason}")]
+        if self.iterations:
+            rows.append(("iterations", str(self.iterations)))
+        if self.backward_error is not None:
+            rows.append(("backward error", f"{self.backward_error:.1e}"))
+        if self.force_error is not None:
+            rows.append(("equilibrium", f"forces {self.force_error:.1e}, moments {self.moment_error:.1e}"))
+        if self.seconds:
+            rows.append(("seconds", ", ".join(f"{name} {s:.3f}" for name, s in self.seconds.items())))
+        rows += [("peak memory", f"{self.peak_memory / 1e6:.0f} MB"), ("kernels", self.kernels)]
+        rows += self.motion_rows()
+        if self.skipped:
+            rows.append(("skipped", "; ".join(self.skipped)))
+        rows += [("warning", text) for text in self.warnings]
+        return rows + [("note", text) for text in self.notes]
+
+    def motion_rows(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary about the motion of the material; none without one."""
+        m = self.motion
+        if not m:
+            return []
+        unit, size = m["unit"], max(map(abs, m["support_force"] + m["support_moment"]))
+        force, moment = (vector(np.array(m[f"support_{k}"]), size) for k in ("force", "moment"))
+        spin = f", {m['acceleration']:g} {unit[:-2]}/s²" if m["acceleration"] else ""
+        center = []
+        if "center_velocity" in m:
+            velocity, gained = (vector(np.array(m[f"center_{k}"])) for k in ("velocity", "acceleration"))
+            center = [("center", f"velocity {velocity} m/s, acceleration {gained} m/s²")]
+        return [
+            (m["kind"], f"{m['rate']:g} {unit}{spin} {vector(np.array(m['direction']))}"),
+            *center,
+            (
+                "critical rate",
+                (f"{m['critical_rate']:.4g} {unit} on this mesh, " if m["critical_rate"] else "")
+                + f"about {m['critical_rate_of_waves']:.4g} {unit} by wave speeds, margin {m['margin']:.1%}",
+            ),
+            ("force of supports", f"{force} N"),
+            ("moment of supports", f"{moment} N m"),
+        ]
+
+
+def vector(v: Array, size: float = 0.0) -> str:
+    """Return a vector for a summary; components that are rounding beside `size` are shown as 0."""
+    small = np.where(np.abs(v) < 1e-12 * max(float(np.abs(v).max()), size, 1e-300), 0.0, v)
+    return "(" + ", ".join(f"{c:.6g}" for c in small) + ")"

@@ -1,0 +1,64 @@
+"""Point fields: strains and stresses anywhere in a mesh, by B of the element that contains the point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.own_steps import STRAIN
+from kratos_lite.elements.tables import cofactors, determinant
+from kratos_lite.errors import InputError
+from kratos_lite.mesh.locate import Located
+from kratos_lite.typing import Array
+
+
+def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
+    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points.
+
+    Raises
+    ------
+    InputError
+        An element class has a strain of its own, but no B-operator; or a stress of its own.
+    """
+    rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
+    out = np.zeros((len(rows), 6))
+    for group in groups:
+        number = np.full(sum(map(len, located.mesh.blocks)), -1)
+        number[group.rows] = np.arange(len(group))
+        at = np.flatnonzero(number[rows] >= 0)
+        if not len(at):
+            continue
+        mine = number[rows[at]]
+        X, displaced = (values[group.nodes[mine]] for values in (located.mesh.points, u))
+        value = _strain(group, X, xi[at], displaced)
+        if stress and not group.element.inherits("stress"):
+            raise InputError(
+                f"{group.element.__name__} has its own stress, known at Gauss points alone; "
+                "ask for at='gauss'"
+            )
+        if stress:
+            value = group.material.stress(value)
+            value = value if group.prestress is None else value + group.prestress[mine]
+        out[at] = value
+    return out.reshape(*located.rows.shape, 6)
+
+
+def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
+    """Return the strain (k, 6) of elements X (k, n, 3) under u (k, n, 3), each at its own xi (k, 3)."""
+    element = group.element
+    if element.inherits(*GEOMETRY, *STRAIN):
+        dN = element.dN(xi)
+        J = np.swapaxes(X, -1, -2) @ dN
+        D = dN @ (cofactors(J) / determinant(J)[..., None, None])
+        return voigt.symmetric_gradient(np.swapaxes(u, -1, -2) @ D)
+    if element.inherits("B") and not element.inherits(*STRAIN):
+        raise InputError(
+            f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "
+            "ask for at='gauss'"
+        )
+    placed = zip(X, xi, u, strict=True)
+    return np.array([element(x, group.rule).B(t) @ v.ravel() for x, t, v in placed])

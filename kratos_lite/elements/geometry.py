@@ -1,0 +1,267 @@
+"""PlacedCell: geometry of cells at their places, at given points and at the Gauss points.
+
+One object holds one cell, X (n, 3), or many, X (..., n, 3).  At many points (..., 3) a result has the
+leading axes of X first, then those of the points, then its own.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.elements import arguments
+from kratos_lite.elements.own_steps import run_step
+from kratos_lite.elements.tables import cofactors, determinant, tabulate
+from kratos_lite.errors import InputError, MeshError
+from kratos_lite.quadrature import Rule
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array
+from kratos_lite.validation import short
+
+GEOMETRY = ("__init__", "N", "dN", "J", "detJ", "dNdX", "dV", "_jacobian", "_gauss")
+"""What an element class may redefine so that its geometry is not that of the tables of shape and rule."""
+
+
+class PlacedCell:
+    """Geometry of a cell: shape × rule at the places X of its nodes; see `KinematicLinear`."""
+
+    shape: ClassVar[type[Shape]]
+    nodes: ClassVar[Array]
+    rule: Rule
+
+    def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
+        name = type(self).__name__
+        if not hasattr(self, "nodes"):
+            raise InputError(f"{name} states no shape and rule; use an element such as KinematicLinear3D8N")
+        self.X: Array = arguments.real(X, f"nodes X of a {name}", self.nodes.shape, error=MeshError)
+        if rule is not None:
+            if not isinstance(rule, Rule):
+                raise InputError(f"rule must be a Rule, such as hexahedron(degree=3); got {short(rule)}")
+            self.rule = rule
+
+    # ---- at given points -----------------------------------------------------------------------
+
+    @classmethod
+    def N(cls, xi: ArrayLike) -> Array:
+        """Return the shape functions at points.
+
+        Parameters
+        ----------
+        xi : (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., n) float
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        xi = arguments.points(xi)
+        return _table(cls.shape, "N", xi, (len(cls.nodes),))
+
+    @classmethod
+    def dN(cls, xi: ArrayLike) -> Array:
+        """Return the derivatives dN_a/dxi_j at points.
+
+        Parameters
+        ----------
+        xi : (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., n, 3) float
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        xi = arguments.points(xi)
+        return _table(cls.shape, "dN", xi, cls.nodes.shape)
+
+    def _jacobian(self, dN: Array) -> Array:
+        """Return dX_i/dxi_j for tabulated dN (g, n, 3) as (..., g, 3, 3)."""
+        n, g = len(self.nodes), len(dN)
+        flat = np.swapaxes(self.X, -1, -2) @ dN.transpose(1, 0, 2).reshape(n, 3 * g)
+        return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
+
+    def determinants(self, dN: Array) -> Array:
+        """Return det J for tabulated derivatives.
+
+        Parameters
+        ----------
+        dN : (g, n, 3) float, derivatives of the shape functions at the points of a rule.
+
+        Returns
+        -------
+        (..., g) float, m³
+
+        Raises
+        ------
+        InputError
+            If `dN` is not made of real numbers (g, n, 3).
+        """
+        dN = arguments.real(dN, "derivatives dN", self.nodes.shape)
+        if dN.ndim != 3:
+            raise InputError(f"derivatives dN must have shape (g, {len(self.nodes)}, 3); got {dN.shape}")
+        return determinant(self._jacobian(dN))
+
+    def J(self, xi: ArrayLike) -> Array:
+        """Return the Jacobian dX_i/dxi_j at points.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., 3, 3) float, m
+            Axes of the elements, axes of the points, 3, 3.
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        xi = arguments.points(xi)
+        dN = self.dN(xi).reshape(-1, *self.nodes.shape)
+        return self._jacobian(dN).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3, 3)
+
+    def detJ(self, xi: ArrayLike) -> Array:
+        """Return det J at points.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (...) float, m³
+            Axes of the elements, axes of the points.
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        return determinant(self.J(xi))
+
+    def dNdX(self, xi: ArrayLike) -> Array:
+        """Return the gradients dN_a/dX_i at points.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., n, 3) float, 1/m
+            Axes of the elements, axes of the points, n, 3.
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        J = self.J(xi)
+        return self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None])
+
+    def position(self, xi: ArrayLike) -> Array:
+        """Return the places X(xi) of points.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+
+        Returns
+        -------
+        (..., 3) float, m
+            Axes of the elements, axes of the points, 3.
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points.
+        """
+        xi = arguments.points(xi)
+        N = self.N(xi).reshape(-1, len(self.nodes))
+        return (N @ self.X).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3)
+
+    # ---- at the Gauss points, made once per instance ---------------------------------------------
+
+    def _N(self, rule: Rule) -> Array:
+        """Return N (g, n) at the points of a rule."""
+        if same_methods(type(self), PlacedCell, "N"):
+            return tabulate(self.shape, rule)[0]
+        return np.array([self.N(xi) for xi in rule.points])
+
+    def _volumes(self, rule: Rule) -> Array:
+        """Return γ det J (..., g) at the points of a rule."""
+        if same_methods(type(self), PlacedCell, "dN", "J", "detJ"):
+            return determinant(self._jacobian(tabulate(self.shape, rule)[1])) * rule.weights
+        det = [run_step(self, "detJ", (), xi) for xi in rule.points]
+        return np.stack(det, axis=-1) * rule.weights
+
+    @cached_property
+    def _gauss(self) -> tuple[Array, Array]:
+        """Return weights γ det J (..., g) and gradients dN_a/dX_i as (..., g, 3, n)."""
+        if not same_methods(type(self), PlacedCell, "dN", "J", "detJ", "dNdX"):
+            gradients = [run_step(self, "dNdX", self.nodes.shape, xi) for xi in self.rule.points]
+            return self._volumes(self.rule), np.swapaxes(np.stack(gradients, axis=-3), -1, -2)
+        _, dN = tabulate(self.shape, self.rule)
+        J = self._jacobian(dN)
+        inverse = cofactors(J)
+        det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
+        inverse /= det[..., None, None]
+        D = dN[:, None, :, 0] * inverse[..., 0, :, None]
+        for j in (1, 2):
+            D += dN[:, None, :, j] * inverse[..., j, :, None]
+        return det * self.rule.weights, D
+
+    @property
+    def dV(self) -> Array:
+        """Volume of each Gauss point, γ det J, as (..., g) in m³."""
+        return self._gauss[0]
+
+    def gauss_points(self) -> Array:
+        """Return the places X of the Gauss points.
+
+        Returns
+        -------
+        (..., g, 3) float, m
+        """
+        return self._N(self.rule) @ self.X
+
+    @cached_property
+    def constant_jacobian(self) -> bool:
+        """Whether J is the same at all Gauss points of each element, but for the rounding of its sums."""
+        J = self._jacobian(tabulate(self.shape, self.rule)[1])
+        change = np.abs(J - J[..., :1, :, :]).max(axis=(-3, -2, -1))
+        size = np.abs(self.X).max(axis=(-2, -1))
+        return bool((change <= 8 * np.finfo(float).eps * size).all())
+
+
+def _table(shape: type[Shape], name: str, xi: Array, tail: tuple[int, ...]) -> Array:
+    """Return N or dN of a shape at points; InputError if the shape does not take them."""
+    values = np.asarray(getattr(shape, name)(xi))
+    if values.shape != (*xi.shape[:-1], *tail):
+        raise InputError(
+            f"{shape.__name__}.{name} must return {(*xi.shape[:-1], *tail)} for points {xi.shape}; "
+            f"got {values.shape}"
+        )
+    return values
+
+
+def same_methods(cls: type[Any], base: type[Any], *methods: str) -> bool:
+    """Return whether a class has these methods from a base."""
+    return all(_plain(getattr(cls, name)) is _plain(getattr(base, name)) for name in methods)
+
+
+def _plain(method: Any) -> Any:
+    """Return the function of a class method, which is bound anew each time."""
+    return getattr(method, "__func__", method)

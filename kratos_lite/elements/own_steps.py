@@ -1,0 +1,151 @@
+"""Own steps: methods that an element class overrides, run for many elements even if written for one.
+
+Whoever computes with many elements takes strain, stress, internal load and stiffness from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.typing import Array
+
+STRAIN = ("B", "B_at_gauss_points", "strain")
+"""Steps to the strain; what follows has the short way of gradients where a class inherits them."""
+STRESS = (*STRAIN, "stress")
+"""Steps to the stress."""
+MECHANICS = (*STRESS, "internal_load", "stiffness", "stiffness_by_axis")
+"""Steps to the stiffness, but for the geometry."""
+
+SAME = 1e-10
+"""Relative difference up to which a value is the same, computed for many elements or for one."""
+LINEAR = 1e-8
+"""Relative error up to which a step is linear in u."""
+SYMMETRIC = 1e-8
+"""Relative difference up to which a stiffness is symmetric."""
+
+
+def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Array:
+    """Return a step that a class overrides, (..., *tail) for elements (..., n, 3).
+
+    All elements at once where that gives what the first and the last give alone; otherwise one by one, so
+    that a class may be written for one element, X (n, 3).
+    """
+    X = element.X
+    lead, cells = X.shape[:-2], X.reshape(-1, *X.shape[-2:])
+    if not lead:
+        return _checked(getattr(element, name)(*given), type(element), name, tail)
+    if not len(cells):
+        return np.zeros((*lead, *tail))
+    cut = [_by_element(value, lead) for value in given]
+
+    def alone(e: int) -> Array:
+        placed = type(element)(cells[e], element.rule)
+        return _checked(getattr(placed, name)(*[value(e) for value in cut]), type(element), name, tail)
+
+    ends = alone(0), alone(len(cells) - 1)
+    try:
+        many = np.asarray(getattr(element, name)(*given), dtype=float).reshape(-1, *tail)
+    except Exception:  # as it may, if it was written for one element
+        many = np.empty((0, *tail))
+    if len(many) == len(cells) and _same(many[0], ends[0]) and _same(many[-1], ends[1]):
+        return many.reshape(*lead, *tail)
+    return np.stack([alone(e) for e in range(len(cells))]).reshape(*lead, *tail)
+
+
+def _by_element(value: Any, lead: tuple[int, ...]) -> Callable[[int], Any]:
+    """Return what gives the part of an argument for one element: nodal values, stresses, C have two axes."""
+    if np.ndim(value) <= 2:
+        return lambda e: value
+    rows = np.broadcast_to(value, (*lead, *np.shape(value)[-2:])).reshape(-1, *np.shape(value)[-2:])
+    return lambda e: rows[e]
+
+
+def _checked(value: Any, cls: type[Any], name: str, tail: tuple[int, ...]) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape != tail:
+        raise InputError(
+            f"{cls.__name__}.{name} must return shape {tail} for one element; got {array.shape}; "
+            "see docs/add-an-element.md"
+        )
+    return array
+
+
+def _same(many: Array, one: Array) -> bool:
+    return bool((np.abs(many - one) <= SAME * np.abs(one).max(initial=0.0)).all())
+
+
+def columns(element: Any, name: str, values: Callable[[Array], Array]) -> Array:
+    """Return the matrix (..., g, 6, 3n) of a step that is linear in u: its values of unit displacements.
+
+    Raises
+    ------
+    InputError
+        If the step is not linear.
+    """
+    shape = element.X.shape
+    found = []
+    for dof in range(3 * shape[-2]):
+        u = np.zeros(shape)
+        u[..., dof // 3, dof % 3] = 1.0
+        found.append(values(u))
+    matrix = np.stack(found, axis=-1)
+    u = np.broadcast_to(np.random.default_rng(1).uniform(-1, 1, shape[-2:]), shape)
+    miss = np.abs(values(np.array(u)) - (matrix @ u.reshape(*shape[:-2], 1, -1, 1))[..., 0])
+    size = np.abs(matrix).max(initial=0.0)
+    if not (miss <= LINEAR * size).all() or values(np.zeros(shape)).any():
+        raise InputError(
+            f"{type(element).__name__}.{name} is not linear in u: its values of a random u miss the sum of "
+            f"those of unit displacements by {miss.max() / max(size, 1e-300):.1e} of the largest; elements "
+            "of small strains need a linear one"
+        )
+    return matrix
+
+
+# ---- the steps as they are ----------------------------------------------------------------------
+
+
+def strain_of(element: Any, u: Any, C: Any = None) -> Array:
+    """Return the strain (..., g, 6) of elements; `C` is for those whose strain depends on it."""
+    if element.inherits("strain"):
+        return np.asarray(element.strain(u, C))
+    return run_step(element, "strain", (len(element.rule), 6), u)
+
+
+def stress_of(element: Any, C: Any, u: Any) -> Array:
+    """Return the stress (..., g, 6) of elements in Pa."""
+    if element.inherits("stress"):
+        return np.asarray(element.stress(C, u))
+    return run_step(element, "stress", (len(element.rule), 6), C, u)
+
+
+def internal_load_of(element: Any, stress: Any, C: Any = None) -> Array:
+    """Return the internal load (..., n, 3) of elements in N."""
+    if element.inherits("internal_load"):
+        return np.asarray(element.internal_load(stress, C))
+    return run_step(element, "internal_load", element.nodes.shape, stress)
+
+
+def stiffness_of(element: Any, C: Any) -> Array:
+    """Return the stiffness (..., 3, n, 3, n) of elements in N/m, by axis, then node.
+
+    Raises
+    ------
+    ModelError
+        If the class overrides a step so that its stiffness is not symmetric.
+    """
+    if element.inherits(*MECHANICS):
+        return np.asarray(element.stiffness_by_axis(C))
+    n = len(element.nodes)
+    own = not element.inherits("stiffness_by_axis")
+    K = run_step(element, "stiffness_by_axis", (3, n, 3, n), C) if own else element.stiffness_by_axis(C)
+    miss = np.abs(K - K.transpose(*range(K.ndim - 4), -2, -1, -4, -3)).max(initial=0.0)
+    if not miss <= SYMMETRIC * np.abs(K).max(initial=0.0):
+        raise ModelError(
+            f"the stiffness of {type(element).__name__} is not symmetric (by {miss:.1e} N/m), so that it has "
+            "no energy; check the steps that the class overrides with kratos-lite check"
+        )
+    return np.asarray(K)

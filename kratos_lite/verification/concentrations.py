@@ -1,0 +1,123 @@
+"""Concentrations of stress: hole, cavity and corner; and Cook's membrane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
+from kratos_lite.materials import Isotropic3D
+from kratos_lite.typing import Array
+from kratos_lite.verification import fields, scenes
+from kratos_lite.verification.meshes import is_quadratic, nearest, on_plane, shaped
+from kratos_lite.verification.orders import ENERGY, error_of, order_of
+from kratos_lite.verification.problem import Problem, StaticProblem
+from kratos_lite.verification.scenes import Scene
+
+
+def hole(kind: str, n: int = 6) -> Scene:
+    """Return a quarter of a plate 8 × 8 with a hole of radius 1 under tension along x, in plane strain.
+
+    Two blocks of n × n bricks from the hole to the sides, where the exact field is prescribed.
+    """
+
+    def place(X: Array) -> Array:
+        angle = np.pi / 2 * X[:, 1]
+        c, s = np.cos(angle), np.sin(angle)
+        far = 4 / np.maximum(c, s)
+        r = 1 + (far - 1) * (np.exp(1.2 * X[:, 0]) - 1) / (np.exp(1.2) - 1)
+        return np.column_stack([r * c, r * s, 0.5 * X[:, 2]])
+
+    mesh = shaped(kind, (n, 2 * n, 1), place)
+    model = Model(mesh, scenes.UNIT)
+    exact = fields.hole(scenes.UNIT.E, scenes.UNIT.nu, 1.0, 1.0)
+    outer = (np.abs(mesh.points[:, :2] - 4) < 1e-9).any(axis=1)
+    values = np.where(np.abs(mesh.points) < 1e-9, 0.0, exact(mesh.points))
+    model.fix(outer, "xy", values[outer, :2])
+    model.fix(on_plane(mesh, 0, 0.0), "x")
+    model.fix(on_plane(mesh, 1, 0.0), "y")
+    model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 0.5), "z")
+    return Scene("hole", kind, n, model, exact)
+
+
+def _hole_stress(result: Result) -> float:
+    return float(result.stress("node")[nearest(result.mesh, (0, 1, 0)), 0])
+
+
+def _cavity_stress(result: Result) -> float:
+    return float(result.stress("node")[nearest(result.mesh, (1, 0, 0)), 2])
+
+
+def _cook_middle(result: Result) -> float:
+    """Return u_y of the middle of the loaded edge under a unit load (the scene has 100)."""
+    return float(result.u[nearest(result.mesh, (48, 52, 0)), 1]) / 100
+
+
+COOK = Isotropic3D(E=1.0, nu=1 / 3)
+
+
+def _hole(kind: str) -> tuple[Model, ...]:
+    return (hole(kind).model,)
+
+
+def _cavity(kind: str) -> tuple[Model, ...]:
+    return (scenes.cavity(kind, 4).model,)
+
+
+NU = scenes.UNIT.nu
+PROBLEMS: list[Problem] = [
+    StaticProblem(
+        name="concentration/kirsch",
+        quantity="σ_xx at the edge (0, 1) of a hole under unit tension, plane strain, 6 × 12 × 1 bricks",
+        source="Kirsch, closed form",
+        reference=3.0,
+        models=_hole,
+        measure=_hole_stress,
+    ),
+    StaticProblem(
+        name="concentration/kirsch_field",
+        quantity="relative error of u over the plate with a hole (L2)",
+        source="Kirsch, closed form",
+        reference=0.0,
+        models=_hole,
+        measure=error_of(fields.hole(1.0, NU, 1.0, 1.0)),
+        tolerance=1e-3,
+        exact=is_quadratic,
+    ),
+    StaticProblem(
+        name="concentration/goodier",
+        quantity="σ_zz at the equator of a spherical cavity under unit tension, 3 blocks of 4 × 4 × 4 bricks",
+        source="Goodier, closed form (27 - 15 ν) / (2 (7 - 5 ν))",
+        reference=(27 - 15 * NU) / (2 * (7 - 5 * NU)),
+        models=_cavity,
+        measure=_cavity_stress,
+    ),
+    StaticProblem(
+        name="concentration/goodier_field",
+        quantity="relative error of u around the cavity (L2)",
+        source="Goodier, closed form",
+        reference=0.0,
+        models=_cavity,
+        measure=error_of(fields.cavity(1.0, NU, 1.0, 1.0)),
+        tolerance=2e-3,
+        exact=is_quadratic,
+    ),
+    StaticProblem(
+        name="concentration/corner_order",
+        quantity="order of the error in the energy norm at a corner of 270°, from 4 to 8 cells",
+        source="Williams, λ = 0.544484",
+        reference=fields.EXPONENT,
+        models=lambda kind: tuple(scenes.l_domain(kind, n).model for n in (4, 8)),
+        measure=order_of(fields.l_domain(1.0, NU), ENERGY),
+        tolerance=0.08,
+    ),
+    StaticProblem(
+        name="concentration/cook",
+        quantity="u_y amid the loaded edge of Cook's membrane, plane stress, 8 × 8 × 1 bricks, unit load",
+        source="Cook, limit 23.96",
+        reference=23.96,
+        models=lambda kind: (scenes.cook(kind, 8, COOK, plane_stress=True).model,),
+        measure=_cook_middle,
+    ),
+]
+"""The rows of this family."""

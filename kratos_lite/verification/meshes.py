@@ -1,0 +1,167 @@
+"""Meshes of the problems, of any element, and nodal forces of loads that vary in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from kratos_lite.elements import ELEMENTS, KinematicLinear
+from kratos_lite.elements.surface import area_vectors, face_rule
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.generators import SPLITS, box, raise_order
+from kratos_lite.quadrature import rule_for
+from kratos_lite.typing import Array, Ints, Mask, Rows
+
+Place = Callable[[Array], Array]
+"""Takes places (n, 3) of the unit cube to places in space."""
+
+
+def element(kind: str) -> str:
+    """Return the name of an element.
+
+    >>> element("8N"), element("3D8N"), element("KinematicLinear3D8N")[-4:]
+    ('KinematicLinear3D8N', 'KinematicLinear3D8N', '3D8N')
+    """
+    names = (f"KinematicLinear3D{kind}", f"KinematicLinear{kind}")
+    return next((name for name in names if name in ELEMENTS), kind)
+
+
+def kind_of(name: str) -> type[KinematicLinear]:
+    """Return the class of an element by its name."""
+    return ELEMENTS[element(name)]
+
+
+def is_quadratic(kind: str) -> bool:
+    """Return whether an element spans all quadratic polynomials."""
+    return kind_of(kind).shape.degree >= 2
+
+
+def split(points: Array, bricks: Ints | Rows, kind: str) -> Mesh:
+    """Return bricks (m, 8) split into elements of one kind with straight edges."""
+    shape, corners = kind_of(kind).shape, np.asarray(bricks, dtype=np.int64)
+    if shape.cell == "pyramid":
+        corners = np.column_stack([corners, len(points) + np.arange(len(corners))])
+        points = np.vstack([points, points[corners[:, :8]].mean(axis=1)])
+    pieces = np.array(SPLITS[shape.cell])
+    return _mesh(*raise_order(points, corners[:, pieces].reshape(-1, pieces.shape[1]), shape), kind)
+
+
+def _mesh(points: Array, nodes: Ints, kind: str) -> Mesh:
+    m = len(nodes)
+    block = Block(
+        element(kind),
+        nodes.astype(np.int32),
+        np.arange(1, m + 1),
+        np.ones(m, dtype=np.int64),
+        kind_of(kind).shape,
+    )
+    return Mesh(points, [block])
+
+
+def warped(kind: str, n: int, amount: float = 0.2, seed: int = 3) -> Mesh:
+    """Return a unit cube of n³ bricks, split; its inner corners are moved by up to amount / n."""
+    grid = box(cells=(n, n, n))
+    inside = (np.abs(grid.points - 0.5) < 0.5 - 1e-9).all(axis=1)
+    points = grid.points.copy()
+    move = np.random.default_rng(seed).uniform(-1, 1, (int(inside.sum()), 3))
+    points[inside] += amount / n * move
+    return split(points, grid.blocks[0].nodes, kind)
+
+
+def shaped(kind: str, cells: Sequence[int], place: Place) -> Mesh:
+    """Return bricks along the axes of the unit cube, split, with every node taken to its place."""
+    grid = box(cells=cells, element=element(kind))
+    return Mesh(place(grid.points), grid.blocks)
+
+
+def straight(kind: str, cells: Sequence[int], place: Place) -> Mesh:
+    """Return the same with the corners alone taken to their places: edges are straight."""
+    grid = box(cells=cells)
+    return split(place(grid.points), grid.blocks[0].nodes, kind)
+
+
+def joined(pieces: Sequence[Mesh]) -> Mesh:
+    """Return meshes of one kind as one: nodes at one place become one node."""
+    starts = np.cumsum([0, *(piece.n_nodes for piece in pieces)])
+    points = np.vstack([piece.points for piece in pieces])
+    nodes = np.vstack([piece.blocks[0].nodes + start for piece, start in zip(pieces, starts, strict=False)])
+    _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    return _mesh(points[first], same.ravel()[nodes], pieces[0].blocks[0].name)
+
+
+def octant(n: int, kind: str, outer: Place) -> Mesh:
+    """Return the space between the unit sphere and an outer surface, x y z ≥ 0, in three blocks of n³ bricks.
+
+    `outer` takes directions (m, 3) to the outer surface.
+    """
+    center, edges = np.ones(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
+
+    def block(k: int) -> Mesh:
+        pole, a, b = np.roll([1.0, 0, 0], k), edges[k], edges[(k + 2) % 3]
+
+        def place(X: Array) -> Array:
+            s, t, r = X.T
+            flat = np.outer((1 - s) * (1 - t), pole) + np.outer(s * (1 - t), a)
+            flat += np.outer((1 - s) * t, b) + np.outer(s * t, center)
+            inner = flat / np.linalg.norm(flat, axis=1, keepdims=True)
+            return inner + r[:, None] * (outer(flat) - inner)
+
+        return shaped(kind, (n, n, n), place)
+
+    return joined([block(k) for k in range(3)])
+
+
+# ---- chosen nodes ------------------------------------------------------------------------------------
+
+
+def on_plane(mesh: Mesh, axis: int, value: float) -> Mask:
+    """Return a mask of the nodes with coordinate `value` along an axis."""
+    return np.abs(mesh.points[:, axis] - value) < 1e-9 * max(1.0, float(np.abs(mesh.points).max()))
+
+
+def on_boundary(mesh: Mesh) -> Mask:
+    """Return a mask of the nodes on the surface of the body."""
+    rows = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.boundary]))
+    return np.isin(np.arange(mesh.n_nodes), rows)
+
+
+def nearest(mesh: Mesh, place: tuple[float, float, float]) -> int:
+    """Return the row of the node nearest to a place."""
+    return int(np.argmin(np.linalg.norm(mesh.points - np.asarray(place), axis=1)))
+
+
+# ---- loads that vary ---------------------------------------------------------------------------------
+
+
+def body_forces(mesh: Mesh, force: Place) -> Array:
+    """Return ∫ N b dV as nodal forces (n, 3), with b known everywhere, by a rule of degree 8."""
+    (block,) = mesh.blocks
+    kind = ELEMENTS[block.name]
+    rule = rule_for(kind.shape.cell, 8)
+    N, _ = tabulate(kind.shape, rule)
+    total = np.zeros_like(mesh.points)
+    for start in range(0, len(block), 2000):
+        nodes = block.nodes[start : start + 2000]
+        placed = kind(mesh.points[nodes], rule)
+        share = N.T @ (force(N @ mesh.points[nodes]) * placed.dV[..., None])
+        np.add.at(total, nodes, share)
+    return total
+
+
+def face_forces(mesh: Mesh, where: Mask, traction: Callable[[Array, Array], Array]) -> Array:
+    """Return ∫ N t dA over the boundary faces among nodes, as nodal forces (n, 3).
+
+    `traction` takes places and unit normals (m, g, 3) to t.  The normals point outward.
+    """
+    total = np.zeros_like(mesh.points)
+    for faces in mesh.faces(where):
+        assert faces.shape is not None
+        rule = face_rule(faces.shape)
+        N, _ = tabulate(faces.shape, rule)
+        X = mesh.points[faces.nodes]
+        vectors = area_vectors(faces.shape, X, rule)
+        area = np.linalg.norm(vectors, axis=-1, keepdims=True)
+        np.add.at(total, faces.nodes, N.T @ (traction(N @ X, vectors / area) * area))
+    return total

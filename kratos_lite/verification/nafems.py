@@ -1,0 +1,97 @@
+"""NAFEMS' thick plates: LE10 under pressure, FV52 in vibration."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
+from kratos_lite.materials import Isotropic3D
+from kratos_lite.mesh.generators import box
+from kratos_lite.model.loads import NodalForces
+from kratos_lite.typing import Array
+from kratos_lite.verification.meshes import element, face_forces, is_quadratic, nearest, on_plane, shaped
+from kratos_lite.verification.problem import Problem, StaticProblem
+
+STEEL = Isotropic3D(E=210e9, nu=0.3)
+PLATE = Isotropic3D(E=200e9, nu=0.3, density=8000.0)
+FREQUENCIES = (45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19)
+"""Hz, of FV52: modes 4 to 10, after three rigid motions in the plane."""
+
+
+def le10(kind: str) -> tuple[Model, ...]:
+    """Return a quarter of an elliptic plate with an elliptic hole, 0.6 thick, 1 MPa on it; 6 × 4 × 4 bricks.
+
+    The outer face is held in the plane, its middle line along z; the layers are thus an even number.
+    """
+
+    def place(X: Array) -> Array:
+        angle = np.pi / 2 * X[:, 1]
+        c, s = np.cos(angle), np.sin(angle)
+        return np.column_stack([(2 + 1.25 * X[:, 0]) * c, (1 + 1.75 * X[:, 0]) * s, 0.6 * X[:, 2]])
+
+    mesh = shaped(kind, (4, 6, 4), place)
+    model = Model(mesh, STEEL)
+    x, y, z = mesh.points.T
+    rim = np.abs((x / 3.25) ** 2 + (y / 2.75) ** 2 - 1) < 1e-6
+    model.fix(on_plane(mesh, 1, 0.0), "y")
+    model.fix(on_plane(mesh, 0, 0.0), "x")
+    model.fix(rim, "xy")
+    model.fix(rim & (np.abs(z - 0.3) < 1e-9), "z")
+    top = on_plane(mesh, 2, 0.6)
+    model.add(NodalForces(face_forces(mesh, top, lambda X, n: -1e6 * n)))
+    return (model,)
+
+
+def _stress_at_d(result: Result) -> float:
+    """Return σ_yy in MPa at the point D = (2, 0, 0.6), a mean over the elements around the node."""
+    return float(result.stress("node")[nearest(result.mesh, (2, 0, 0.6)), 1]) / 1e6
+
+
+def fv52(kind: str) -> Model:
+    """Return a plate 10 × 10 × 1 with its lower edges on rollers; 4 × 4 × 1 bricks, 8 × 8 × 3 linear ones."""
+    cells = (4, 4, 1) if is_quadratic(kind) else (8, 8, 3)
+    mesh = box((10, 10, 1), cells, element(kind))
+    model = Model(mesh, PLATE)
+    X = mesh.points
+    edge = (np.abs(X[:, :2] - 5) > 5 - 1e-9).any(axis=1) & (X[:, 2] < 1e-9)
+    model.fix(edge, "z")
+    return model
+
+
+@lru_cache(maxsize=16)
+def _modes(kind: str) -> Array:
+    """Return ten frequencies of FV52 in Hz; several rows share them."""
+    return fv52(kind).modes(10)[0] / (2 * np.pi)
+
+
+def _frequency(number: int, shape: str) -> Problem:
+    def of(kind: str) -> float:
+        return float(_modes(kind)[number - 1])
+
+    return Problem(
+        name=f"nafems/fv52_mode_{number}",
+        quantity=f"frequency {number} of FV52, {shape}, Hz",
+        source="NAFEMS-FV, test FV52",
+        reference=FREQUENCIES[number - 4],
+        of=of,
+    )
+
+
+PROBLEMS: list[Problem] = [
+    StaticProblem(
+        name="nafems/le10",
+        quantity="σ_yy at the point D of the thick plate LE10, 6 × 4 × 4 bricks, MPa",
+        source="NAFEMS, test LE10",
+        reference=-5.38,
+        models=le10,
+        measure=_stress_at_d,
+    ),
+    *(
+        _frequency(number, shape)
+        for number, shape in ((4, "bending"), (5, "bending"), (7, "bending"), (8, "in its plane"))
+    ),
+]
+"""The rows of this family."""

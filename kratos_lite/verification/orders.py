@@ -1,0 +1,73 @@
+"""Orders of convergence against a manufactured solution: p + 1 for displacements, p for the energy norm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
+from kratos_lite.verification import fields, scenes
+from kratos_lite.verification.errors import norms
+from kratos_lite.verification.meshes import is_quadratic, kind_of
+from kratos_lite.verification.problem import Of, Problem, StaticProblem
+
+DISPLACEMENT, ENERGY = 0, 1
+CELLS = {"tetrahedron": (12, 6), "pyramid": (8, 4), "wedge": (8, 4), "hexahedron": (8, 6)}
+"""Bricks along an edge of the finer mesh, for linear and for quadratic elements; 8 for the 20-node brick."""
+
+
+def error_of(field: fields.Field, norm: int = DISPLACEMENT) -> Callable[[Result], float]:
+    """Return a function: the relative error of a result in a norm."""
+    return lambda result: _norms(field, result)[norm]
+
+
+@lru_cache(maxsize=32)
+def _norms(field: fields.Field, result: Result) -> tuple[float, float]:
+    """Return both norms: rows of the two share them."""
+    return norms(field, result.mesh.points, result.groups, result.u)
+
+
+def order_of(field: fields.Field, norm: int) -> Callable[[Result, Result], float]:
+    """Return a function: the order of the error between two results, the second with half the cells' size."""
+    error = error_of(field, norm)
+    return lambda coarse, fine: float(np.log2(error(coarse) / error(fine)))
+
+
+def two_meshes(distortion: float) -> Callable[[str], tuple[Model, ...]]:
+    """Return a function: the manufactured solution on a mesh and on one twice as fine."""
+
+    def models(kind: str) -> tuple[Model, ...]:
+        n = CELLS[kind_of(kind).shape.cell][is_quadratic(kind)]
+        n = 8 if len(kind_of(kind).shape.nodes) == 20 else n
+        return tuple(scenes.manufactured(kind, m, distortion).model for m in (n // 2, n))
+
+    return models
+
+
+MESHES = {"cubic": two_meshes(0.0), "distorted": two_meshes(0.1)}
+
+
+def _problem(word: str, norm: int, degree: int) -> Problem:
+    linear = degree == 1
+    takes: Of = (lambda kind: not is_quadratic(kind)) if linear else is_quadratic
+    what, order = ("displacement", degree + 1) if norm == DISPLACEMENT else ("energy", degree)
+    return StaticProblem(
+        name=f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",
+        quantity=f"order of the error of {'u (L2 norm)' if norm == DISPLACEMENT else 'σ (energy norm)'}, "
+        f"manufactured solution, {word} cells",
+        source="Roache",
+        reference=float(order),
+        models=MESHES[word],
+        measure=order_of(fields.manufactured, norm),
+        tolerance=0.15 / order,
+        takes=takes,
+    )
+
+
+PROBLEMS: list[Problem] = [
+    _problem(word, norm, degree) for degree in (1, 2) for word in MESHES for norm in (DISPLACEMENT, ENERGY)
+]
+"""The rows of this family."""

@@ -1,0 +1,181 @@
+"""The table as text, Markdown and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from typing import Any
+
+from kratos_lite.verification.problem import FAIL, GRADES, PASS, Problem, Row
+from kratos_lite.verification.sources import SOURCES
+
+TITLES = {
+    "element": "One element",
+    "patch": "Patch tests",
+    "macneal_harder": "Beams of MacNeal and Harder",
+    "shells": "Plates and shells",
+    "pressure": "Pressure vessels",
+    "concentration": "Concentrations of stress",
+    "nafems": "NAFEMS",
+    "order": "Orders of convergence",
+    "vibration": "Frequencies",
+    "time": "Integration in time",
+    "body": "Bodies in motion",
+    "ale": "Material moving through the mesh",
+}
+"""Headings of the families."""
+SMALL = 1e-9
+"""Errors below are rounding, which differs from machine to machine."""
+
+
+def number(value: float) -> str:
+    """Return a value to the four digits that matter.
+
+    >>> number(0.10398765), number(-1.3221478e-4), number(6.0), number(float("nan"))
+    ('0.104', '-0.0001322', '6', '–')
+    """
+    if not isfinite(value):
+        return "–"
+    text = f"{value:.4g}"
+    return f"{value:.3e}" if "e" in text else text
+
+
+def found(row: Row, value: float) -> str:
+    """Return the value found; where it has to be 0, a bound stands for what is rounding."""
+    if row.problem.reference == 0 and abs(value) <= (row.problem.tolerance or 0.0) <= SMALL:
+        return f"< {row.problem.tolerance:.0e}"
+    return number(value)
+
+
+def limit(problem: Problem) -> str:
+    """Return what a row has to meet."""
+    if problem.tolerance is None:
+        return "graded"
+    return "exact" if problem.tolerance <= SMALL else f"{problem.tolerance:.2g}"
+
+
+def by_family(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Return rows by the first word of their problem."""
+    families: dict[str, list[Row]] = {}
+    for row in rows:
+        families.setdefault(row.problem.name.partition("/")[0], []).append(row)
+    return families
+
+
+# ---- terminal ----------------------------------------------------------------------------------------
+
+
+def line(row: Row) -> str:
+    """Return a row for a terminal."""
+    error = "" if row.note else f"{row.error:9.1e}"
+    text = (
+        f"{row.problem.name:<42}{row.kind:<6}{found(row, row.value):>12}{number(row.problem.reference):>12}"
+    )
+    return f"{text}{error:>11}  {row.grade:<5}{row.note.splitlines()[0] if row.note else ''}".rstrip()
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Return how many rows there are of each grade.
+
+    >>> summary([])
+    '0 rows'
+    """
+    grades = [PASS, FAIL, *(letter for _, letter in GRADES), "F"]
+    counts = {grade: sum(row.grade == grade for row in rows) for grade in grades}
+    told = [f"{count} {grade}" for grade, count in counts.items() if count]
+    return f"{len(rows)} rows" + (": " + ", ".join(told) if told else "")
+
+
+# ---- Markdown ----------------------------------------------------------------------------------------
+
+INTRO = (
+    "How well each element finds what is known. `kratos-lite verify` computes the table, of the elements of "
+    "the library or of [your own](add-an-element.md): `kratos-lite verify my_element.py --element My8N`.",
+    "Every row has a value that is known: from a closed form, or from a publication that the last column "
+    "names. `pass`: the error is at most that of the column *limit* (*exact*: rounding alone). Where an "
+    "element need not be exact it has a grade instead, by the relative error, after MacNeal and Harder: "
+    "A ≤ 2 %, B ≤ 10 %, C ≤ 20 %, D ≤ 50 %, F beyond. Errors are relative to the reference, or absolute "
+    "where it is 0.",
+    "Meshes are coarse on purpose, so that locking shows: an F is a property of the element, in every "
+    "program that has it, and the reason to take another one. Linear elements (4N, 5N, 6N, 8N) lock in "
+    "bending and near ν = ½; quadratic ones (10N, 15N, 20N, 27N) are the ones to take.",
+)
+PEERS = (
+    "Other programs solve the same discrete problems, with the same nodes, supports and nodal forces: {}. "
+    "Their columns hold the same quantity, from their nodal displacements; they are empty where a program "
+    "has no such element or constraint."
+)
+
+
+def markdown(rows: Sequence[Row], programs: dict[str, str] | None = None, command: str = "") -> str:
+    """Return the page; `programs` are other programs with their versions, each a column."""
+    programs = programs or {}
+    told = ", ".join(f"{name} {version}" for name, version in programs.items())
+    parts = ["# Verification\n", *(f"{text}\n" for text in INTRO)]
+    parts += [PEERS.format(told) + "\n"] if programs else []
+    parts.append(f"Made by `{command or 'kratos-lite verify'}`; {summary(rows)}.\n")
+    if len({row.kind for row in rows}) > 1:
+        parts.append(_overview(rows))
+    for family, some in by_family(rows).items():
+        parts.append(f"## {TITLES.get(family, family)}\n\n{_table(some, programs)}")
+    parts.append(_citations(rows))
+    return "\n".join(parts)
+
+
+def _cells(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def _overview(rows: Sequence[Row]) -> str:
+    """Return the grades of all elements, one line for each problem."""
+    kinds = list(dict.fromkeys(row.kind for row in rows if row.kind))
+    lines: dict[str, dict[str, str]] = {}
+    for row in rows:
+        if row.kind:
+            name = row.problem.name.removesuffix("_linear").removesuffix("_quadratic")
+            lines.setdefault(name, {})[row.kind] = row.grade
+    text = "## Overview\n\n" + _cells(["problem", *kinds]) + _cells(["---"] * (len(kinds) + 1))
+    return text + "".join(
+        _cells([name, *(grades.get(kind, "") for kind in kinds)]) for name, grades in lines.items()
+    )
+
+
+def _table(rows: Sequence[Row], programs: Iterable[str]) -> str:
+    named = [program for program in programs if any(program in row.others for row in rows)]
+    head = ["problem", "element", "value", *named, "reference", "limit", "grade", "source"]
+    text = _cells(head) + _cells(["---"] * len(head))
+    for row in rows:
+        others = [found(row, row.others[name]) if name in row.others else "" for name in named]
+        problem = row.problem
+        first = [problem.name.partition("/")[2], row.kind or "–", found(row, row.value)]
+        last = [number(problem.reference), limit(problem), row.grade, problem.source]
+        text += _cells([*first, *others, *last])
+    quantities = dict.fromkeys((row.problem.name, row.problem.quantity) for row in rows)
+    told = "".join(f"- {name.partition('/')[2]}: {quantity}\n" for name, quantity in quantities)
+    return f"{told}\n{text}"
+
+
+def _citations(rows: Sequence[Row]) -> str:
+    used = {row.problem.source.partition(",")[0] for row in rows}
+    lines = (f"- **{word}**: {SOURCES[word]}." for word in SOURCES if word in used)
+    return "## Sources\n\n" + "\n".join(lines) + "\n"
+
+
+# ---- JSON --------------------------------------------------------------------------------------------
+
+
+def record(row: Row) -> dict[str, Any]:
+    """Return a row as JSON holds it."""
+    problem = row.problem
+    return {
+        "problem": problem.name,
+        "element": row.element,
+        "quantity": problem.quantity,
+        "value": row.value if isfinite(row.value) else None,
+        "reference": problem.reference,
+        "source": problem.source,
+        "tolerance": problem.tolerance,
+        "grade": row.grade,
+        **({"note": row.note} if row.note else {}),
+        **({"others": row.others} if row.others else {}),
+    }

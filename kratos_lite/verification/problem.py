@@ -1,0 +1,154 @@
+"""Problem: a question with a known answer; Row: what one element answers, and its grade."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import inf, isfinite
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
+from kratos_lite.errors import KratosLiteError
+from kratos_lite.verification.meshes import kind_of
+from kratos_lite.verification.sources import SOURCES
+
+ELEMENTS = tuple(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27))
+"""The elements of the library, in the order of the table."""
+GRADES = ((0.02, "A"), (0.1, "B"), (0.2, "C"), (0.5, "D"))
+"""Largest relative error of each grade, after MacNeal & Harder 1985; beyond the last it is F."""
+PASS, FAIL = "pass", "FAIL"
+Of = Callable[[str], bool]
+"""Whether something holds for an element, by its name."""
+
+
+def every(kind: str) -> bool:
+    """Return True: the problem is for every element."""
+    return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A quantity with a known value.
+
+    Attributes
+    ----------
+    name : family and problem, such as ``patch/linear``.
+    quantity : what is measured, with its unit.
+    source : a key of `SOURCES`, and where it stands in there.
+    reference : the value known; errors are relative to it, or absolute where it is 0.
+    of : takes the name of an element, or "" where the problem has none, to the value found.
+    tolerance : error up to which a row passes.
+    exact : elements that have to pass; the others are graded.  All are graded without a tolerance.
+    takes : elements that the problem is for; None where it has no element.
+    """
+
+    name: str
+    quantity: str
+    source: str
+    reference: float
+    of: Callable[[str], float]
+    tolerance: float | None = None
+    exact: Of = every
+    takes: Of | None = every
+
+    def __post_init__(self) -> None:
+        if self.source.partition(",")[0] not in SOURCES:
+            raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
+
+    def error(self, value: float) -> float:
+        """Return how far a value is from the reference."""
+        off = abs(value - self.reference) / (abs(self.reference) or 1.0)
+        return off if isfinite(off) else inf
+
+    def grade(self, value: float, element: str) -> str:
+        """Return ``pass`` or ``FAIL`` where a tolerance holds, a letter elsewhere."""
+        error = self.error(value)
+        if self.tolerance is not None and self.exact(element):
+            return PASS if error <= self.tolerance else FAIL
+        return next((letter for limit, letter in GRADES if error <= limit), "F")
+
+    def elements(self, wanted: tuple[str, ...] = ELEMENTS) -> tuple[str, ...]:
+        """Return those of some elements that the problem is for; ("",) where it has none."""
+        return ("",) if self.takes is None else tuple(filter(self.takes, wanted))
+
+    def row(self, element: str) -> Row:
+        """Find the value for an element; an error of the library becomes a row that fails."""
+        try:
+            value, note = float(self.of(element)), ""
+        except KratosLiteError as error:
+            value, note = float("nan"), str(error)
+        return Row(self, element, value, note=note)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticProblem(Problem):
+    """A problem whose answer follows from the displacements of one or several models at rest.
+
+    Attributes
+    ----------
+    models : takes the name of an element to the models.
+    measure : takes their results to the value.
+    """
+
+    models: Callable[[str], tuple[Model, ...]]
+    measure: Callable[..., float]
+    of: Callable[[str], float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "of", self._solved)
+
+    def _solved(self, element: str) -> float:
+        return self.measure(*solved(self.models, element))
+
+
+@lru_cache(maxsize=16)
+def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Result, ...]:
+    """Return the results of the models of a problem; others that have the same models share them."""
+    return tuple(model.solve("direct") for model in models(element))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes
+    ----------
+    problem : what is asked.
+    element : its name, or "".
+    value : what was found.
+    others : what other programs find, by their names.
+    note : why there is no value.
+    """
+
+    problem: Problem
+    element: str
+    value: float
+    others: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def error(self) -> float:
+        """How far the value is from the reference."""
+        return self.problem.error(self.value)
+
+    @property
+    def grade(self) -> str:
+        """``pass``, ``FAIL`` or a letter."""
+        return FAIL if self.note else self.problem.grade(self.value, self.element)
+
+    @property
+    def failed(self) -> bool:
+        """Whether a row that has to pass does not."""
+        return self.grade == FAIL
+
+    @property
+    def kind(self) -> str:
+        """Short name of the element, such as ``8N``."""
+        return self.element.removeprefix("KinematicLinear3D")
+
+
+def cell_is(*cells: str) -> Of:
+    """Return whether an element has one of these cells."""
+    return lambda kind: kind_of(kind).shape.cell in cells

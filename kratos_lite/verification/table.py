@@ -1,0 +1,78 @@
+"""The table: which problems there are, and the rows of some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from fnmatch import fnmatchcase
+
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.verification import (
+    concentrations,
+    macneal_harder,
+    nafems,
+    orders,
+    patch,
+    pressure,
+    shells,
+    uniform,
+)
+from kratos_lite.verification.meshes import element, kind_of
+from kratos_lite.verification.problem import ELEMENTS, Problem, Row, solved
+
+FAMILIES = (uniform, patch, macneal_harder, shells, pressure, concentrations, nafems, orders)
+"""Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""
+PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for problem in family.PROBLEMS}
+"""Every problem by its name."""
+
+
+def chosen(names: Sequence[str] = ()) -> list[Problem]:
+    """Return the problems of some names, families or patterns such as ``*cylinder*``; all without names.
+
+    Raises
+    ------
+    InputError
+        A name fits no problem.
+    """
+    if not names:
+        return list(PROBLEMS.values())
+    for name in names:
+        if not any(_fits(problem, name) for problem in PROBLEMS):
+            families = dict.fromkeys(problem.partition("/")[0] for problem in PROBLEMS)
+            hint = nearest(name, [*PROBLEMS, *families])
+            raise InputError(f"no problem fits {name!r}; the families are {', '.join(families)}.{hint}")
+    return [problem for problem in PROBLEMS.values() if any(_fits(problem.name, name) for name in names)]
+
+
+def _fits(problem: str, name: str) -> bool:
+    return problem == name or problem.startswith(f"{name}/") or fnmatchcase(problem, name)
+
+
+def verify(
+    names: Sequence[str] = (),
+    elements: Sequence[str] = (),
+    progress: Callable[[str, float], None] | None = None,
+) -> Iterator[Row]:
+    """Yield the rows of some problems for some elements.
+
+    Parameters
+    ----------
+    names : problems, families or patterns; all if there are none.
+    elements : names such as ``3D8N`` or ``My8N``; with them, problems without an element are left out.
+        Those of the library if there are none.
+    progress : called with the name of each problem and the share done.
+
+    Raises
+    ------
+    InputError
+        A name fits no problem, or there is no such element.
+    """
+    problems = chosen(names)
+    solved.cache_clear()  # an element of this name may have been another one
+    wanted = tuple(kind_of(name).__name__ for name in elements) or ELEMENTS
+    for number, problem in enumerate(problems):
+        if progress is not None:
+            progress(problem.name, number / len(problems))
+        if elements and problem.takes is None:
+            continue
+        for kind in problem.elements(tuple(map(element, wanted))):
+            yield problem.row(kind)

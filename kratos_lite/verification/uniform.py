@@ -1,0 +1,164 @@
+"""One brick: uniform states, bending, own weight; rank and inertia of an element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kratos_lite.analysis.model import Model
+from kratos_lite.analysis.result import Result
+from kratos_lite.bodies import FiniteElementBody
+from kratos_lite.materials import Isotropic3D
+from kratos_lite.mesh.generators import box
+from kratos_lite.model.loads import NodalForces
+from kratos_lite.typing import Array
+from kratos_lite.verification import scenes
+from kratos_lite.verification.meshes import (
+    element,
+    face_forces,
+    is_quadratic,
+    kind_of,
+    nearest,
+    on_boundary,
+    warped,
+)
+from kratos_lite.verification.problem import Problem, StaticProblem
+
+STEEL = Isotropic3D(E=1e6, nu=0.25)
+E, NU = STEEL.E, STEEL.nu
+ROUND_OFF = 1e-11
+"""Relative error of what has to be exact but for rounding."""
+STRESSES = {
+    "uniaxial": (np.diag([1.0, 0, 0]), 1 / E),
+    "shear": (np.array([[0, 1.0, 0], [1, 0, 0], [0, 0, 0]]), (1 + NU) / E),
+    "hydrostatic": (np.eye(3), (1 - 2 * NU) / E),
+}
+"""Unit stresses in Pa, and u_x of the corner (1, 1, 1) of a unit cube in m."""
+
+
+def under(stress: Array, model: Model) -> Model:
+    """Load all faces of a box by a uniform stress, and hold its rigid motions at the corner 0."""
+    mesh = model.mesh
+    model.add(NodalForces(face_forces(mesh, on_boundary(mesh), lambda X, n: n @ stress)))
+    for place, axes in (((0, 0, 0), "xyz"), ((1, 0, 0), "yz"), ((0, 1, 0), "z")):
+        at = np.array([nearest(mesh, place)])
+        model.fix(at, axes, uniform(stress)(mesh.points[at])[:, ["xyz".index(a) for a in axes]])
+    return model
+
+
+def uniform(stress: Array) -> Callable[[Array], Array]:
+    """Return the field u = ε X of a uniform stress."""
+    strain = ((1 + NU) * stress - NU * np.trace(stress) * np.eye(3)) / E
+    return lambda X: np.asarray(X @ strain)
+
+
+def _loaded(stress: Array) -> Callable[[str], tuple[Model, ...]]:
+    return lambda kind: (under(stress, Model(box(element=element(kind)), STEEL)),)
+
+
+def _corner(result: Result) -> float:
+    return float(result.u[nearest(result.mesh, (1, 1, 1)), 0])
+
+
+def rank(kind: str) -> float:
+    """Return the number of zero-energy modes of one element with all its nodes a little moved."""
+    cls = kind_of(kind)
+    nodes = cls.shape.nodes
+    moved = nodes + 0.03 * np.random.default_rng(11).uniform(-1, 1, nodes.shape)
+    values = np.linalg.eigvalsh(cls(moved).stiffness(STEEL.C))
+    return float((values < 1e-9 * values[-1]).sum())
+
+
+def inertia(kind: str) -> float:
+    """Return twice the kinetic energy of a turning cube of distorted cells / its exact moment of inertia."""
+    body = FiniteElementBody(warped(kind, 2, amount=0.2), scenes.SOIL)
+    body.set_velocity(angular=(0.0, 0.0, 1.0))
+    return 2 * float(body.kinetic_energy()) / (scenes.SOIL.density / 6)
+
+
+def _tip(result: Result) -> float:
+    """Return u_y of the end of the bent bar, at its axis, / exact."""
+    mesh = result.mesh
+    end = np.flatnonzero(np.abs(mesh.points[:, 0] - 4) < 1e-9)
+    exact = scenes.bending("8N", 1).exact
+    assert exact is not None
+    return float(result.u[end, 1].sum() / exact(mesh.points[end])[:, 1].sum())
+
+
+def _top(result: Result) -> float:
+    """Return u_z of that node of the top which is farthest from the exact value."""
+    top = result.displacement("z+")[:, 2]
+    return float(top[np.argmax(np.abs(top - TOP))])
+
+
+def _weight(kind: str) -> tuple[Model, ...]:
+    return (scenes.cube(kind, 1).model,)
+
+
+def _warped_weight(kind: str) -> tuple[Model, ...]:
+    return (scenes.on_rollers(Model(warped(kind, 2, seed=0), scenes.SOIL)).model,)
+
+
+TOP = -scenes.SOIL.density * 9.81 / (2 * scenes.SOIL.C[0, 0])
+PROBLEMS: list[Problem] = [
+    Problem(
+        name="element/rank",
+        quantity="zero-energy modes of one element: its rigid motions and no others",
+        source="Hughes, chapter 4",
+        reference=6,
+        of=rank,
+        tolerance=0.0,
+    ),
+    Problem(
+        name="element/inertia",
+        quantity="moment of inertia of a cube of distorted cells / (m L²/6), consistent mass",
+        source="Timoshenko, closed form m (L² + L²)/12",
+        reference=1,
+        of=inertia,
+        tolerance=1e-11,
+    ),
+    *(
+        StaticProblem(
+            name=f"element/{name}",
+            quantity=f"u_x of the corner (1, 1, 1) of a unit cube, one brick, under unit stress, {name}, m",
+            source="Hooke",
+            reference=moved,
+            models=_loaded(stress),
+            measure=_corner,
+            tolerance=ROUND_OFF,
+        )
+        for name, (stress, moved) in STRESSES.items()
+    ),
+    StaticProblem(
+        name="element/bending",
+        quantity="mean deflection of the end / exact, bar 4 × 1 × 1 of four bricks in pure bending",
+        source="Timoshenko, section 102",
+        reference=1,
+        models=lambda kind: (scenes.bending(kind, 1).model,),
+        measure=_tip,
+        tolerance=ROUND_OFF,
+        exact=is_quadratic,
+    ),
+    StaticProblem(
+        name="element/weight",
+        quantity="u_z of the top of the gravity cube, one brick, at the worst node, m",
+        source="Timoshenko, closed form -ρ g L²/(2 M)",
+        reference=TOP,
+        models=_weight,
+        measure=_top,
+        tolerance=ROUND_OFF,
+        exact=lambda kind: len(kind_of(kind).shape.nodes) > 4,
+    ),
+    StaticProblem(
+        name="element/weight_warped",
+        quantity="u_z of the top of the gravity cube, 2 × 2 × 2 distorted bricks, at the worst node, m",
+        source="Timoshenko, closed form -ρ g L²/(2 M)",
+        reference=TOP,
+        models=_warped_weight,
+        measure=_top,
+        tolerance=ROUND_OFF,
+        exact=lambda kind: len(kind_of(kind).shape.nodes) in (10, 27),
+    ),
+]
+"""The rows of this family."""

@@ -1,0 +1,222 @@
+"""Values at integration points by Kratos's names, and anywhere in a mesh, beside plain NumPy."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.analysis.integration_point_values import QUANTITIES
+
+E, NU = 3e5, 0.3
+LAM, MU = E * NU / (1 + NU) / (1 - 2 * NU), E / 2 / (1 + NU)
+KINDS = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
+
+
+def held_model(mesh, u, material=None):
+    """Return a model whose displacements are all prescribed."""
+    model = kl.Model(mesh, material or kl.Isotropic3D(E=E, nu=NU, density=1.0))
+    model.fix(np.arange(mesh.n_nodes), "xyz", u)
+    return model
+
+
+def distorted(kind, seed=0):
+    mesh = kl.box((1.0, 0.8, 0.6), (2, 1, 1), element=kind)
+    shift = 0.03 * np.random.default_rng(seed).uniform(-1, 1, mesh.points.shape)
+    return kl.Mesh(mesh.points + shift, mesh.blocks)
+
+
+def voigt(tensor, factor=1.0):
+    """Return a tensor (3, 3) as xx yy zz xy yz xz, shear times a factor."""
+    return np.array([tensor[p] * (1.0 if p[0] == p[1] else factor) for p in PAIRS])
+
+
+@pytest.fixture(params=KINDS)
+def solved(request):
+    """A distorted mesh, random displacements, its result, and all values at Gauss points by loops."""
+    mesh = distorted(request.param)
+    u = 1e-3 * np.random.default_rng(1).uniform(-1, 1, mesh.points.shape)
+    return mesh, u, held_model(mesh, u).solve()
+
+
+def by_hand(mesh, u, element, name):
+    """Return values (g, ...) of one element by a loop over its Gauss points."""
+    block, kind = mesh.blocks[0], kl.ELEMENTS[mesh.blocks[0].name]
+    nodes = block.nodes[list(block.ids).index(element)]
+    found = []
+    for xi, gamma in kind.rule:
+        dN, N = kind.shape.dN(xi), kind.shape.N(xi)
+        J = mesh.points[nodes].T @ dN
+        gradient = u[nodes].T @ dN @ np.linalg.inv(J)
+        strain = (gradient + gradient.T) / 2
+        stress = LAM * np.trace(strain) * np.eye(3) + 2 * MU * strain
+        deviator = stress - np.trace(stress) / 3 * np.eye(3)
+        values = {
+            "STRAIN": voigt(strain, 2.0),
+            "GREEN_LAGRANGE_STRAIN_VECTOR": voigt(strain, 2.0),
+            "GREEN_LAGRANGE_STRAIN_TENSOR": strain,
+            "STRESSES": voigt(stress),
+            "CAUCHY_STRESS_VECTOR": voigt(stress),
+            "CAUCHY_STRESS_TENSOR": stress,
+            "PK2_STRESS_VECTOR": voigt(stress),
+            "PK2_STRESS_TENSOR": stress,
+            "VON_MISES_STRESS": np.sqrt(1.5 * (deviator**2).sum()),
+            "STRAIN_ENERGY": (strain * stress).sum() / 2,
+            "CONSTITUTIVE_MATRIX": np.diag([2 * MU] * 3 + [MU] * 3) + np.pad(np.full((3, 3), LAM), (0, 3)),
+            "JACOBIAN": np.linalg.det(J),
+            "JACOBIAN_0": np.linalg.det(J),
+            "INTEGRATION_WEIGHT": gamma * np.linalg.det(J),
+            "INTEGRATION_COORDINATES": N @ mesh.points[nodes],
+            "INTEGRATION_POINT_GLOBAL": N @ mesh.points[nodes],
+            "INTEGRATION_POINT_LOCAL": xi,
+            "DISPLACEMENT": N @ u[nodes],
+        }
+        if name == "STRAIN_INTERPOLATION_OPERATOR":
+            one = np.eye(u[nodes].size).reshape(-1, len(nodes), 3)
+            H = np.swapaxes(one, 1, 2) @ dN @ np.linalg.inv(J)
+            values[name] = np.array([voigt((h + h.T) / 2, 2.0) for h in H]).T
+        found.append(values[name])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_values_at_integration_points_are_those_of_a_loop_over_them(solved, name):
+    mesh, u, result = solved
+    element = int(mesh.element_ids[-1])
+    expected = by_hand(mesh, u, element, name)
+    got = result.at_integration_points(name, element=element)
+    assert got.shape == expected.shape
+    assert np.abs(got - expected).max() <= 1e-11 * np.abs(expected).max()
+    every = result.at_integration_points(name)
+    assert every.shape == (mesh.n_elements, *expected.shape)
+    assert np.abs(every[-1] - got).max() <= 1e-14 * np.abs(got).max()
+
+
+def test_documentation_lists_every_quantity():
+    assert all(f"``{name}``" in kl.Result.at_integration_points.__doc__ for name in QUANTITIES)
+
+
+def test_energy_is_the_sum_over_integration_points(solved):
+    result = solved[2]
+    density, weight = map(result.at_integration_points, ("STRAIN_ENERGY", "INTEGRATION_WEIGHT"))
+    assert abs((density * weight).sum() - result.energy()) < 1e-12 * result.energy()
+
+
+def test_elements_with_different_rules_give_a_list():
+    mesh = kl.box(cells=(2, 1, 1))
+    model = held_model(mesh, 1e-3 * mesh.points)
+    model.use_rule(3, [1])
+    values = model.solve().at_integration_points("CAUCHY_STRESS_VECTOR")
+    assert [value.shape for value in values] == [(8, 6), (27, 6)]
+
+
+def test_unknown_quantities_and_elements_are_named():
+    result = held_model(kl.box(), np.zeros((8, 3))).solve()
+    with pytest.raises(kl.InputError, match=r"must be one of CAUCHY_STRESS_VECTOR, .*Did you mean VON_MISES"):
+        result.at_integration_points("VON_MISES")
+    with pytest.raises(kl.MeshError, match="no element has the id 7; ids run from 1 to 1"):
+        result.at_integration_points("STRAIN", element=7)
+    with pytest.raises(kl.MeshError, match="id of an element must be a whole number"):
+        result.at_integration_points("STRAIN", element="one")
+
+
+# ---- anywhere in the mesh ----------------------------------------------------------------------------
+
+
+def quadratic(X):
+    """Return a displacement (n, 3) of second degree, and its strain (n, 6)."""
+    x, y, z = X.T
+    u = np.array([x * x + y * z, 2 * x * y - z, y * y - 3 * x * z + x]).T
+    zero = np.zeros_like(x)
+    return 1e-3 * u, 1e-3 * np.array([2 * x, 2 * x, -3 * x, z + 2 * y, -1 + 2 * y, y - 3 * z + 1 + zero]).T
+
+
+def linear(X):
+    A = 1e-3 * np.array([[1.0, 2.0, 0.5], [-1.0, 3.0, 1.0], [0.0, 4.0, 2.0]])
+    return X @ A.T, np.tile(voigt((A + A.T) / 2, 2.0), (len(X), 1))
+
+
+def inner_points(count=40):
+    return np.random.default_rng(2).uniform(0.1, 0.5, (count, 3)) * [1.6, 1.2, 1.0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_strains_at_points_of_a_field_that_the_element_holds_are_exact(kind):
+    regular = kl.box((1.0, 0.8, 0.6), (2, 1, 1), element=kind)
+    mesh, field = (regular, quadratic) if kind[-3:] in ("10N", "20N", "27N") else (distorted(kind), linear)
+    result, points = held_model(mesh, field(mesh.points)[0]).solve(), inner_points()
+    u, strain = field(points)
+    assert np.abs(result.displacement(at=points) - u).max() < 1e-13
+    assert np.abs(result.strain(at=points) - strain).max() < 1e-13
+    stress = strain * ([2 * MU] * 3 + [MU] * 3)
+    stress[:, :3] += LAM * strain[:, :3].sum(axis=1, keepdims=True)
+    assert np.abs(result.stress(at=points) - stress).max() < 1e-12 * np.abs(stress).max()
+    assert result.von_mises(at=points).shape == (40,)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_values_at_gauss_points_are_found_again_by_their_places(kind):
+    mesh = distorted(kind)
+    u = 1e-3 * np.random.default_rng(1).uniform(-1, 1, mesh.points.shape)
+    model = held_model(mesh, u)
+    model.stress_free_at(u[::-1])
+    model.add_prestress(np.arange(6.0 * mesh.n_elements).reshape(-1, 6))
+    result = model.solve()
+    places = result.at_integration_points("INTEGRATION_COORDINATES")
+    for at_gauss, at_points in (
+        (result.strain(), result.strain(at=places)),
+        (result.stress(), result.stress(at=places)),
+    ):
+        assert np.abs(at_points - at_gauss).max() < 1e-10 * np.abs(at_gauss).max()
+
+
+def test_points_may_be_one_none_or_located_before():
+    mesh = distorted("KinematicLinear3D8N")
+    result = held_model(mesh, linear(mesh.points)[0]).solve()
+    point = [0.4, 0.4, 0.3]
+    assert result.strain(at=point).shape == (6,)
+    assert result.stress(at=np.zeros((0, 3))).shape == (0, 6)
+    located = mesh.locate([point, [9.0, 9.0, 9.0]])
+    inside = result.stress(at=located[located.inside])
+    assert (inside == result.stress(at=[point])).all()
+
+
+def test_a_point_outside_the_mesh_is_an_error_that_says_how_far():
+    result = held_model(kl.box(), np.zeros((8, 3))).solve()
+    for method in (result.stress, result.strain, result.von_mises, result.displacement):
+        with pytest.raises(kl.MeshError, match=r"point 1 at .* lies outside the mesh"):
+            method(at=[[0.5, 0.5, 0.5], [2.0, 0.5, 0.5]])
+    with pytest.raises(kl.InputError, match="located in another mesh"):
+        result.stress(at=kl.box(cells=(2, 1, 1)).locate([0.5, 0.5, 0.5]))
+    with pytest.raises(kl.InputError, match="not both"):
+        result.displacement("x-", at=[0.5, 0.5, 0.5])
+
+
+def test_own_b_operator_gives_the_strain_at_points():
+    with kl.ELEMENTS.temporary():
+
+        class TwiceTheStrain(kl.KinematicLinear3D8N):
+            def B(self, xi):
+                return 2 * super().B(xi)
+
+        class OwnStrainAlone(kl.KinematicLinear3D8N):
+            def strain(self, u):
+                return 3 * super().strain(u)
+
+        mesh = kl.box(element="TwiceTheStrain")
+        u, strain = linear(mesh.points)
+        result = held_model(mesh, u).solve()
+        assert np.abs(result.strain(at=[[0.2, 0.7, 0.4]]) - 2 * strain[0]).max() < 1e-15
+        result = held_model(kl.box(element="OwnStrainAlone"), u).solve()
+        with pytest.raises(kl.InputError, match="OwnStrainAlone has its own strain"):
+            result.strain(at=[0.2, 0.7, 0.4])
+
+
+def test_states_of_a_transient_have_stresses_at_points():
+    bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0, density=1000.0))
+    bar.fix("z-")
+    bar.add(kl.Traction("z+", (0, 0, 1e3)))
+    transient = bar.transient()
+    *_, state = kl.integrate(transient, dt=1e-3, steps=20)
+    stress = transient.result(state).stress(at=[0.3, 0.3, 0.3])
+    top = state.u[bar.mesh.nodes("z+"), 2].mean()
+    assert abs(stress[2] - 1e6 * top) < 1e-9 * abs(stress[2])

@@ -1,0 +1,191 @@
+"""Sizes that are absurd, in files and arguments: refused in words before memory or time is spent on them."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import zipfile
+
+import meshio
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import validation
+from kratos_lite.io.formats import foreign
+from kratos_lite.io.formats.vtu import write_vtu
+
+
+@pytest.fixture
+def msh(tmp_path):
+    """Write a tetrahedron as .msh, with some bytes replaced."""
+
+    def write(old, new):
+        path = tmp_path / "broken.msh"
+        mesh = meshio.Mesh(np.eye(4, 3), [("tetra", [[0, 1, 2, 3]])])
+        mesh.write(path, file_format="gmsh", binary=False)
+        data = path.read_bytes()
+        assert old in data
+        path.write_bytes(data.replace(old, new, 1))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"$Nodes\n1 4 1 4", b"$Nodes\n1 4000000000000 1 4"),
+        (b"3 0 4 1\n", b"3 0 4 1000000000000\n"),
+        (b"3 0 0 4\n", b"3 0 0 400000000000\n"),
+    ],
+)
+def test_a_gmsh_file_with_an_absurd_count_is_refused_within_its_memory(msh, old, new, run, tmp_path):
+    run("convert", msh(old, new), tmp_path / "out.vtu").refuses("broken.msh: meshio needs more memory")
+    assert not (tmp_path / "out.vtu").exists()
+
+
+def test_a_file_in_which_meshio_never_ends_is_given_up_and_the_next_one_is_read(monkeypatch, run, tmp_path):
+    monkeypatch.setattr(foreign, "SECONDS", 0.1)
+    (tmp_path / "cut.bdf").write_text("BEGIN BULK\n")
+    run("convert", tmp_path / "cut.bdf", tmp_path / "out.vtu").refuses("does not end within", "Save it anew")
+    kl.write(tmp_path / "good.msh", kl.box())
+    assert kl.read(tmp_path / "good.msh").mesh.n_elements == 1
+
+
+def test_a_gzip_bomb_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("kratos_lite.io.text.free_memory", lambda: 4e7)
+    path = tmp_path / "bomb.mdpa.gz"
+    path.write_bytes(gzip.compress(b"//" + b" " * 3 * 10**7, 1))
+    with pytest.raises(kl.InputError, match=r"bomb\.mdpa\.gz: holds more than 0\.01 GB when unzipped"):
+        kl.read(path)
+
+
+@pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D27N"])
+def test_a_box_that_no_memory_holds_is_refused_at_once(element):
+    with pytest.raises(kl.InputError, match=r"bricks has [16]e"):
+        kl.box(cells=(10**6,) * 3, element=element)
+    with pytest.raises(kl.InputError, match="bricks has"):
+        kl.annulus(1.0, 2.0, 1.0, cells=(1e300, 3, 1))
+
+
+def test_a_box_larger_than_the_free_memory_is_refused_with_both_numbers(monkeypatch):
+    monkeypatch.setattr(validation, "free_memory", lambda: 1e8)
+    with pytest.raises(kl.InputError, match=r"about 0\.48 GB of memory; 0\.1 GB are free; take fewer cells"):
+        kl.box(cells=(100, 100, 100))
+
+
+def test_the_memory_asked_for_is_near_what_a_box_takes():
+    import tracemalloc
+
+    cells = (20, 20, 20)
+    for element in ("KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D20N"):
+        tracemalloc.start()
+        mesh = kl.box(cells=cells, element=element)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 60 * mesh.blocks[0].nodes.size
+
+
+def scene(tmp_path, **more):
+    content = {
+        "mesh": {"box": {"size": [1, 1, 1]}},
+        "material": {"E": 1e6, "nu": 0.3, "density": 1000},
+        "body": "rigid",
+        "time": {"step": 0.01, "steps": 10},
+    }
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(content | more))
+    return path
+
+
+def test_a_scene_with_an_absurd_number_of_steps_is_refused_at_its_place(tmp_path, run):
+    path = scene(tmp_path, time={"step": 1e-9, "steps": 10**15})
+    run("solve", path).refuses(
+        "scene.json:1:", "1000000000000000 steps are more than 1000000000; take longer ones"
+    )
+    run("solve", scene(tmp_path), "--time", "1e-9:10000000000").refuses(
+        "10000000000 steps are more than 1000000000"
+    )
+
+
+def test_states_that_memory_cannot_hold_are_refused_before_the_first_step(tmp_path, run, monkeypatch):
+    monkeypatch.setattr(validation, "free_memory", lambda: 1e9)
+    path = scene(tmp_path, time={"step": 1e-6, "steps": 10**7}, output={"npz": "all.npz"})
+    run("solve", path).refuses("a series of 10000001 states needs about", "keep fewer of them, with every")
+    assert [p.name for p in tmp_path.iterdir()] == ["scene.json"]
+
+
+def test_frames_that_the_disk_cannot_hold_are_refused_before_the_first_step(tmp_path, run, monkeypatch):
+    import shutil
+    from types import SimpleNamespace
+
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=10**6))
+    path = scene(tmp_path, time={"step": 1e-3, "steps": 10**4}, output={"pvd": "all.pvd"})
+    run("solve", path).refuses("all.pvd: 10001 frames need about", "0.001 GB are free on the disk")
+    assert [p.name for p in tmp_path.iterdir()] == ["scene.json"]
+
+
+def test_a_step_that_needs_absurdly_many_substeps_is_refused(tmp_path, run):
+    stiff = {"E": 1e30, "nu": 0.3, "density": 1e-3}
+    body = {"kind": "finite-element", "integrator": "explicit"}
+    path = scene(tmp_path, material=stiff, body=body, time={"step": 1.0, "steps": 1, "substeps": "auto"})
+    run("solve", path).refuses("more than 1000000 substeps", "take shorter steps")
+
+
+def zipped(path, **entries):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, data in entries.items():
+            file.writestr(f"{name}.npy", data)
+
+
+def array(value):
+    stream = io.BytesIO()
+    np.save(stream, value)
+    return stream.getvalue()
+
+
+def test_a_state_that_states_more_numbers_than_it_holds_is_refused(tmp_path):
+    path = tmp_path / "state.npz"
+    head = {
+        "kind": np.array("rigid"),
+        "integrator": np.array("x"),
+        "time": np.array(0.0),
+        "step": np.array(0),
+    }
+    entries = {name: array(value) for name, value in head.items()}
+    good = array(np.zeros(2))
+    absurd = good.replace(b"(2,), }" + b" " * 11, b"(999999999999,), }")
+    assert absurd != good
+    assert len(absurd) == len(good)
+    zipped(path, **entries, q=absurd, u=good, external_work=array(np.array(0.0)))
+    with pytest.raises(
+        kl.InputError, match=r"state\.npz: not a state that kl\.write wrote, or not all of it"
+    ):
+        kl.read_state(path)
+
+
+def test_a_state_with_numbers_that_are_none_is_refused(tmp_path):
+    body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    state = kl.State.of(body)
+    state.values["u"][0] = np.nan
+    with pytest.raises(kl.SolveError, match=r"s\.npz: not written: u is not finite"):
+        kl.write(tmp_path / "s.npz", state)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".vtk", ".mdpa", ".elem", ".msh"])
+def test_a_mesh_with_a_coordinate_that_is_no_number_is_not_written(tmp_path, ending):
+    mesh = kl.box()
+    mesh.points[3, 1] = np.nan
+    with pytest.raises(kl.KratosLiteError, match="not finite"):
+        kl.write(tmp_path / f"a{ending}", mesh)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_field_that_is_not_finite_is_not_written(tmp_path):
+    mesh = kl.box()
+    with pytest.raises(kl.SolveError, match=r"a\.vtu: not written: T is not finite"):
+        write_vtu(tmp_path / "a.vtu", mesh, {"T": np.full(8, np.inf)})
+    assert not list(tmp_path.iterdir())
