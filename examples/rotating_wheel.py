@@ -12,7 +12,8 @@ import numpy as np
 import kratos_lite as kl
 
 mesh = kl.annulus(0.3, 1.0, 0.25, cells=(4, 64, 1), element="KinematicLinear3D20N")  # m
-mesh.points = np.column_stack([mesh.points[:, 0], 0.25 - mesh.points[:, 2], mesh.points[:, 1]])  # axis is -y
+x, y, z = mesh.points.T
+mesh = mesh.replace(points=np.column_stack([x, 0.25 - z, y]))  # axis is -y
 rubber = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)  # Pa, –, kg/m³
 p0, width = 4e6, 0.15  # Pa, rad
 

@@ -83,6 +83,15 @@ class Problems:
             raise self.kind(text)
 
 
+RENAMED = {
+    **{"scheme": "integrator", "form": "formulation", "factor": "amplitude", "factors": "values"},
+    **{"ends": "boundaries", "march": "time", "characteristics": "mass_properties", "link": "constrain"},
+    **{f"set_{what}": f"prescribed_{what}" for what in ("displacement", "velocity", "acceleration")},
+    **{"pvd": "output", "csv": "output", "npz": "output", "generalised_alpha": "generalized_alpha"},
+}
+"""Words that other programs, or earlier versions, have for what is known here by another word."""
+
+
 def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     """Return a hint that names the known words closest to `name`, or an empty string.
 
@@ -91,5 +100,8 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     """
     from difflib import get_close_matches
 
-    close = get_close_matches(name, list(known), n=count, cutoff=0.6)
+    known = list(known)
+    if RENAMED.get(name) in known:
+        return f" It is called {RENAMED[name]} here."
+    close = get_close_matches(name, known, n=count, cutoff=0.6)
     return f" Did you mean {' or '.join(close)}?" if close else ""

@@ -9,6 +9,7 @@ to check               write
 an array               ``finite(value, what, (3,))``, ``finite(value, what, ("n", 3))``
 a number               ``number(value, what)``, with ``above=``, ``least=``, ``below=``
 a whole number         ``whole_number(value, what)``, with ``least=``, ``most=``
+whole numbers          ``whole_numbers(value, what, ("n",))``, with ``size=`` for rows of something
 one of some names      ``choice(value, what, names)``
 True or False          ``flag(value, what)``
 a function or None     ``function_or_none(value, what)``
@@ -27,11 +28,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, KratosLiteError, nearest
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Numbers
 
 T = TypeVar("T")
+AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 SMALL = 1e7
 """Bytes that every machine has; nobody asks for the free memory before."""
 
@@ -73,12 +76,76 @@ def finite(
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what} must be made of real numbers; got {short(value)}") from None
     if shape is not None and not _has(array.shape, shape):
-        axes = ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "")
-        raise error(f"{what} must have shape ({axes}); got {array.shape}")
+        raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
     if not np.isfinite(array).all():
-        found = value if array.size < 10 else float(array[~np.isfinite(array)][0])
-        raise error(f"{what} must be finite; got {short(found)}")
+        first = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
+        found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
+        raise error(f"{what} must be finite; got {found}")
     return array
+
+
+def whole_numbers(
+    value: Any,
+    what: str,
+    shape: tuple[int | str, ...] | None = None,
+    *,
+    size: int | None = None,
+    dtype: type[np.signedinteger[Any]] = np.int64,
+    error: type[KratosLiteError] = InputError,
+) -> Numbers:
+    """Return an array of whole numbers, such as rows and ids; an empty list is one, too.
+
+    Parameters
+    ----------
+    shape : lengths of the axes; a word such as ``"n"`` stands for any length.
+    size : of what has these rows, which must lie in 0 … size - 1.
+    dtype : of the array returned.
+
+    Raises
+    ------
+    InputError
+        If it is made of anything else, has another shape, or a row does not exist.
+
+    Examples
+    --------
+    >>> whole_numbers([3, 1], "rows", ("n",), size=4)
+    array([3, 1])
+    >>> whole_numbers([0.5], "rows")
+    Traceback (most recent call last):
+    kratos_lite.errors.InputError: rows must be whole numbers; got [0.5]
+    """
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        array = np.asarray(None)
+    axes = "" if shape is None else f" of shape ({_axes(shape)})"
+    if array.dtype.kind not in "iu" and (array.size or array.dtype.kind != "f"):
+        raise error(f"{what} must be whole numbers{axes}; got {short(value)}")
+    if shape is not None and not _has(array.shape, shape):
+        raise error(f"{what} must be whole numbers{axes}; got shape {array.shape}")
+    low, high = (int(array.min()), int(array.max())) if array.size else (0, -1)
+    if size is not None and not 0 <= low <= high + 1 <= size:
+        raise error(f"{what} must lie in 0 … {size - 1}; got {low} … {high}")
+    ends = np.iinfo(dtype)
+    if low < ends.min or high > ends.max:
+        raise error(f"{what} must be below 2^{ends.bits - 1}; got {high}")
+    return array.astype(dtype, copy=False)
+
+
+def read_only(array: AnyArray) -> AnyArray:
+    """Return an array that nobody can change: itself if it is one, else a copy.
+
+    >>> read_only(np.zeros(3)).flags.writeable
+    False
+    """
+    if array.flags.writeable or array.base is not None:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
+
+
+def _axes(shape: tuple[int | str, ...]) -> str:
+    return ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "")
 
 
 def _has(found: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:

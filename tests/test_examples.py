@@ -55,7 +55,7 @@ def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     out = run(sys.executable, "-W", "error", script, cwd=tmp_path)
     if page == "ale.md":
         lines = re.findall(r"^kratos-lite (.*)$", (EXAMPLES.parent / "docs" / page).read_text(), re.M)
-        assert len(lines) == 4
+        assert len(lines) == 6
         for line in lines:
             run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
     if page == "exercises.md":

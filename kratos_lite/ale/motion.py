@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.boundaries import leak
 from kratos_lite.ale.parts import check_ties, moving_nodes
-from kratos_lite.ale.rate import Rate
+from kratos_lite.ale.rate import Rate, vector_rates
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
@@ -93,11 +93,12 @@ class Motion(Attachment):
         self.steady = self._rate.steady
         self.damping = number(damping, "a damping", least=0, unit="1/s")
         self.part = part
+        self._center = vector_rates((0.0, 0.0, 0.0), None, "a center")
         self.A, self.center, self.drift = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
 
     def __str__(self) -> str:
         when = "" if self.steady else " at the time 0"
-        where = "" if self.part is None else f", part {self.part!r:.40}"
+        where = f", part {self.part!r}" if isinstance(self.part, (str, int)) else ""
         name = type(self).__name__
         return f"{name} {self.direction.tolist()}, rate {self.rate(0.0):g}{when}{where}"
 
@@ -127,17 +128,18 @@ class Motion(Attachment):
         -------
         (3,) m/s and (3,) m/s².
         """
-        return np.zeros(3), np.zeros(3)
+        velocity, acceleration = np.transpose([one.at(time, step, steady) for one in self._center])
+        return velocity, acceleration
 
     @property
     def travels(self) -> bool:
         """Whether the body as a whole moves in space with its center."""
-        return False
+        return any(not one.steady or one.value(0.0) for one in self._center)
 
     @property
-    def is_carried_evenly(self) -> bool:
-        """Whether the acceleration of the center never changes."""
-        return True
+    def uniformly_accelerated(self) -> bool:
+        """Whether Z̈ never changes."""
+        return not any(one.is_changing for one in self._center)
 
     def moving(self, mesh: Mesh) -> Mask:
         """Return the nodes of the elements that move.
@@ -263,12 +265,12 @@ class Motion(Attachment):
         return leak(mesh, self.field, self.moving(mesh), self.open_faces(mesh))
 
     def attach(self, structure: Structure) -> None:
-        """Become the motion of a structure.
+        """Become the motion of a structure, and tie or fix its boundaries if asked for.
 
         Raises
         ------
         ModelError
-            It has a motion already, or is not a body that may move so.
+            It has a motion already, is not a body that may move so, or its boundaries cannot be tied.
         """
         if structure.motion is not None:
             raise ModelError("the model has a motion already; there is one")
@@ -278,7 +280,11 @@ class Motion(Attachment):
                 f"the body is not {self.alike[0]} the axis {self.direction.tolist()}: {share:.0%} of the "
                 f"velocity passes through its boundary; {self.cure}"
             )
+        self._bind(structure)
         structure.motion = self
+
+    def _bind(self, structure: Structure) -> None:
+        """Tie or fix boundaries."""
 
     def warnings(self, structure: Structure, groups: Sequence[ElementGroup]) -> list[str]:
         """Return the warnings about the motion of a structure, except those about its rate.

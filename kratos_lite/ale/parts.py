@@ -32,7 +32,7 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
     shared = np.flatnonzero(moving & resting)
     if len(shared):
         raise ModelError(
-            f"the moving part {part!r:.40} shares {len(shared)} nodes with elements at rest, such as node "
+            f"{mine.sum()} moving elements share {len(shared)} nodes with elements at rest, such as node "
             f"{mesh.node_ids[shared[0]]}: material cannot both flow and rest in one place; give each side "
             "its own nodes, and tie those along the normal of the face with model.constrain"
         )

@@ -84,24 +84,9 @@ class Rotation(Motion):
     ) -> None:
         super().__init__(axis, rate, acceleration, damping=damping, part=part)
         self.center = finite(center, "the center of a rotation", (3,))
-        self._center_rates = vector_rates(center_velocity, center_acceleration, "a center")
+        self._center = vector_rates(center_velocity, center_acceleration, "a center")
         self.skew, self.stiffening = flag(skew, "skew"), flag(stiffening, "stiffening")
         self.A = np.cross(np.eye(3), self.direction).T
-
-    @property
-    def travels(self) -> bool:
-        """Whether the center ever moves."""
-        return any(not one.steady or one.value(0.0) for one in self._center_rates)
-
-    @property
-    def is_carried_evenly(self) -> bool:
-        """Whether the acceleration of the center never changes."""
-        return not any(one.is_changing for one in self._center_rates)
-
-    def center_rates(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[Array, Array]:
-        """Return Ż and Z̈ (3,) at a time."""
-        velocity, acceleration = np.transpose([one.at(time, step, steady) for one in self._center_rates])
-        return velocity, acceleration
 
     def wave_directions(self) -> Array:
         """Return the directions x, y and z (3, 3)."""

@@ -86,15 +86,8 @@ class Translation(Motion):
             return None
         return dashpots(mesh, self.direction, system, self.moving(mesh))
 
-    def attach(self, structure: Structure) -> None:
-        """Become the motion of a structure, and tie or fix its boundaries.
-
-        Raises
-        ------
-        ModelError
-            It has a motion already, is not straight, or its boundaries cannot be tied.
-        """
-        super().attach(structure)
+    def _bind(self, structure: Structure) -> None:
+        """Tie or fix the boundaries."""
         if self.boundaries == "fixed":
             for nodes in self.open_faces(structure.mesh):
                 structure.supports.fix(nodes, "xyz")

@@ -86,7 +86,8 @@ def motion_summary(
     (rate, acceleration), waves = e.rates(time), critical_rate_estimate(e.terms)
     critical = None if critical == np.inf else critical
     noise = 1e-12 * float(np.abs(of.reactions).sum())  # what is left of reactions that balance one another
-    force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in reaction_resultant(e.model, of))
+    carried = reaction_resultant(e.model, of, e.terms.motion.moving(e.model.mesh))
+    force, moment = (np.where(np.abs(v) < noise, 0.0, v) for v in carried)
     return {
         "kind": e.terms.motion.kind,
         "unit": e.terms.motion.unit,

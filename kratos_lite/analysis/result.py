@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -52,13 +51,12 @@ class Result:
         report: Report,
         u0: Array | None = None,
     ) -> None:
-        self.mesh = copy(mesh)
-        self.mesh.points = mesh.points.copy()  # where they were, whatever becomes of the model
+        self.mesh = mesh
         self.groups = list(groups)
         self.u = u
         self.reactions = reactions
         self.loads = loads
-        for array in (u, reactions, loads, self.mesh.points):
+        for array in (u, reactions, loads):
             array.setflags(write=False)  # strains and stresses are made of them later
         self.report = report
         self._strained = u if u0 is None else u - u0

@@ -90,13 +90,13 @@ class State:
         if not isinstance(subject, Body):
             subject.restore(self)
             return
-        q, u = (self.values.get(name, np.zeros(0)) for name in ("q", "u"))
-        if subject.kind != self.kind or subject.q.shape != q.shape or subject.u.shape != u.shape:
-            whose = "model" if self.kind == "model" else f"{self.kind} body with q {q.shape}"
-            raise InputError(
-                f"this is the state of a {whose}; "
-                f"it does not fit a {subject.kind} body with q {subject.q.shape}"
-            )
+        mine, its = ([np.shape(_value(one, name)) for name in BODY_FIELDS] for one in (self, subject))
+        if subject.kind != self.kind or mine != its:
+            shapes = "q {}, u {} and work {}".format
+            whose = "model" if self.kind == "model" else f"{self.kind} body with {shapes(*mine)}"
+            text = f"it does not fit a {subject.kind} body with {shapes(*its)}"
+            raise InputError(f"this is the state of a {whose}; {text}")
+        q, u = self.values["q"], self.values["u"]
         subject.q[...], subject.u[...] = q, u  # bodies that advance together share these arrays
         subject.time, subject.step = self.time, self.step
         subject.integrated_velocity = u.copy() if self.step else None
@@ -108,6 +108,11 @@ class State:
             raise AttributeError(f"the state of a {self.__dict__.get('kind')} has no {name!r}")
         found: Array = values[name]
         return found
+
+
+def _value(owner: State | Body, name: str) -> Array:
+    """Return an array of a state, empty where it has none, or of a body."""
+    return owner.values.get(name, np.zeros(0)) if isinstance(owner, State) else getattr(owner, name)
 
 
 def state_of_body(body: Body, substeps: int = 1) -> State:

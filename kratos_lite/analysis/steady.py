@@ -29,7 +29,7 @@ def solve_steady(
             changing = [
                 f"the rate changes; this is the steady state of {e.rates(0.0)[0]:g}, as at the time 0"
             ]
-        if e.terms is not None and not e.terms.motion.is_carried_evenly:
+        if e.terms is not None and not e.terms.motion.uniformly_accelerated:
             changing.append("the acceleration of the center changes; it is taken as at the time 0")
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kratos_lite.analysis.body_motion import BodyMotion
+from kratos_lite.analysis.body_stepper import BodyStepper
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies.body import Body
@@ -26,7 +26,7 @@ MOST_SUBSTEPS = 1_000_000
 """Parts of one step; more would take the time of a whole run until the first state."""
 
 
-class Motion(Protocol):
+class Stepper(Protocol):
     """What the loop advances."""
 
     def critical_step(self) -> float:
@@ -100,23 +100,23 @@ def integrate(
     count = None if steps is None else whole_number(steps, "steps")
     function_or_none(until, "until must be a function of a state")
     function_or_none(progress, "progress must be a function of a phase and a share")
-    motion: Motion = subject if isinstance(subject, TransientAnalysis) else BodyMotion(subject)
+    stepper: Stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
     if substeps == "auto":
-        critical = motion.critical_step()
+        critical = stepper.critical_step()
         parts = max(1, ceil(min(h / (SAFETY * critical) if critical > 0 else inf, 10.0 * MOST_SUBSTEPS)))
         _log.info("each step of %g s in %d parts; the critical step is %g s", h, parts, critical)
     if parts > MOST_SUBSTEPS:
-        stable = f"; the critical step is {motion.critical_step():.3g} s" if substeps == "auto" else ""
+        stable = f"; the critical step is {stepper.critical_step():.3g} s" if substeps == "auto" else ""
         raise InputError(
             f"a step of {h:g} s has more than {MOST_SUBSTEPS} substeps{stable}; take shorter steps"
         )
-    motion.prepare(h, parts)
-    return _states(motion, h, count, every, until, progress)
+    stepper.prepare(h, parts)
+    return _states(stepper, h, count, every, until, progress)
 
 
 def _states(
-    motion: Motion,
+    stepper: Stepper,
     h: float,
     count: int | None,
     every: int,
@@ -126,21 +126,21 @@ def _states(
     done = 0
     while count is None or done < count:
         chunk = every if count is None else min(every, count - done)
-        motion.advance(h, chunk)
+        stepper.advance(h, chunk)
         done += chunk
-        if motion.diverged():
-            raise _divergence(motion, h)
+        if stepper.diverged():
+            raise _divergence(stepper, h)
         if progress and count:
             progress("integrate", done / count)
-        state = motion.state()
+        state = stepper.state()
         yield state
         if until and until(state):
             return
 
 
-def _divergence(motion: Motion, h: float) -> SolveError:
+def _divergence(stepper: Stepper, h: float) -> SolveError:
     with np.errstate(over="ignore", invalid="ignore"):
-        state = motion.state()
+        state = stepper.state()
     return SolveError(
         f"the motion grows without bound: at t = {state.time:g} s it is no longer finite, or far beyond the "
         f"size of the model; is {state.integrator} stable with steps of {h / state.substeps:g} s "

@@ -96,11 +96,11 @@ def internal_load(
 
 def _moved(
     points: Array, group: ElementGroup, chunk: slice, q: Array, dq: Array | None, damping: float
-) -> tuple[KinematicLinear, lagrange.Motion]:
-    """Return the placed elements of a chunk and their motion."""
+) -> tuple[KinematicLinear, lagrange.Deformation]:
+    """Return the placed elements of a chunk and their deformation."""
     nodes, element = group.nodes[chunk], group.at(points, chunk)
     step = None if dq is None else dq[nodes]
-    at = lagrange.motion(element, group.material.C, q[nodes], step, damping, group.initial_stress(chunk))
+    at = lagrange.deformation(element, group.material.C, q[nodes], step, damping, group.initial_stress(chunk))
     return element, at
 
 

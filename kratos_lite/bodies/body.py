@@ -61,6 +61,8 @@ class Body(FreeBody):
     integrators: ClassVar[Mapping[str, str]] = {}
     """Names of the time integrators of the kind of body, the default first, and their aliases in Solfec."""
     convertible: ClassVar[bool] = True
+    mass_is_given = False
+    """Whether mass properties were given in place of those of mesh and material."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -141,6 +143,20 @@ class Body(FreeBody):
 
     # ---- conversion to another kind --------------------------------------------------------------
 
+    def settings(self) -> dict[str, Any]:
+        """Return the arguments, besides mesh and material, that make another body like this one.
+
+        Returns
+        -------
+        dict, ``mass_properties`` None where they follow from mesh and material.
+        """
+        return {
+            "mass_properties": self.mass_properties if self.mass_is_given else None,
+            "integrator": self.integrator,
+            "damping": self.damping,
+            "tolerance": self.tolerance,
+        }
+
     @abstractmethod
     def affine_motion(self) -> tuple[Array, Array]:
         """Return the affine motion that is nearest to that of the body with respect to mass.
@@ -159,7 +175,7 @@ class Body(FreeBody):
         Parameters
         ----------
         F, rate : (3, 3), deformation gradient and its rate in 1/s.
-        center, velocity : (3,), place and velocity of X̄ in m and m/s.
+        center, velocity : (3,), place of X̄ in m, and velocity of the mass center in m/s.
         angular_momentum : (3,) kg m²/s about the mass center; only a rigid body takes it from here.
         """
 

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+from inspect import signature
 from typing import Any, TypeVar, overload
 
+import numpy as np
+
 from kratos_lite.bodies.body import BODIES, Body
+from kratos_lite.bodies.validation import mass_properties_of
 from kratos_lite.errors import InputError, ModelError
+
+_log = logging.getLogger("kratos_lite")
+ROUND_OFF = 1e-12
+"""Share of the angular momentum that is not worth a correction."""
 
 Kind = TypeVar("Kind", bound=Body)
 
@@ -17,9 +26,13 @@ def convert(body: Body, kind: str, **options: Any) -> Body: ...
 def convert(body: Body, kind: Any, **options: Any) -> Any:
     """Return the body as another kind, in the motion that this kind can have.
 
-    A rigid one gets the rotation by polar decomposition, and keeps both momenta; a pseudo-rigid one the
-    affine motion that is nearest with respect to mass; a finite-element one the affine motion exactly.
-    Loads and constraints do not go along: they are bound to the body that they were added to.
+    A rigid one gets the rotation by polar decomposition; a pseudo-rigid one the affine motion that is nearest
+    with respect to mass; a finite-element one the affine motion.  Linear and angular momentum stay as they
+    are: where mass is distributed otherwise, a rotation is added to the velocity.
+
+    Mass properties that were given, damping, integrator, tolerance and further arguments of the body go along
+    where the kind takes them; `options` replace them.  Loads and constraints do not: they are bound to the
+    body that they were added to.  What does not go along is logged as a warning.
 
     Parameters
     ----------
@@ -34,7 +47,8 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     Raises
     ------
     InputError, ModelError
-        The kind is unknown, or the body has no mesh.
+        The kind is unknown, the body has no mesh, or its mass properties were given and are not those of the
+        mesh that a finite-element body takes them from.
 
     Examples
     --------
@@ -53,10 +67,70 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
         raise ModelError(f"an {body.kind} has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
+    other = _made(body, kind, options)
     F, rate = body.affine_motion()
     center = body.mass_center() + F @ (body.center - body.reference_center())
-    other = kind(body.mesh, body.material, **options)
     velocity = body.linear_momentum() / body.mass
     other.set_affine_motion(F, rate, center, velocity, body.angular_momentum())
+    _turn(other, body.angular_momentum())
     other.time, other.step = body.time, body.step
+    other.external_work = np.array(body.external_work)
+    for what, held in (("loads", body.loads), ("constraints", body.constraints)):
+        if held:
+            _log.warning("%d %s of the %s body do not go along; add them anew", len(held), what, body.kind)
     return other
+
+
+def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
+    """Return a new body at rest with the settings of another."""
+    settings, takes = body.settings(), signature(kind).parameters
+    integrator = settings.pop("integrator")
+    for name in [name for name in settings if name not in takes]:
+        value = settings.pop(name)
+        if name == "mass_properties" and value is not None:
+            _check_mass(body, kind)
+        elif name == "damping" and value:
+            _log.warning("a %s body takes no damping: %g s is left out", kind.kind, value)
+    if "formulation" in options:
+        settings.pop("modes", None)
+    if type(body) is not kind:  # its default is that of the kind
+        settings.pop("tolerance", None)
+    other = kind(body.mesh, body.material, **{**settings, **options})
+    if "integrator" not in options:
+        if integrator in other.integrators:
+            other.integrator = integrator
+        elif integrator != next(iter(body.integrators)):
+            _log.warning(
+                "a %s body has no integrator %s: it takes %s", kind.kind, integrator, other.integrator
+            )
+    return other
+
+
+def _check_mass(body: Body, kind: type[Body]) -> None:
+    """Refuse mass properties that a body takes from its mesh, but that are others."""
+    assert body.mesh is not None
+    assert body.material is not None
+    own = mass_properties_of(body.mesh, body.material)
+    given = body.mass_properties
+    size = float(np.ptp(body.mesh.points, axis=0).max())
+    pairs = ((given.mass, own.mass, 1.0), (given.center, own.center, size), (given.euler, own.euler, size**2))
+    for value, other, scale in pairs:
+        if not np.allclose(value, other, rtol=0, atol=1e-9 * own.mass * scale):
+            raise ModelError(
+                f"the mass of a {kind.kind} body follows from its mesh ({own.mass:g} kg), and the mass "
+                f"properties that were given to this {body.kind} body are others ({given.mass:g} kg); make "
+                "one of a mesh and a density that have them"
+            )
+
+
+def _turn(body: Body, angular_momentum: Any) -> None:
+    """Add the rotation to a velocity that gives the angular momentum about the mass center."""
+    missing = angular_momentum - body.angular_momentum()
+    if np.abs(missing).max() <= ROUND_OFF * np.abs(angular_momentum).max():
+        return
+    u, turns, momenta = body.u.copy(), [], []
+    for axis in np.eye(3):
+        body.set_velocity(angular=axis)
+        turns.append(body.u.copy())
+        momenta.append(body.angular_momentum())
+    body.u[...] = u + np.linalg.solve(np.transpose(momenta), missing) @ np.array(turns)

@@ -51,14 +51,17 @@ class Deformable(Body):
         """
 
     @abstractmethod
-    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
-        """Solve K(q) x = residual + H^T multipliers with H x = -gap: one step towards equilibrium.
+    def solve_static(
+        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
+    ) -> tuple[Array, Array]:
+        """Solve (K(q) - A) x = residual + H^T multipliers with H x = -gap: one step towards equilibrium.
 
         Parameters
         ----------
         residual : (dofs,), loads less internal load.
         entries : rows, dofs and values (k,) of H (c, dofs).
         gap : (c,) m.
+        tangent : rows, dofs and values of A, the derivative of loads and reactions with respect to q.
 
         Returns
         -------

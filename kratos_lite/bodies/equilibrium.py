@@ -7,7 +7,7 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
-from kratos_lite.bodies.linear_algebra import Entries
+from kratos_lite.bodies.linear_algebra import Entries, sum_of
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.typing import Array, Progress
 
@@ -29,8 +29,8 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Parameters
     ----------
-    body : pseudo-rigid or finite-element; constraints must hold it, for the tangent is that of the body
-        alone: springs and pressures that follow count as loads, and must be weak beside its stiffness.
+    body : pseudo-rigid or finite-element, held by constraints or springs.  A `Callback` that depends on the
+        configuration counts as a load without a derivative, and must be weak beside the other stiffness.
     progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
 
     Returns
@@ -78,17 +78,19 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     body.q = start
     raise SolveError(
         f"no equilibrium was found: {failed}; is the body held by constraints "
-        "(springs alone do not hold it), and are the loads not too large?"
+        "or springs, and are the loads not too large?"
     )
 
 
 def _increment(body: Deformable, start: Array, share: float, progress: Progress | None) -> int:
     """Find the equilibrium under a share of the loads; return the number of iterations."""
     initial, noise = _gap(body, start), ROUND_OFF * body.extent()
+    multipliers = np.zeros(len(initial))
     for iteration in range(1, NEWTON_MAX + 1):
-        load = share * body.external_load(body.q)
+        left = share * _load(body) - body.internal_load(body.q)
         gap = _gap(body, body.q) - (1 - share) * initial
-        step, multipliers = body.solve_static(load - body.internal_load(body.q), _entries(body), gap)
+        tangent = _tangent(body, share, multipliers)
+        step, multipliers = body.solve_static(left, _entries(body), gap, tangent)
         largest = float(np.abs(step).max())
         if not np.isfinite(largest):
             break
@@ -106,6 +108,23 @@ def _gap(body: Deformable, q: Array) -> Array:
     """Return by how much the constraints are missed in m."""
     gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
     return np.concatenate([np.zeros(0), *gaps])
+
+
+def _load(body: Deformable) -> Array:
+    """Return the generalized load on the body at rest, (dofs,)."""
+    return body.external_load(body.q, u=np.zeros_like(body.u))
+
+
+def _tangent(body: Deformable, share: float, multipliers: Array) -> Entries:
+    """Return the derivative of a share of the loads, and of the reactions, with respect to q."""
+    rest, at, parts = np.zeros_like(body.u), 0, []
+    for load in body.loads:
+        row, column, value = load.derivative(body.q, rest, body.time)
+        parts.append((row, column, share * value))
+    for constraint in body.constraints:
+        parts += constraint.tangent_entries(body, body.q, multipliers[at : at + constraint.count])
+        at += constraint.count
+    return sum_of(parts)
 
 
 def _entries(body: Deformable) -> Entries:
@@ -129,7 +148,7 @@ def _balance(body: Deformable, share: float, multipliers: Array) -> None:
         row, dof, value = constraint.jacobian_entries(body, body.q)
         np.add.at(reaction, dof, own[row] * value)
         at += constraint.count
-    load, inner = share * body.external_load(body.q), body.internal_load(body.q)
+    load, inner = share * _load(body), body.internal_load(body.q)
     left = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
     K = body.stiffness(body.q)

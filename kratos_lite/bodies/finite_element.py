@@ -6,6 +6,7 @@ Source: Solfec-1.0 theory, finite-element bodies.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,6 +94,7 @@ class FiniteElementBody(Deformable):
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
         self.formulation = FORMULATIONS[formulation](self.points, self.groups, self._mass, modes)
+        self._modes = modes
         self.integrators = {  # type: ignore[misc]
             word: alias for word, alias in self.integrators.items() if word not in self.formulation.without
         }
@@ -180,9 +182,13 @@ class FiniteElementBody(Deformable):
         self, F: Array, rate: Array, center: Array, velocity: Array, angular_momentum: Array
     ) -> None:
         """Move the nodes along; see `Body.set_affine_motion`."""
-        arms = self.points - self.center
-        self.set_configuration(arms @ F.T + center - self.points)
-        self.u = (arms @ rate.T + velocity).ravel()
+        self.set_configuration((self.points - self.center) @ F.T + center - self.points)
+        self.u = ((self.points - self.reference_center()) @ rate.T + velocity).ravel()
+
+    def settings(self) -> dict[str, Any]:
+        """Return those of all bodies, formulation, modes and kind of mass; see `Body.settings`."""
+        own = {"formulation": self.formulation.name, "modes": self._modes, "lumped": self.lumped}
+        return {**super().settings(), **own}
 
     def elements(self) -> list[ElementGroup]:
         """Return the elements; see `Body.elements`."""
@@ -227,6 +233,10 @@ class FiniteElementBody(Deformable):
     def generalized_nodal_force(self, forces: Array, q: Array) -> Array:
         """Return the nodal forces as (3n,); see `Body.generalized_nodal_force`."""
         return forces.ravel()
+
+    def generalized_nodal_tangent(self, entries: Entries) -> Entries:
+        """Return the entries as they are; see `FreeBody.generalized_nodal_tangent`."""
+        return entries
 
     def convected(self, vector: Array, X: Array, q: Array) -> Array:
         """Return F(X) times the vector; see `Body.convected`."""
@@ -305,9 +315,11 @@ class FiniteElementBody(Deformable):
         """
         return self.formulation.increment_solver(q, dq, damping, c)
 
-    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+    def solve_static(
+        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
+    ) -> tuple[Array, Array]:
         """Return step and multipliers; see `Deformable.solve_static`."""
-        return sparse_step(self.stiffness(), self.points, residual, entries, gap)
+        return sparse_step(self.stiffness(), self.points, residual, entries, gap, tangent)
 
     def extent(self) -> float:
         """Return the largest side of the undeformed body in m."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.bodies.linear_algebra import Solve
+from kratos_lite.bodies.linear_algebra import Entries, Solve
 from kratos_lite.bodies.validation import Material, elements_of, mass_properties_of
 from kratos_lite.errors import ModelError
 from kratos_lite.materials import Isotropic3D
@@ -198,6 +198,24 @@ class FreeBody(ABC):
         -------
         (..., dofs) float.
         """
+
+    def generalized_nodal_tangent(self, entries: Entries) -> Entries:
+        """Return what forces on the nodes that change with their places do; see `generalized_nodal_force`.
+
+        Parameters
+        ----------
+        entries : of the derivative of the forces (3n,) with respect to the places (3n,), in N/m.
+
+        Returns
+        -------
+        Entries of the derivative of the generalized force with respect to q.
+
+        Raises
+        ------
+        ModelError
+            Configurations of this kind of body form no linear space.
+        """
+        raise ModelError(f"loads of a {self.kind} body have no tangent")
 
     def generalized_torque(self, torque: Array, q: Array) -> Array:
         """Return what a torque does; see `generalized_force`.

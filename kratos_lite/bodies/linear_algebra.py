@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -14,6 +14,21 @@ Solve: TypeAlias = Callable[[Array], Array]
 """Returns x of A x = b for a matrix A made ready before; b is one right side or columns of them."""
 Entries: TypeAlias = tuple[Ints, Ints, Array]
 """Rows, columns and values of a sparse matrix."""
+
+
+NO_ENTRIES: Entries = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+
+
+def sum_of(parts: Iterable[Entries]) -> Entries:
+    """Return the entries of a sum of sparse matrices."""
+    row, column, value = zip(NO_ENTRIES, *parts, strict=True)
+    return np.concatenate(row), np.concatenate(column), np.concatenate(value)
+
+
+def block_entries(rows: Ints, columns: Ints, values: Array) -> Entries:
+    """Return the entries of full blocks (..., r, c) that stand in rows (..., r) and columns (..., c)."""
+    row, column = np.broadcast_arrays(rows[..., :, None], columns[..., None, :])
+    return row.ravel(), column.ravel(), np.asarray(values).ravel()
 
 
 def first(failed: NDArray[np.bool_]) -> int:

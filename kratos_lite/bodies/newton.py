@@ -14,14 +14,14 @@ from kratos_lite.typing import Array, Ints
 
 
 def dense_step(K: Array, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
-    """Return x (n,) and multipliers (c,) for a full matrix K (k, k), k ≤ n, that leaves the rest free.
+    """Return x (n,) and multipliers (c,) for a full matrix K (n, n), which may be singular.
 
     Least squares: a body that loads do not move needs no support, and redundant supports share their load.
     """
-    n, c, k = len(residual), len(gap), len(K)
+    n, c = len(residual), len(gap)
     row, dof, value = entries
     A = np.zeros((n + c, n + c))
-    A[:k, :k] = K
+    A[:n, :n] = K
     A[n + row, dof], A[dof, n + row] = value, value
     size = np.abs(K).max()
     scale = np.concatenate([np.full(n, size**-0.5), np.full(c, size**0.5)])
@@ -31,28 +31,42 @@ def dense_step(K: Array, residual: Array, entries: Entries, gap: Array) -> tuple
 
 
 def sparse_step(
-    K: BlockMatrix, points: Array, residual: Array, entries: Entries, gap: Array
+    K: BlockMatrix, points: Array, residual: Array, entries: Entries, gap: Array, tangent: Entries
 ) -> tuple[Array, Array]:
-    """Return x (3n,) and multipliers (c,) for a matrix K (3n, 3n) on points (n, 3)."""
+    """Return x (3n,) and multipliers (c,) for a matrix K less a tangent (3n, 3n) on points (n, 3)."""
     row, dof, value = entries
+    symmetric = not len(tangent[0])
+    if not symmetric:
+        K = _less(K, tangent)
     if len(row) == len(gap) and len(set(row.tolist())) == len(row):  # each row prescribes one displacement
-        return _eliminated(K, points, residual, dof, value, gap)
+        return _eliminated(K, points, residual, dof, value, gap, symmetric)
     return _with_multipliers(K, residual, entries, gap)
 
 
 def _eliminated(
-    K: BlockMatrix, points: Array, residual: Array, dof: Ints, value: Array, gap: Array
+    K: BlockMatrix, points: Array, residual: Array, dof: Ints, value: Array, gap: Array, symmetric: bool
 ) -> tuple[Array, Array]:
     n = len(residual)
     prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
     prescribed[dof], free[dof] = -gap / value, False
     constraints = ConstraintMap(np.flatnonzero(free), prescribed)
     method, reason = solvers.choose("auto", len(constraints.free), n)
+    method = method if symmetric or method == "dense" else "direct"
     matrix: Any = K if method != "dense" else K.scipy().toarray()
-    x = solvers.LinearSolver(matrix, constraints, points, method, reason).solve(residual, 1e-12).x
+    solver = solvers.LinearSolver(matrix, constraints, points, method, reason, symmetric=symmetric)
+    x = solver.solve(residual, 1e-12).x
     reaction = (K @ x - residual)[dof] / value
     twice = np.bincount(dof, minlength=n)[dof]
     return x, np.asarray(reaction / twice)
+
+
+def _less(K: BlockMatrix, tangent: Entries) -> BlockMatrix:
+    from scipy.sparse import bsr_array, csr_array
+
+    row, column, value = tangent
+    A = bsr_array(K.scipy().tocsr() - csr_array((value, (row, column)), shape=K.shape), blocksize=(3, 3))
+    A.sort_indices()
+    return BlockMatrix(A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32))
 
 
 def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:

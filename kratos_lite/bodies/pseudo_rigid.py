@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.affine import AffineBody
 from kratos_lite.bodies.deformable import Deformable
-from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, transposed
+from kratos_lite.bodies.linear_algebra import Entries, Solve, apply, block_entries, transposed
 from kratos_lite.bodies.newton import dense_step
 from kratos_lite.bodies.rotations import axial, hat
 from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
@@ -72,6 +72,7 @@ class PseudoRigidBody(AffineBody, Deformable):
                 raise InputError("a pseudo-rigid body is of one material; FiniteElementBody takes several")
             (material,) = material.values()
         material = checked_material(material)
+        self.mass_is_given = mass_properties is not None
         if mass_properties is None:
             if mesh is None:
                 raise InputError("a pseudo-rigid body needs a mesh, or its mass_properties")
@@ -149,6 +150,16 @@ class PseudoRigidBody(AffineBody, Deformable):
         resultant = np.broadcast_to(forces.sum(axis=0), (*q.shape[:-1], 3))
         return np.concatenate([moment.reshape(*moment.shape[:-2], 9), resultant], axis=-1)
 
+    def generalized_nodal_tangent(self, entries: Entries) -> Entries:
+        """Return G^T A G as a full matrix, x = G q + const; see `FreeBody.generalized_nodal_tangent`."""
+        assert self.mesh is not None
+        row, column, value = entries
+        arms = self.mesh.points - self.center
+        G = np.einsum("ij,na->nija", np.eye(3), arms).reshape(-1, 9)
+        G = np.hstack([G, np.tile(np.eye(3), (len(arms), 1))])
+        dofs = np.arange(12)
+        return block_entries(dofs, dofs, G[row].T @ (value[:, None] * G[column]))
+
     def times_mass(self, v: Array) -> Array:
         """Return V̇ E0 row by row and m v̄; see `Body.times_mass`."""
         rows = (self.matrix_of(v) @ self.mass_properties.euler).reshape(*v.shape[:-1], 9)
@@ -216,9 +227,14 @@ class PseudoRigidBody(AffineBody, Deformable):
         squares = np.linalg.eigvalsh(L @ K @ np.swapaxes(L, -1, -2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
-    def solve_static(self, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
+    def solve_static(
+        self, residual: Array, entries: Entries, gap: Array, tangent: Entries
+    ) -> tuple[Array, Array]:
         """Return step and multipliers; see `Deformable.solve_static`."""
-        return dense_step(self.stiffness(), residual, entries, gap)
+        K = np.zeros((self.dofs, self.dofs))
+        K[:9, :9] = self.stiffness()
+        np.subtract.at(K, tangent[:2], tangent[2])
+        return dense_step(K, residual, entries, gap)
 
     def extent(self) -> float:
         """Return 1, the size of F."""

@@ -73,6 +73,7 @@ class RigidBody(AffineBody):
         integrator: str | None = None,
         tolerance: float = 1e-14,
     ) -> None:
+        self.mass_is_given = mass_properties is not None
         if mass_properties is None:
             if mesh is None or material is None:
                 raise InputError(f"a {self.kind} body needs a mesh and a material, or its mass_properties")

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from kratos_lite.cli.options import build_parser
+from kratos_lite.cli.options import build_parser, parser_of
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
 
@@ -55,7 +55,7 @@ def _run(words: Sequence[str]) -> int:
     options, rest = parser.parse_known_args(words)
     options.rest = rest
     if rest and options.command != "bench":
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        parser_of(parser, options.command).error(f"unrecognized arguments: {' '.join(rest)}")
     try:
         from kratos_lite.cli import commands
 

@@ -8,7 +8,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kratos_lite.cli.progress import TerminalProgress
 from kratos_lite.errors import InputError, ModelError, SolveError
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
     from kratos_lite.io.case import Case
     from kratos_lite.io.formats.document import Document
+    from kratos_lite.io.runners.outcome import Outcome
     from kratos_lite.mesh import Mesh
 
 EXIT_VALUE_MISSED = 3
@@ -27,15 +28,19 @@ ROOT = Path(__file__).resolve().parents[2]
 def solve(options: Namespace) -> int:
     """Run what an input and the options describe, print the summary, write what was asked for."""
     use_threads(options.threads)
-    clock = perf_counter()
+    return _within_numbers(_solve, options, perf_counter())
+
+
+def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) -> int:
+    """Do something; an overflow, or what is no number, becomes an error in words."""
     import numpy as np
 
     try:
-        with np.errstate(over="raise"):
-            return _solve(options, clock)
-    except FloatingPointError:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            return action(options, *more)
+    except (FloatingPointError, OverflowError):
         raise SolveError(
-            "numbers exceed what a computer holds (1.8e308); "
+            f"{options.input}: numbers exceed what a computer holds (1.8e308); "
             "look for coordinates, constants, supports or loads in wrong units"
         ) from None
 
@@ -60,15 +65,19 @@ def _solve(options: Namespace, clock: float) -> int:
         outcome = run(case, progress)
     if outcome.result is not None:
         outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
-    written, expected = list[str](), list[str]()
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
-        if not options.quiet:
-            _print(outcome.summary(verbose=options.verbose))
-    finally:
-        written = outcome.write()
-        expected = outcome.compare()
-        _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
-        _print(expected)
+        _print([] if options.quiet else outcome.summary(verbose=options.verbose))
+    except OSError:
+        _write(outcome, options)
+        raise
+    return _write(outcome, options)
+
+
+def _write(outcome: Outcome, options: Namespace) -> int:
+    """Write what the end gives, compare it with expected values, and say both; return the exit code."""
+    written, expected = outcome.write(), outcome.compare()
+    _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
+    _print(expected)
     return EXIT_VALUE_MISSED if any(" failed " in line for line in expected) else 0
 
 
@@ -81,6 +90,10 @@ def _print(lines: list[str]) -> None:
 
 def info(options: Namespace) -> int:
     """Describe a file; of a run file, what it means."""
+    return _within_numbers(_info, options)
+
+
+def _info(options: Namespace) -> int:
     from kratos_lite.io.formats import ending
 
     if ending(options.input) in (".json", ".py"):
@@ -108,13 +121,20 @@ def _document(options: Namespace) -> Document:
     case = read_case(options.input)
     if not case.is_of_model:
         raise InputError(f"{options.input}: describes a body; only meshes and models are converted")
-    document = document_from(case.model)
+    try:
+        document = document_from(case.model)
+    except InputError as error:
+        raise InputError(f"{options.input}: {error}") from None
     document.notes += [Note(0, text) for text in case.model.notes]
     return document
 
 
 def check(options: Namespace) -> int:
     """Report every problem of a file."""
+    return _within_numbers(_check, options)
+
+
+def _check(options: Namespace) -> int:
     from kratos_lite.io.files import read_case
     from kratos_lite.io.outputs import check_outputs
 
@@ -193,6 +213,10 @@ def _check_python(path: Path) -> int:
 
 def convert(options: Namespace) -> int:
     """Convert a file."""
+    return _within_numbers(_convert, options)
+
+
+def _convert(options: Namespace) -> int:
     from kratos_lite.io.formats import write_document
     from kratos_lite.io.outputs import check_targets
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import re
-from typing import Any
+from typing import Any, NoReturn
 
 from kratos_lite import __version__
+from kratos_lite.errors import nearest
 
 EXIT_CODES = """exit codes:
   0    done
@@ -43,9 +44,40 @@ RESTART = (
 )
 
 
+COMMANDS = {"march": "solve, with --time STEP:STEPS", "run": "solve"}
+"""Words for which a command of another name does what is likely meant."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors name what was likely meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong with the words, and end."""
+        hint = self._hint(message)
+        super().error(f"{message}.{hint}" if hint else message)
+
+    def _hint(self, message: str) -> str:
+        """Return the known option, choice or command nearest to what is wrong."""
+        if unknown := re.search(r"unrecognized arguments:.*?--([\w-]+)", message):
+            known = [word[2:] for word in self._option_string_actions if word.startswith("--")]
+            return nearest(unknown[1], known).replace("called ", "called --").replace("mean ", "mean --")
+        if choice := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message):
+            other = COMMANDS.get(choice[1], "") if "COMMAND" in message else ""
+            known = re.findall(r"[\w-]+", choice[2])
+            return f" Did you mean {other}?" if other else nearest(choice[1], known)
+        return ""
+
+
+def parser_of(parser: argparse.ArgumentParser, command: str) -> argparse.ArgumentParser:
+    """Return the parser of a command."""
+    (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    found: argparse.ArgumentParser = commands.choices[command]
+    return found
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="kratos-lite",
         description="Finite elements for solids: from an input file to displacements and stresses.",
         epilog=EXIT_CODES,

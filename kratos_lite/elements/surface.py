@@ -75,6 +75,27 @@ def surface_mass(shape: type[Shape], X: ArrayLike) -> Array:
     return (N.T * measure[..., None, :]) @ N
 
 
+def surface_pressure_tangent(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
+    """Return the derivative of `surface_pressure` with respect to the nodes, (..., k, 3, k, 3) in N/m.
+
+    With t1, t2 the tangents, d(t1 × t2) = t1 × dt2 - t2 × dt1.
+
+    Parameters
+    ----------
+    shape : shape of the face.
+    X : (..., k, 3) float, m.
+    pressure : number, or (...) per face; Pa.
+    """
+    X, p = np.asarray(X, dtype=float), np.asarray(pressure, dtype=float)
+    rule = face_rule(shape)
+    N, dN = tabulate(shape, rule)
+    tangents = np.einsum("...ai,gaj->...gji", X, dN)
+    across = np.cross(tangents[..., None, :], np.eye(3))  # (t × e_i) in row i
+    change = np.einsum("...gic,gb->...gbic", across[..., 0, :, :], dN[..., 1])
+    change -= np.einsum("...gic,gb->...gbic", across[..., 1, :, :], dN[..., 0])
+    return -p[..., None, None, None, None] * np.einsum("g,ga,...gbic->...acbi", rule.weights, N, change)
+
+
 def surface_pressure(shape: type[Shape], X: ArrayLike, pressure: ArrayLike) -> Array:
     """Return -∫ N p n dA of faces as nodal forces (..., k, 3) in N: a pressure pushes against n.
 

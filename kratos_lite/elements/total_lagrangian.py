@@ -21,7 +21,7 @@ from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.typing import Array
 
 
-class Motion(NamedTuple):
+class Deformation(NamedTuple):
     """What is known at the Gauss points of displaced elements.
 
     Attributes
@@ -57,15 +57,15 @@ def green_strain(element: KinematicLinear, q: Array) -> Array:
     return strain_change(np.eye(3), displacement_gradient(element, q))
 
 
-def motion(
+def deformation(
     element: KinematicLinear,
     C: Array,
     q: Array,
     dq: Array | None = None,
     damping: float = 0.0,
     prestress: Array | float = 0.0,
-) -> Motion:
-    """Return the motion at q (..., n, 3), or over the step from q to q + dq.
+) -> Deformation:
+    """Return the deformation at q (..., n, 3), or over the step from q to q + dq.
 
     Parameters
     ----------
@@ -77,20 +77,20 @@ def motion(
     H = displacement_gradient(element, q)
     F, E = np.eye(3) + H, strain_change(np.eye(3), H)
     if dq is None:
-        return Motion(F, E @ C.T + prestress, F, 1.0, 1.0)
+        return Deformation(F, E @ C.T + prestress, F, 1.0, 1.0)
     dF = displacement_gradient(element, dq)
     S = (E + (0.5 + damping) * strain_change(F, dF)) @ C.T + prestress
-    return Motion(F + dF / 2, S, F + dF, 0.5, 0.5 + damping)
+    return Deformation(F + dF / 2, S, F + dF, 0.5, 0.5 + damping)
 
 
-def internal_load(element: KinematicLinear, at: Motion) -> Array:
+def internal_load(element: KinematicLinear, at: Deformation) -> Array:
     """Return ∫ P grad N dV as (..., n, 3) in N."""
     dV, D = element._gauss
     S = voigt.tensor(at.S) * dV[..., None, None]
     return (np.swapaxes(D, -1, -2) @ (S @ np.swapaxes(at.F, -1, -2))).sum(axis=-3)
 
 
-def stiffness_by_axis(element: KinematicLinear, C: Array, at: Motion) -> Array:
+def stiffness_by_axis(element: KinematicLinear, C: Array, at: Deformation) -> Array:
     """Return the derivative of the internal load as (..., 3, n, 3, n) in N/m.
 
     Order: axis and node of the row, axis and node of the column.  At q it is the symmetric tangent;

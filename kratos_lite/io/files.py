@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -157,8 +156,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 def _with_named_sides(mesh: Mesh) -> Mesh:
     """Return a mesh whose parts for the sides, such as ``z+`` of a box, have names for files."""
     from kratos_lite.io.kratos.to_document import kratos_name
-    from kratos_lite.mesh.mesh import SIDES
+    from kratos_lite.mesh import SIDES
 
-    named = copy(mesh)
-    named.parts = {kratos_name(name) if name in SIDES else name: part for name, part in mesh.parts.items()}
-    return named
+    return mesh.replace(
+        parts={kratos_name(name) if name in SIDES else name: p for name, p in mesh.parts.items()}
+    )

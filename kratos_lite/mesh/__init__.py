@@ -12,11 +12,13 @@ from kratos_lite.mesh.blocks import (
     without_repeats,
 )
 from kratos_lite.mesh.locate import Located
-from kratos_lite.mesh.mesh import Mesh, Where, WhereElements
+from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.selection import SIDES, Where, WhereElements
 from kratos_lite.mesh.topology import Faces, components, equal_sets, outward_signs
 
 __all__ = [
     "NO_ROWS",
+    "SIDES",
     "Block",
     "Faces",
     "Located",

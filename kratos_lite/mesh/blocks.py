@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.errors import MeshError
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
+from kratos_lite.validation import instance, read_only, short, whole_numbers
 
-NO_ROWS: Ints = np.zeros(0, dtype=np.int64)
+NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Block:
-    """Cells of one kind: elements, or the conditions that carry loads.
+    """Cells of one kind: elements, or the conditions that carry loads; its arrays are read-only.
 
-    Attributes
+    Parameters
     ----------
     name : kind as registered or as written in the file, e.g. ``KinematicLinear3D8N``.
     nodes : (m, k) int, rows of ``mesh.points``, in Kratos order.
-    ids : (m,) int, ids of the cells.
-    properties : (m,) int, property id of each cell.
-    shape : the reference cell, or None for a kind that kratos_lite does not know.
+    ids : (m,) int, ids of the cells; 1 … m if not given.
+    properties : int or (m,) int, property id of the cells.
+    shape : the reference cell; if not given, that of the registered element of this name, or None for a
+        kind that kratos_lite does not know.
     lines : (m,) int, line of each cell in the file it came from, or None.
+
+    Raises
+    ------
+    MeshError
+        An array holds anything but whole numbers, has another shape, or a row of a node is negative.
+
+    Examples
+    --------
+    >>> block = Block("KinematicLinear3D4N", [[0, 1, 2, 3], [1, 2, 3, 4]])
+    >>> block.ids, block.properties, block.shape.__name__
+    (array([1, 2]), array([1, 1]), 'Tetrahedron4')
     """
 
     name: str
@@ -34,10 +49,35 @@ class Block:
     ids: Ints
     properties: Ints
     shape: type[Shape] | None
-    lines: Rows | None = None
+    lines: Rows | None
+
+    def __init__(
+        self,
+        name: str,
+        nodes: ArrayLike,
+        ids: ArrayLike | None = None,
+        properties: ArrayLike = 1,
+        shape: type[Shape] | None = None,
+        lines: ArrayLike | None = None,
+    ) -> None:
+        instance(name, "the name of a block", str, "'KinematicLinear3D8N'", error=MeshError)
+        if shape is None and name in ELEMENTS:
+            shape = ELEMENTS[name].shape
+        width = "k" if shape is None else len(shape.nodes)
+        vars(self).update(name=name, shape=shape, nodes=_column(name, "nodes", nodes, ("m", width), np.int32))
+        if self.nodes.min(initial=0) < 0:
+            raise MeshError(f"block {name}: nodes are rows of points, from 0; got {self.nodes.min()}")
+        m = len(self.nodes)
+        if isinstance(properties, (int, np.integer)) and not isinstance(properties, bool):
+            properties = np.full(m, properties)
+        vars(self).update(
+            ids=_column(name, "ids", np.arange(1, m + 1) if ids is None else ids, (m,)),
+            properties=_column(name, "properties", properties, (m,)),
+            lines=None if lines is None else _column(name, "lines", lines, (m,), np.int32),
+        )
 
     def __len__(self) -> int:
-        return len(self.ids)
+        return len(self.nodes)
 
     def take(self, chosen: Ints | Mask) -> Block:
         """Return the block of some of the cells.
@@ -56,29 +96,49 @@ class Block:
         )
 
 
+def _column(
+    name: str, what: str, values: Any, shape: tuple[int | str, ...], dtype: Any = np.int64
+) -> Numbers:
+    """Return whole numbers of a block, read-only."""
+    return read_only(whole_numbers(values, f"block {name}: {what}", shape, dtype=dtype, error=MeshError))
+
+
 class Cells(Protocol):
     """Points and blocks of cells on them, as a mesh has them."""
 
-    points: Array
-    blocks: list[Block]
-    node_ids: Ints
+    @property
+    def points(self) -> Array:
+        """(n, 3) float, m."""
+
+    @property
+    def blocks(self) -> Sequence[Block]:
+        """Blocks of elements."""
+
+    @property
+    def node_ids(self) -> Ints:
+        """(n,) int."""
 
     def place(self, block: Block, cell: int) -> str:
         """Return a readable place of a cell for messages."""
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Part:
-    """A named part (Kratos: SubModelPart): rows of what belongs to it.
+    """A named part (Kratos: SubModelPart): rows of what belongs to it, in read-only arrays.
 
     Rows of elements and conditions count through all blocks in order.
 
-    Attributes
+    Parameters
     ----------
     nodes, elements, conditions : (k,) int, rows.
     geometries, constraints : (k,) int, ids as a file gives them.
     properties, tables : ids as a file gives them.
     data : variables of the part by name.
+
+    Raises
+    ------
+    MeshError
+        Rows or ids are no whole numbers, or a row is negative.
     """
 
     nodes: Ints = field(default_factory=lambda: NO_ROWS)
@@ -90,9 +150,39 @@ class Part:
     tables: tuple[int, ...] = ()
     data: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for name in ("nodes", "elements", "conditions", "geometries", "constraints"):
+            what = f"{name} of a part"
+            vars(self)[name] = read_only(whole_numbers(getattr(self, name), what, ("k",), error=MeshError))
+
     def __str__(self) -> str:
         sizes = {"nodes": self.nodes, "elements": self.elements, "conditions": self.conditions}
         return ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
+
+
+def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:
+    """Return blocks given as ``{element name: nodes}``, numbered through, or as a sequence."""
+    if isinstance(given, Mapping):
+        blocks: list[Block] = []
+        for name, nodes in given.items():
+            block, first = Block(name, nodes), sum(map(len, blocks)) + 1
+            if name not in ELEMENTS:
+                raise MeshError(f"there is no element {name!r}{_elements_of(block.nodes.shape[1])}")
+            blocks.append(replace(block, ids=np.arange(first, first + len(block))))
+        return tuple(blocks)
+    found = tuple(given) if isinstance(given, Sequence) else (given,)
+    if not all(isinstance(block, Block) for block in found):
+        raise MeshError(
+            f"{what} must be nodes by element name, as in kl.Mesh(points, {{'KinematicLinear3D8N': nodes}}), "
+            f"or a list of kl.Block(name, nodes); got {short(given)}"
+        )
+    return found
+
+
+def _elements_of(width: int) -> str:
+    """Return a hint that names the elements with so many nodes."""
+    names = [name for name in ELEMENTS if len(ELEMENTS[name].nodes) == width]
+    return f"; with {width} nodes there is {', '.join(names)}" if names else f", nor any with {width} nodes"
 
 
 def with_rows(blocks: Iterable[Block]) -> Iterator[tuple[Block, slice]]:

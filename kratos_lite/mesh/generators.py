@@ -9,7 +9,7 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Block, Mesh, Part
+from kratos_lite.mesh import SIDES, Mesh, Part
 from kratos_lite.shapes import Hexahedron8, Shape
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, fits_memory
@@ -103,14 +103,15 @@ def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
     """Raise InputError for more cells than int32 numbers, or than memory holds."""
     i, j, k = counts
     cells = i * j * k * len(SPLITS[shape.cell])
-    what = f"a mesh of {i} × {j} × {k} bricks"
+    what = f"a mesh of {i:.6g} × {j:.6g} × {k:.6g} bricks"
     if cells * len(shape.nodes) >= 2**31:
-        raise InputError(f"{what} has {cells:.3g} cells, more than the {2**31 // len(shape.nodes)} possible")
+        raise InputError(f"{what} has more than the {2**31 // len(shape.nodes)} cells possible; take fewer")
     # Measured: points, bricks, cells and the sorting of their edges take 54 bytes for each node of a cell.
     fits_memory(60.0 * cells * len(shape.nodes), what, "take fewer cells")
 
 
-def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, type[Shape]]:
+def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:
+    """Return points and cells of the unit cube."""
     if not isinstance(element, str):
         raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
     kind = ELEMENTS[element]
@@ -123,13 +124,12 @@ def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, Ints, str, ty
     split = np.array(SPLITS[shape.cell])
     corners = bricks[:, split].reshape(-1, split.shape[1])
     points, nodes = raise_order(points, corners, shape)
-    return points, nodes, kind.__name__, shape
+    return points, {kind.__name__: nodes}
 
 
-def _mesh(points: Array, nodes: Ints, name: str, shape: type[Shape], parts: dict[str, Part]) -> Mesh:
-    m = len(nodes)
-    block = Block(name, nodes.astype(np.int32), np.arange(1, m + 1), np.ones(m, dtype=np.int64), shape)
-    return Mesh(points, [block], parts=parts)
+def _sides(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
+    """Return parts by their axis and end in the unit cube."""
+    return {name: Part(nodes=np.flatnonzero(unit[:, axis] == end)) for name, (axis, end) in sides.items()}
 
 
 def box(
@@ -165,12 +165,8 @@ def box(
     lengths, corner = finite(size, "size"), finite(origin, "origin")
     if lengths.shape != (3,) or corner.shape != (3,) or (lengths <= 0).any():
         raise InputError(f"size must be three lengths > 0 m and origin three numbers; got {size}, {origin}")
-    unit, nodes, name, shape = _unit_mesh(cells, element)
-    parts = {}
-    for axis, letter in enumerate("xyz"):
-        for end, sign in ((0.0, "-"), (1.0, "+")):
-            parts[letter + sign] = Part(nodes=np.flatnonzero(unit[:, axis] == end))
-    return _mesh(corner + unit * lengths, nodes, name, shape, parts)
+    unit, cells_by_name = _unit_mesh(cells, element)
+    return Mesh(corner + unit * lengths, cells_by_name, parts=_sides(unit, SIDES))
 
 
 def annulus(
@@ -209,17 +205,16 @@ def annulus(
         raise InputError(f"an annulus needs 0 < inner < outer and width > 0; got {inner}, {outer}, {width}")
     if _cells(cells)[1] < 3:
         raise InputError(f"an annulus needs at least 3 cells around; got {cells[1]}")
-    unit, nodes, name, shape = _unit_mesh(cells, element)
+    unit, cells_by_name = _unit_mesh(cells, element)
     seam, start = np.flatnonzero(unit[:, 1] == 1), np.flatnonzero(unit[:, 1] == 0)
     seam = seam[np.lexsort((unit[seam, 0], unit[seam, 2]))]
     start = start[np.lexsort((unit[start, 0], unit[start, 2]))]
     target = np.arange(len(unit))
     target[seam] = start
     kept, renumbered = np.unique(target, return_inverse=True)
-    unit, nodes = unit[kept], renumbered[nodes]
+    unit = unit[kept]
     r = inner + (outer - inner) * unit[:, 0]
     angle = 2 * np.pi * unit[:, 1]
     points = np.column_stack([r * np.cos(angle), r * np.sin(angle), width * unit[:, 2]])
-    sides = {"inner": (0, 0.0), "outer": (0, 1.0), "z-": (2, 0.0), "z+": (2, 1.0)}
-    parts = {side: Part(nodes=np.flatnonzero(unit[:, axis] == end)) for side, (axis, end) in sides.items()}
-    return _mesh(points, nodes, name, shape, parts)
+    parts = _sides(unit, {"inner": (0, 0), "outer": (0, 1), "z-": (2, 0), "z+": (2, 1)})
+    return Mesh(points, {name: renumbered[nodes] for name, nodes in cells_by_name.items()}, parts=parts)

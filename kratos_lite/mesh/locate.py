@@ -166,9 +166,6 @@ class _Search:
     """The elements of a mesh, ready to be searched; one without a shape contains nothing."""
 
     def __init__(self, mesh: Cells) -> None:
-        bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
-        if len(bad):
-            raise MeshError(f"node {mesh.node_ids[bad[0]]} must have finite coordinates to locate points")
         self.mesh = mesh
         ends = [0, *(at.stop for _, at in with_rows(mesh.blocks))]
         n, self.starts = ends[-1], np.array(ends[:-1])

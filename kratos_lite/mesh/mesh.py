@@ -1,46 +1,43 @@
-"""Mesh: points, blocks and named parts, and how to choose among them."""
+"""Mesh: points, blocks and named parts; it does not change."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from types import MappingProxyType
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import (
-    NO_ROWS,
-    Block,
-    Part,
-    distinct,
-    ids_of,
-    rows_of_ids,
-    select,
-    without_repeats,
-)
+from kratos_lite.errors import MeshError
+from kratos_lite.mesh.blocks import Block, Part, blocks_of, ids_of, rows_of_ids, select
 from kratos_lite.mesh.locate import Located, locate
+from kratos_lite.mesh.selection import (
+    Where,
+    WhereElements,
+    elements_among,
+    find_elements,
+    find_nodes,
+    find_part,
+)
 from kratos_lite.mesh.topology import Faces, inverted, mirror
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import finite, instance, read_only, whole_numbers
 
-Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
-"""Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
-WhereElements: TypeAlias = "str | int | ArrayLike | None"
-"""Elements by part name, by property id, by element rows, or all."""
-
-SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
-"""Names of the sides of the bounding box: axis and end."""
+PART = "kl.Part(nodes=[4, 5])"
 
 
 class Mesh:
     """Points (n, 3) in m, element blocks, condition blocks and named parts.
 
+    A mesh does not change, and its arrays are read-only; `replace` makes another one from it.
+
     Parameters
     ----------
     points : (n, 3) float, m.
-    blocks : element blocks.
+    blocks : cells (m, k) by element name, rows of `points` from 0; or a list of `Block`.
     node_ids : (n,) int, ids of the nodes; 1 … n if not given.
     conditions : condition blocks.
     parts : named parts; a child of part ``A`` is named ``A.b``.
@@ -49,48 +46,113 @@ class Mesh:
     Raises
     ------
     MeshError
-        If points or ids have the wrong shape, an id occurs twice, or a part has rows that do not exist.
+        If points, cells or ids have the wrong shape or are no finite numbers, an id occurs twice, a cell or a
+        part has rows that do not exist, or there is no such element.
+
+    Examples
+    --------
+    >>> points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = Mesh(points, {"KinematicLinear3D4N": [[0, 1, 2, 3]]})
+    >>> mesh.n_nodes, mesh.n_elements
+    (4, 1)
     """
+
+    points: Array
+    node_ids: Ints
+    blocks: tuple[Block, ...]
+    conditions: tuple[Block, ...]
+    source: str
+    _parts: dict[str, Part]
 
     def __init__(
         self,
         points: ArrayLike,
-        blocks: Sequence[Block] = (),
+        blocks: Mapping[str, ArrayLike] | Sequence[Block] = (),
         *,
         node_ids: ArrayLike | None = None,
-        conditions: Sequence[Block] = (),
-        parts: dict[str, Part] | None = None,
+        conditions: Mapping[str, ArrayLike] | Sequence[Block] = (),
+        parts: Mapping[str, Part] | None = None,
         source: str = "",
     ) -> None:
-        try:
-            self.points: Array = np.array(points, dtype=float, order="C")
-        except (TypeError, ValueError):
-            raise MeshError(f"points must be real numbers of shape (n, 3); got {points!r:.80}") from None
-        if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise MeshError(f"points must have shape (n, 3); got {self.points.shape}")
-        n = len(self.points)
-        ids = np.asarray(np.arange(1, n + 1) if node_ids is None else node_ids)
-        if ids.shape != (n,) or (n and ids.dtype.kind not in "iu"):
-            raise MeshError(f"node_ids must be whole numbers of shape ({n},); got {ids.dtype} {ids.shape}")
-        self.node_ids: Ints = ids.astype(np.int64)
-        self.blocks = list(blocks)
-        self.conditions = list(conditions)
-        self.parts = dict(parts or {})
-        self.source = source
-        self._faces: tuple[list[Rows], Faces | None] = ([], None)
+        X = finite(points, "points", ("n", 3), error=MeshError)
+        n = len(X)
+        ids = np.arange(1, n + 1) if node_ids is None else node_ids
+        vars(self).update(
+            points=read_only(np.ascontiguousarray(X)),
+            node_ids=read_only(whole_numbers(ids, "node_ids", (n,), error=MeshError)),
+            blocks=blocks_of(blocks),
+            conditions=blocks_of(conditions, "conditions"),
+            _parts=dict(
+                instance(parts or {}, "parts", Mapping, "{'top': kl.Part(nodes=[4, 5])}", error=MeshError)
+            ),
+            source=source,
+        )
         self._check()
 
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise MeshError(f"a mesh does not change; make another one, as in mesh = mesh.replace({name}=...)")
+
     def _check(self) -> None:
-        """Raise MeshError for ids that occur twice and for parts whose rows do not exist."""
+        """Raise MeshError for ids that occur twice, and for rows of cells and parts that do not exist."""
         if not self._is_counting:
             ordered = self.node_ids[self._node_order]
             twice = ordered[1:][ordered[1:] == ordered[:-1]]
             if len(twice):
                 raise MeshError(f"node id {twice[0]} occurs more than once; give every node its own")
+        for block in (*self.blocks, *self.conditions):
+            if block.nodes.max(initial=-1) >= self.n_nodes:
+                cell = int(np.argmax((block.nodes >= self.n_nodes).any(axis=1)))
+                raise MeshError(
+                    f"{self.place(block, cell)} uses node rows {block.nodes[cell].tolist()}; "
+                    f"rows are 0 … {self.n_nodes - 1}"
+                )
         sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
         for name, part in self.parts.items():
+            instance(part, f"part {name!r}", Part, "kl.Part(nodes=[4, 5])", error=MeshError)
             for what, size in sizes.items():
-                _existing(getattr(part, what), size, f"part {name!r}: rows of {what}")
+                whole_numbers(
+                    getattr(part, what), f"part {name!r}: rows of {what}", size=size, error=MeshError
+                )
+
+    def replace(
+        self,
+        *,
+        points: ArrayLike | None = None,
+        blocks: Mapping[str, ArrayLike] | Sequence[Block] | None = None,
+        conditions: Mapping[str, ArrayLike] | Sequence[Block] | None = None,
+        parts: Mapping[str, Part] | None = None,
+    ) -> Mesh:
+        """Return a mesh in which some of these are others; ids of nodes and all the rest stay.
+
+        Parameters
+        ----------
+        points : (n, 3) float, m.
+        blocks, conditions, parts : as for a new mesh.
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        MeshError
+            As for a new mesh.
+
+        Examples
+        --------
+        >>> from kratos_lite import box
+        >>> mesh = box()
+        >>> mesh.replace(points=mesh.points * [1, 1, 2]).points.max(axis=0)
+        array([1., 1., 2.])
+        """
+        return Mesh(
+            self.points if points is None else points,
+            self.blocks if blocks is None else blocks,
+            node_ids=self.node_ids,
+            conditions=self.conditions if conditions is None else conditions,
+            parts=self._parts if parts is None else parts,
+            source=self.source,
+        )
 
     # ---- sizes and ids ---------------------------------------------------------------------
 
@@ -158,6 +220,11 @@ class Mesh:
 
     # ---- parts -----------------------------------------------------------------------------
 
+    @property
+    def parts(self) -> Mapping[str, Part]:
+        """Named parts; `add_part` adds one."""
+        return MappingProxyType(self._parts)
+
     def part(self, name: str) -> Part:
         """Return a part by its full name, or by its last word when that is unique.
 
@@ -177,22 +244,7 @@ class Mesh:
         MeshError
             If there is no such part, or several.
         """
-        if not isinstance(name, str):
-            raise MeshError(
-                f"a part is known by its name; got {name!r}: see nodes(where) and add_part(name, where)"
-            )
-        if name in self.parts:
-            return self.parts[name]
-        if name in SIDES and self.n_nodes:
-            return Part(nodes=self._side(*SIDES[name]))
-        ends = [full for full in self.parts if full.rsplit(".", 1)[-1] == name]
-        if len(ends) == 1:
-            return self.parts[ends[0]]
-        if ends:
-            raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
-        have = ", ".join(part for part in self.parts if part not in SIDES)
-        have = f"have {have} and" if have else "have"
-        raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, self.parts)}")
+        return find_part(name, self._parts, self.points)
 
     def add_part(self, name: str, where: Where) -> None:
         """Give nodes a name.
@@ -219,13 +271,7 @@ class Mesh:
         rows = self.nodes(where)
         if not len(rows):
             raise MeshError(f"no node is chosen for part {name!r}")
-        self.parts[name] = Part(nodes=rows)
-
-    def _side(self, axis: int, end: int) -> Ints:
-        x = self.points[:, axis]
-        low, high = float(x.min()), float(x.max())
-        goal = high if end else low
-        return np.flatnonzero(np.abs(x - goal) <= 1e-6 * (high - low))
+        self._parts[name] = Part(nodes=rows)
 
     def nodes(self, where: Where) -> Ints:
         """Return the rows of nodes, each once and in the order in which they are given.
@@ -249,17 +295,7 @@ class Mesh:
         >>> mesh.nodes(lambda X: X[:, 0] > 0.5)
         array([1])
         """
-        if isinstance(where, str):
-            return self.part(where).nodes
-        chosen = np.asarray(where(self.points.copy()) if callable(where) else where)
-        if chosen.dtype == bool:
-            if chosen.shape != (self.n_nodes,):
-                raise MeshError(f"a node mask must have shape ({self.n_nodes},); got {chosen.shape}")
-            return np.flatnonzero(chosen)
-        if chosen.dtype.kind not in "iu":
-            raise MeshError("nodes are chosen by part name, predicate, mask or integer rows")
-        rows = chosen.astype(np.int64).ravel()
-        return without_repeats(_existing(rows, self.n_nodes, "node rows"))
+        return self.part(where).nodes if isinstance(where, str) else find_nodes(where, self.points)
 
     def used_nodes(self) -> Mask:
         """Return which nodes belong to an element.
@@ -293,29 +329,13 @@ class Mesh:
         """
         if where is None:
             return np.arange(self.n_elements)
-        if isinstance(where, (int, np.integer)) and not isinstance(where, bool):
-            ids = np.concatenate([NO_ROWS, *(block.properties for block in self.blocks)])
-            rows = np.flatnonzero(ids == where)
-            if not len(rows):
-                raise MeshError(
-                    f"no element has property {where}; the properties are {distinct(ids).tolist()}"
-                )
-            return rows
-        if isinstance(where, str):
-            part = self.part(where)
-            rows = part.elements if len(part.elements) else self._elements_among(part.nodes)
-            if not len(rows):
-                raise MeshError(f"part {where!r} has no elements")
-            return rows
-        rows = np.asarray(where)
-        if rows.dtype.kind not in "iu" or rows.ndim != 1:
-            raise MeshError("elements are chosen by part name, property id or an array of integer rows")
-        return _existing(rows, self.n_elements, "element rows").astype(np.int64)
-
-    def _elements_among(self, nodes: Ints) -> Ints:
-        inside = np.zeros(self.n_nodes, dtype=bool)
-        inside[nodes] = True
-        return np.flatnonzero(np.concatenate([NO_ROWS, *(inside[b.nodes].all(axis=1) for b in self.blocks)]))
+        if not isinstance(where, str):
+            return find_elements(where, self)
+        part = self.part(where)
+        rows = part.elements if len(part.elements) else elements_among(part.nodes, self)
+        if not len(rows):
+            raise MeshError(f"part {where!r} has no elements")
+        return rows
 
     def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
         """Return which elements contain points, and where in them the points lie.
@@ -350,32 +370,18 @@ class Mesh:
 
     # ---- faces -----------------------------------------------------------------------------
 
+    @cached_property
+    def all_faces(self) -> Faces:
+        """All faces of the elements, and which coincide."""
+        return Faces(self.blocks)
+
     @property
     def boundary(self) -> list[Block]:
         """Faces that belong to one element only, outward, one block per face shape.
 
-        ``ids`` holds the row of the parent element.  Made anew when the blocks have changed.
+        ``ids`` holds the row of the parent element.
         """
-        return self.all_faces().boundary
-
-    def all_faces(self, *, anew: bool = False) -> Faces:
-        """Return all faces of the elements and which coincide; they are kept until a block is exchanged.
-
-        Parameters
-        ----------
-        anew : find them in any case.
-
-        Returns
-        -------
-        Faces
-        """
-        nodes = [block.nodes for block in self.blocks]
-        known, faces = self._faces
-        same = len(known) == len(nodes) and all(a is b for a, b in zip(known, nodes, strict=True))
-        if faces is None or anew or not same:
-            faces = Faces(self.blocks)
-            self._faces = (nodes, faces)
-        return faces
+        return self.all_faces.boundary
 
     def reoriented(self) -> Mesh:
         """Return the mesh in which inverted elements have the node order of their mirror image.
@@ -391,8 +397,7 @@ class Mesh:
             if turn.any() and block.shape is not None:
                 nodes[turn] = nodes[turn][:, mirror(block.shape)]
             blocks.append(replace(block, nodes=nodes))
-        rest: Any = {"conditions": self.conditions, "parts": self.parts, "source": self.source}
-        return Mesh(self.points, blocks, node_ids=self.node_ids, **rest)
+        return self.replace(blocks=blocks)
 
     def faces(self, where: Where) -> list[Block]:
         """Return the faces of a part: its conditions, or else the boundary faces among its nodes.
@@ -412,10 +417,3 @@ class Mesh:
         inside[self.nodes(where)] = True
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
-
-
-def _existing(rows: Ints, size: int, what: str) -> Ints:
-    """Return rows, all of which exist."""
-    if len(rows) and not (0 <= rows.min() and rows.max() < size):
-        raise MeshError(f"{what} must lie in 0 … {size - 1}; got {rows.min()} … {rows.max()}")
-    return rows

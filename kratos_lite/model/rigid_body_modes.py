@@ -14,21 +14,25 @@ import numpy as np
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
+from kratos_lite.model.connected import FEW, Bodies, bodies
 from kratos_lite.model.supports import Supports
+from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
 
-MAX_HINGED = 300
-"""More bodies than this that hang together by edges or corners are taken as one."""
 FREE = 1e-7
 """Singular value, as a share of the largest, up to which a rigid mode is free."""
 SAMPLE = 48
 """_Constraints for each body that are looked at first: a few of very many show that nothing is free."""
+SOFT = 1e-13
+"""Share of the largest squared singular value that is added to those of many bodies."""
+PASSES, PROBES = 12, 12
+"""Passes that leave of a motion nothing but what is free, and motions at random that make them."""
 
 
 def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
     """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = faces or mesh.all_faces()
+    faces = faces or mesh.all_faces
     warnings = []
     one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
     if len(one):
@@ -75,74 +79,6 @@ def _halved_squares(mesh: Mesh) -> Ints:
     return np.concatenate(elements)[np.concatenate(meets)]
 
 
-@dataclass(frozen=True)
-class Bodies:
-    """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it.
-
-    Attributes
-    ----------
-    part : (n,) int, the first body of each node, -1 for nodes without elements.
-    node, body : all pairs, sorted by node.
-    """
-
-    part: Ints
-    node: Ints
-    body: Ints
-
-    @property
-    def joints(self) -> tuple[Ints, Ints]:
-        """Nodes that belong to a further body, and that body."""
-        further = self.body != self.part[self.node]
-        return self.node[further], self.body[further]
-
-    def frames(self, points: Array) -> tuple[Array, Array]:
-        """Return the center (b, 3) and the size (b,) of each body."""
-        order = np.argsort(self.body, kind="stable")
-        X, start = points[self.node[order]], np.flatnonzero(np.diff(self.body[order], prepend=-1))
-        low, high = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
-        return (low + high) / 2, np.maximum((high - low).max(axis=1), np.finfo(float).tiny)
-
-
-def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
-    """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    faces = faces or mesh.all_faces()
-    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
-    root = components(mesh.n_elements, joined)
-    is_root = root == np.arange(len(root))
-    body = (np.cumsum(is_root) - 1)[root]
-    found = _of_elements(mesh, body)
-    if len(distinct(found.joints[1])) > MAX_HINGED:
-        pairs = np.stack([found.part[found.joints[0]], found.joints[1]], axis=1)
-        label = components(int(is_root.sum()), pairs)
-        label = np.searchsorted(distinct(label), label)
-        found = _of_elements(mesh, label[body])
-    return found
-
-
-def _of_elements(mesh: Mesh, body: Ints) -> Bodies:
-    """Return the bodies of the nodes from those of the elements."""
-    part = np.full(mesh.n_nodes, -1)
-    if not body.any():
-        part[mesh.used_nodes()] = 0
-        node = np.flatnonzero(part == 0)
-        return Bodies(part, node, np.zeros_like(node))
-    pairs = []
-    for block, at in with_rows(mesh.blocks):
-        owner = np.broadcast_to(body[at, None], block.nodes.shape)
-        part[block.nodes] = owner
-        pairs.append((block.nodes, owner))
-    node = np.flatnonzero(part >= 0)
-    shared = [(nodes[mask], owner[mask]) for nodes, owner in pairs if (mask := part[nodes] != owner).any()]
-    if not shared:
-        return Bodies(part, node, part[node])
-    further, owner = (np.concatenate(both) for both in zip(*shared, strict=True))
-    count = int(body.max()) + 1
-    every = np.concatenate([node * count + part[node], further.astype(np.int64) * count + owner])
-    node, owner = np.divmod(distinct(every), count)
-    part[node[::-1]] = owner[::-1]
-    return Bodies(part, node, owner)
-
-
 def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) -> Ints:
     """Raise ModelError that names the rigid modes which the supports leave free, part by part.
 
@@ -155,7 +91,10 @@ def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) 
     group_of = _groups(len(frames[0]), equations)
     problems = []
     for group, mine in zip(*_by_group(group_of, equations), strict=True):
-        problems += _name_modes(mesh, found, group, _free_modes(mesh, frames, group, mine))
+        modes = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
+        problems += _name_modes(mesh, found, group, modes)
+        if len(problems) >= MAX_PROBLEMS:
+            break
     if problems:
         shown = "; ".join(problems[:MAX_PROBLEMS])
         raise ModelError(f"the supports leave rigid-body modes free: {shown}. Fix more nodes or components")
@@ -203,7 +142,7 @@ def _groups(n_bodies: int, equations: _Constraints) -> Ints:
     return (np.cumsum(label == np.arange(n_bodies)) - 1)[label]
 
 
-def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[list[int]], list[_Constraints]]:
+def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[Ints], list[_Constraints]]:
     """Return the bodies of each group, and its equations."""
     numbers = np.arange(1, int(group_of.max()) + 1)
     members = np.argsort(group_of, kind="stable")
@@ -211,12 +150,10 @@ def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[list[int]],
     owner = group_of[equations.body]
     order = np.argsort(owner, kind="stable")
     mine = np.split(order, np.searchsorted(owner[order], numbers))
-    return [group.tolist() for group in groups], [equations.take(rows) for rows in mine]
+    return groups, [equations.take(rows) for rows in mine]
 
 
-def _free_modes(
-    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: _Constraints
-) -> list[Array]:
+def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints) -> list[Array]:
     """Return the free modes (6, k) of each body of a group under its equations.
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
@@ -239,29 +176,63 @@ def _free_modes(
 
 
 def _spectrum(
-    mesh: Mesh, frames: tuple[Array, Array], group: list[int], equations: _Constraints, row: Ints
+    mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints, row: Ints
 ) -> tuple[Array, Array]:
     """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
-    dof, body, weight = equations.dof, equations.body, equations.weight
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
-    for i, p in enumerate(group):
-        center, size = frames[0][p], float(frames[1][p])
-        here = body == p
-        R = rigid_modes(mesh.points[dof[here] // 3], center).reshape(-1, 3, 6)
-        R = R[np.arange(len(R)), dof[here] % 3] / np.array([1, 1, 1, size, size, size])
-        np.add.at(C[:, 6 * i : 6 * i + 6], row[here], R * weight[here, None])
+    np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
     C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
     return values, directions
 
 
-def _name_modes(mesh: Mesh, found: Bodies, group: list[int], modes: list[Array]) -> list[str]:
-    """Return one sentence for each part that can still move."""
-    named = []
+def _columns(group: Ints, equations: _Constraints) -> Ints:
+    """Return the numbers (k, 6) of the modes of the body of each entry, in a group in ascending order."""
+    return 6 * np.searchsorted(group, equations.body)[:, None] + np.arange(6)
+
+
+def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> Array:
+    """Return what the six modes of its body are in each entry of equations, (k, 6)."""
+    node, axis = np.divmod(equations.dof, 3)
+    R = rigid_modes(mesh.points[node], frames[0][equations.body]).reshape(-1, 3, 6)
+    R = R[np.arange(len(R)), axis]
+    R[:, 3:] /= frames[1][equations.body, None]
+    return np.asarray(R * equations.weight[:, None])
+
+
+def _free_modes_of_many(
+    mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints
+) -> list[Array]:
+    """Return as `_free_modes` motions (6, k) of each body of a group that span its free ones.
+
+    Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
+    """
+    from scipy.sparse import csr_array, diags_array, eye_array
+
+    row = np.searchsorted(distinct(equations.row), equations.row)
+    count, n = int(row.max()) + 1, 6 * len(group)
+    value = _on_modes(mesh, frames, equations)
+    largest = np.zeros(count)
+    np.maximum.at(largest, row, np.abs(value).max(axis=1))
+    places = np.repeat(row, 6), _columns(group, equations).ravel()
+    C = diags_array(1 / np.maximum(largest, np.finfo(float).tiny)) @ csr_array(
+        (value.ravel(), places), shape=(count, n)
+    )
+    gram = csr_array(C.T @ C)
+    small = SOFT * float(abs(gram).sum(axis=0).max())
+    factors = direct.factorize(csr_array(gram + small * eye_array(n)))
+    motions = np.random.default_rng(0).standard_normal((n, PROBES))
+    for _ in range(PASSES):
+        motions = small * np.column_stack([factors.solve(motion) for motion in motions.T])
+    return list(motions.reshape(-1, 6, PROBES))
+
+
+def _name_modes(mesh: Mesh, found: Bodies, group: Ints, modes: list[Array]) -> list[str]:
+    """Return one sentence for each part that can still move, for as many as are shown."""
+    named: list[str] = []
     for p, free in zip(group, modes, strict=True):
-        words = _motions(free)
-        if words:
+        if len(named) < MAX_PROBLEMS and (words := _motions(free)):
             nodes = found.node[found.body == p]
             if found.body.max() == 0:
                 who = f"the body ({len(nodes)} nodes)"
@@ -297,4 +268,5 @@ def _axes(directions: Array) -> str:
     inside = (Q**2).sum(axis=1) > 1 - 1e-6
     if inside.sum() == Q.shape[1]:
         return ", ".join(letter for letter, yes in zip("xyz", inside, strict=True) if yes)
-    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q / np.abs(q).max()) + ")" for q in Q.T)
+    named = [np.round(q / np.abs(q).max(), 9) + 0.0 for q in Q.T]
+    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q) + ")" for q in named)

@@ -14,7 +14,7 @@ from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements
-from kratos_lite.model import checks
+from kratos_lite.model import checks, connected
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.supports import AXES, Supports
@@ -46,8 +46,6 @@ class Attachment(ABC):
 class Structure:
     """What is analyzed: mesh, materials, supports, loads and motion.
 
-    Points and elements of the mesh become read-only, as all that is checked and computed depends on them.
-
     Parameters
     ----------
     mesh : points, elements and named parts.
@@ -71,7 +69,7 @@ class Structure:
     def __init__(
         self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
     ) -> None:
-        self.mesh = checks.checked_mesh(mesh)
+        self._mesh = checks.checked_mesh(mesh)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self.motion: Attachment | None = None
@@ -84,8 +82,6 @@ class Structure:
         self._rules: dict[int, Rule | int] = {}
         self._rule_of = np.full(mesh.n_elements, -1)
         self._changes = 0
-        self._arrays: list[NDArray[Any]] = []
-        self._freeze()
         if isinstance(material, Mapping):
             for where, one in material.items():
                 self.assign(one, where)
@@ -93,19 +89,14 @@ class Structure:
             self.assign(material)
 
     @property
+    def mesh(self) -> Mesh:
+        """Points, elements and named parts, which do not change."""
+        return self._mesh
+
+    @property
     def version(self) -> tuple[int, int]:
         """Change counters of everything that affects the equations except prescribed values and loads."""
-        self._freeze()
         return self._changes, self.supports.version
-
-    def _freeze(self) -> None:
-        """Make the arrays of the mesh read-only, and count a change if there are others."""
-        arrays: list[NDArray[Any]] = [self.mesh.points, *(block.nodes for block in self.mesh.blocks)]
-        if list(map(id, arrays)) != list(map(id, self._arrays)):
-            for array in arrays:
-                array.flags.writeable = False
-            self._arrays = arrays
-            self._changes += 1
 
     # ---- elements -----------------------------------------------------------------------------
 
@@ -395,7 +386,7 @@ class Structure:
         mesh = self.mesh
         warnings = self.check_geometry()
         groups = self.element_groups()
-        used, faces = mesh.used_nodes(), mesh.all_faces(anew=True)
+        used, faces = mesh.used_nodes(), mesh.all_faces
         warnings += checks.check_rules(mesh, groups)
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used)
@@ -406,7 +397,7 @@ class Structure:
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
         part: NDArray[np.int64] = np.where(used, 0, -1)
         if not free:
-            bodies = rigid_body_mode_check.bodies(mesh, faces)
+            bodies = connected.bodies(mesh, faces)
             part = rigid_body_mode_check.check_supports(mesh, self.supports, bodies)
         self.supports.check_used(used)
         return groups, part, warnings

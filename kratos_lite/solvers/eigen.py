@@ -60,13 +60,27 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
     if whole_number(count, "count") > n:
         raise InputError(f"this body has 1 … {n} modes; got {count}")
     if n <= DENSE_MODES or count > n // 4:
-        from scipy.linalg import eigh
-
-        squares, shapes = eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
+        squares, shapes = _dense(K.toarray(), M.toarray(), count)
     else:
         squares, shapes = _by_iteration(K, M, count)
     check_residuals([(np.ones(count), K), (-squares, M)], shapes)
     return np.sqrt(np.maximum(squares, 0.0)), shapes
+
+
+def _dense(K: Array, M: Array, count: int) -> tuple[Array, Array]:
+    """Return the lowest modes by LAPACK, which finds none where the mass is not positive in its rounding."""
+    from scipy.linalg import LinAlgError, eigh
+
+    try:
+        squares, shapes = eigh(K, M, subset_by_index=[0, count - 1])
+    except (LinAlgError, ValueError):
+        squares, shapes = np.zeros(0), np.zeros((len(K), 0))
+    if len(squares) != count:
+        raise SolveError(
+            f"{count} modes cannot be found: stiffness or mass is not positive within rounding; look for "
+            "lengths or constants in wrong units, and for very thin elements"
+        )
+    return squares, shapes
 
 
 def _by_iteration(K: Any, M: Any, count: int) -> tuple[Array, Array]:

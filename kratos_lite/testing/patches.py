@@ -132,8 +132,7 @@ def shared_faces(element: Element) -> Measured | str:
     if why := unbuildable(shape):
         return why
     points, nodes = patch(shape, (2, 1, 1), (2, 1, 1))
-    n = len(nodes)
-    block = Block(element.__name__, nodes.astype(np.int32), np.arange(n), np.zeros(n, dtype=np.int64), shape)
+    block = Block(element.__name__, nodes, shape=shape)
     area = flux = 0.0
     for face in Mesh(points, [block]).boundary:
         assert face.shape is not None

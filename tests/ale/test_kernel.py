@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,10 +25,12 @@ VELOCITY = np.random.default_rng(1).uniform(-1, 1, (3, 4))
 def parts(kind, cells=(3, 2, 3), amount=0.05):
     """Return points, groups and pattern of a distorted box of two materials."""
     mesh = kl.box((1.1, 0.9, 1.3), cells, f"KinematicLinear3D{kind}N")
-    mesh.points += amount / max(cells) * np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    shift = np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    mesh = mesh.replace(points=mesh.points + amount / max(cells) * shift)
     light, heavy = (kl.Isotropic3D(E=1.0, nu=0.3, density=density) for density in (2.0, 700.0))
-    block = mesh.blocks[0]
-    block.properties[len(block.nodes) // 3 :] = 2
+    m = mesh.n_elements
+    properties = np.where(np.arange(m) < m // 3, 1, 2)
+    mesh = mesh.replace(blocks=[replace(mesh.blocks[0], properties=properties)])
     model = kl.Model(mesh, {1: light, 2: heavy})
     groups = model.element_groups()
     assert len(groups) == 2

@@ -47,6 +47,17 @@ def test_a_constant_velocity_of_the_center_adds_to_that_of_the_material_alone(wh
     np.testing.assert_array_equal(kl.material_acceleration(carried, u), kl.material_acceleration(still, u))
 
 
+def test_a_wheel_that_rolls_stands_where_it_touches_the_ground(wheels):
+    """Ż = b s along x for a clockwise turn: 0 below, twice Ż above, Ż turned down in front."""
+    model = rotor(wheels, rate=30.0, center_velocity=(30.0, 0.0, 0.0))
+    X = model.mesh.points
+    v = kl.material_velocity(model, np.zeros_like(X))
+    for place, expected in (((0, -1), (0, 0)), ((0, 1), (60, 0)), ((1, 0), (30, -30))):
+        at = np.abs(X[:, :2] - place).max(axis=1) < 1e-9
+        assert at.sum() == 2
+        np.testing.assert_allclose(v[at], [(*expected, 0.0)] * 2, atol=1e-10)
+
+
 def shaken(t):
     """Return Z of the center at a time."""
     return np.array([2e-3 * np.sin(90 * t), 3e-3 * (1 - np.cos(60 * t)), -1.5 * t * t])

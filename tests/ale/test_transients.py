@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import elsewhere
 from scipy.integrate import solve_ivp
 from scipy.sparse import eye_array, kron
 from scipy.sparse.linalg import splu, spsolve
@@ -292,7 +293,7 @@ def graded(wheels, **options):
     r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
     angle = angle + 0.4 * np.sin(angle) + 0.25 * np.sin(2 * angle + 0.7)
     points[:, :2] = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
-    model.mesh.points = points
+    model = elsewhere(model, points)
     model.add(Rotation("z", rate=80.0, **options))
     e = EquationsOfMotion(model)
     model.add(kl.NodalForces(-e.system.scatter(e.inertia_load(0.0))))

@@ -41,7 +41,8 @@ def way(request, monkeypatch):
 def distorted(name, cells=(2, 1, 1)):
     """Return a box of elements whose nodes are moved by a tenth of a cell at most."""
     mesh = kl.box(size=tuple(map(float, cells)), cells=cells, element=name)
-    mesh.points += np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
+    shift = np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
+    mesh = mesh.replace(points=mesh.points + shift)
     return mesh
 
 

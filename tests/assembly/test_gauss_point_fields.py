@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from meshes import changed_at, with_block
 
 import kratos_lite as kl
 from kratos_lite.assembly import element_groups, inertia, nodal_values
@@ -36,7 +37,7 @@ def distorted(name, cells=(3, 2, 2)):
     """Return a box of elements whose nodes are moved by a tenth of a cell at most."""
     mesh = kl.box(size=(3.0, 2.0, 2.0), cells=cells, element=name)
     shift = np.random.default_rng(len(name)).uniform(-0.05, 0.05, mesh.points.shape)
-    mesh.points += shift * (3.0 / cells[0])
+    mesh = mesh.replace(points=mesh.points + shift * (3.0 / cells[0]))
     return mesh
 
 
@@ -123,8 +124,9 @@ def test_results_do_not_depend_on_the_number_of_threads():
 
 SCRIPT = """
 import json, numpy as np, kratos_lite as kl
-model = kl.Model(kl.box(cells=(3, 3, 3), element="KinematicLinear3D10N"), kl.Isotropic3D(1e9, 0.3, 2000.0))
-model.mesh.points = model.mesh.points + 0.02 * np.sin(9 * model.mesh.points[:, [1, 2, 0]])
+mesh = kl.box(cells=(3, 3, 3), element="KinematicLinear3D10N")
+mesh = mesh.replace(points=mesh.points + 0.02 * np.sin(9 * mesh.points[:, [1, 2, 0]]))
+model = kl.Model(mesh, kl.Isotropic3D(1e9, 0.3, 2000.0))
 model.fix("z-")
 model.add(kl.Gravity((1.0, 2.0, -9.81)))
 result = model.solve()
@@ -318,25 +320,29 @@ def verdict(mesh, kind):
 
 
 def turned(mesh):
-    mesh.blocks[0].nodes[[2, 5]] = mesh.blocks[0].nodes[[2, 5]][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    nodes = mesh.blocks[0].nodes
+    return with_block(mesh, nodes=changed_at(nodes, [2, 5], nodes[[2, 5]][:, [4, 5, 6, 7, 0, 1, 2, 3]]))
 
 
 def flattened(mesh):
     normal = np.array([0.6, 0.0, 0.8])
-    mesh.points -= (mesh.points @ normal)[:, None] * normal
+    return mesh.replace(points=mesh.points - (mesh.points @ normal)[:, None] * normal)
 
 
 def swapped(mesh):
-    mesh.blocks[0].nodes[3, [0, 1]] = mesh.blocks[0].nodes[3, [1, 0]]
+    nodes = mesh.blocks[0].nodes
+    return with_block(mesh, nodes=changed_at(nodes, (3, [0, 1]), nodes[3, [1, 0]]))
 
 
 def folded(mesh):
     corner = mesh.blocks[0].nodes[0]
-    mesh.points[corner[0]] = 1.1 * mesh.points[corner[[1, 3, 4]]].mean(axis=0)
+    apex = 1.1 * mesh.points[corner[[1, 3, 4]]].mean(axis=0)
+    return mesh.replace(points=changed_at(mesh.points, corner[0], apex))
 
 
 def collapsed(mesh):
-    mesh.points[mesh.blocks[0].nodes[0, 0]] = mesh.points[mesh.blocks[0].nodes[0, 1]]
+    one, other = mesh.blocks[0].nodes[0, :2]
+    return mesh.replace(points=changed_at(mesh.points, one, mesh.points[other]))
 
 
 @pytest.mark.parametrize(
@@ -350,9 +356,7 @@ def collapsed(mesh):
     ],
 )
 def test_both_ways_judge_bad_shapes_alike(spoil, text, numpy_only):
-    mesh = kl.box(cells=(3, 2, 2))
-    mesh.blocks[0].nodes = mesh.blocks[0].nodes.copy()
-    spoil(mesh)
+    mesh = spoil(kl.box(cells=(3, 2, 2)))
     found = verdict(mesh, KinematicLinear3D8N)
     assert text in str(found)
     numpy_only()
@@ -365,7 +369,7 @@ def test_both_ways_judge_flat_elements_alike(name, numpy_only):
     for seed in range(8):
         mesh = kl.box(cells=(2, 2, 1), element=name)
         turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
-        mesh.points[:] = mesh.points * [1, 1, 0] @ turn + seed  # in a plane but for rounding
+        mesh = mesh.replace(points=mesh.points * [1, 1, 0] @ turn + seed)  # in a plane but for rounding
         found.append((mesh, verdict(mesh, kind)))
     numpy_only()
     for mesh, text in found:

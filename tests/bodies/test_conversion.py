@@ -61,19 +61,90 @@ def test_a_turned_rigid_body_becomes_turned_elements(brick):
 
 
 def test_what_elements_do_beyond_an_affine_motion_is_left_out(brick):
-    """The nearest affine motion with respect to mass: its rest carries no momentum and no moment."""
+    """The nearest affine place with respect to mass: its rest has no moment; both momenta stay."""
     rng = np.random.default_rng(2)
     body = brick(cells=(2, 2, 2))
     body.set_configuration(0.02 * rng.uniform(-1, 1, body.q.shape))
     body.u[...] = rng.uniform(-1, 1, body.u.shape)
     whole = kl.convert(body, kl.PseudoRigidBody)
     X = body.points
-    rest = body.velocity(X) - whole.velocity(X)
-    weighted = body.times_mass(rest.ravel()).reshape(-1, 3)
-    np.testing.assert_allclose(weighted.sum(axis=0), 0, atol=1e-11)
-    np.testing.assert_allclose(weighted.T @ X, 0, atol=1e-11)
+    rest = body.times_mass((body.position(X) - whole.position(X)).ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(rest.sum(axis=0), 0, atol=1e-11)
+    np.testing.assert_allclose(rest.T @ X, 0, atol=1e-11)
     np.testing.assert_allclose(whole.linear_momentum(), body.linear_momentum(), rtol=1e-11)
+    np.testing.assert_allclose(whole.angular_momentum(), body.angular_momentum(), rtol=1e-11)
     assert whole.kinetic_energy() < body.kinetic_energy()
+
+
+@pytest.mark.parametrize(("kind", "other"), [(a, b) for a, b in PAIRS if a is not kl.FiniteElementBody])
+def test_given_mass_properties_go_along_or_are_refused(kind, other, brick):
+    plain = brick(kind)
+    heavy = plain.mass_properties.with_(mass=5 * float(plain.mass))
+    body = kind(plain.mesh, plain.material, mass_properties=heavy)
+    body.set_velocity(FLIGHT, SPIN)
+    if other is kl.FiniteElementBody:
+        with pytest.raises(kl.ModelError, match="the mass of a finite-element body follows from its mesh"):
+            kl.convert(body, other)
+        same = kind(plain.mesh, plain.material, mass_properties=plain.mass_properties)
+        assert kl.convert(same, other).mass == pytest.approx(float(plain.mass))
+        return
+    result = kl.convert(body, other)
+    assert result.mass == heavy.mass
+    np.testing.assert_allclose(result.linear_momentum(), body.linear_momentum(), rtol=1e-14)
+    np.testing.assert_allclose(result.angular_momentum(), body.angular_momentum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "other"), PAIRS)
+def test_lumped_mass_keeps_both_momenta(kind, other, brick):
+    """Nodes of an uneven mesh stand for another mass center and inertia than the shape."""
+    body = spinning(brick, kind)
+    mesh = kl.Mesh(body.mesh.points**2 + body.mesh.points, body.mesh.blocks)
+    fine = {"lumped": True} if other is kl.FiniteElementBody else {}
+    start = kind(mesh, body.material, **({"lumped": True} if kind is kl.FiniteElementBody else {}))
+    start.set_velocity(FLIGHT, SPIN)
+    result = kl.convert(start, other, **fine)
+    np.testing.assert_allclose(result.linear_momentum(), start.linear_momentum(), rtol=1e-12)
+    momentum = start.angular_momentum()
+    np.testing.assert_allclose(result.angular_momentum(), momentum, atol=1e-11 * np.abs(momentum).max())
+
+
+def test_settings_go_along_where_the_kind_takes_them(brick, caplog):
+    plain = brick(kl.PseudoRigidBody)
+    body = kl.PseudoRigidBody(plain.mesh, plain.material, damping=1e-3, integrator="linearly_implicit")
+    body.external_work[...] = 7.0
+    soft = kl.convert(body, kl.FiniteElementBody)
+    assert (soft.damping, soft.integrator, float(soft.external_work)) == (1e-3, "linearly_implicit", 7.0)
+    assert kl.convert(body, kl.FiniteElementBody, damping=0.5, integrator="explicit").damping == 0.5
+    assert not caplog.records
+    stiff = kl.convert(body, kl.RigidBody)
+    assert (stiff.damping, stiff.integrator) == (0.0, "momentum_conserving")
+    assert [record.getMessage() for record in caplog.records] == [
+        "a rigid body takes no damping: 0.001 s is left out",
+        "a rigid body has no integrator linearly_implicit: it takes momentum_conserving",
+    ]
+
+
+def test_a_copy_has_all_settings(brick):
+    plain = brick(kl.FiniteElementBody)
+    options = {"formulation": "modal", "modes": 14, "lumped": True, "integrator": "explicit"}
+    body = kl.FiniteElementBody(plain.mesh, plain.material, damping=1e-4, tolerance=1e-9, **options)
+    copy = kl.convert(body, "finite-element")
+    assert copy.settings() == body.settings()
+    assert len(copy.formulation.omega) == 14
+    assert kl.convert(body, "finite-element", formulation="corotational").settings()["modes"] is None
+
+
+def test_loads_and_constraints_that_stay_behind_are_reported(brick, caplog):
+    body = brick(kl.PseudoRigidBody)
+    body.add(kl.Gravity((0, 0, -9.81)))
+    body.constrain(kl.FixPoint(body.center))
+    other = kl.convert(body, kl.RigidBody)
+    assert not other.loads
+    assert not other.constraints
+    assert [record.getMessage() for record in caplog.records] == [
+        "1 loads of the pseudo-rigid body do not go along; add them anew",
+        "1 constraints of the pseudo-rigid body do not go along; add them anew",
+    ]
 
 
 def test_the_other_body_is_another(brick):

@@ -485,7 +485,7 @@ def test_missing_supports_are_named_by_their_motions(run, box):
 
 def test_an_unknown_part_is_answered_with_the_nearest_name(run, folder):
     mesh = kl.box()
-    mesh.parts["Clamped"] = mesh.parts.pop("z-")
+    mesh.add_part("Clamped", "z-")
     kl.write("a.mdpa", kl.Model(mesh, LAW))
     done = run("solve", "a.mdpa", "--fix", "Clampd:xyz")
     assert done.refuses("there is no part 'Clampd'", "Did you mean Clamped?")
@@ -697,8 +697,7 @@ def test_ctrl_c_while_writing_leaves_the_old_file(run, box, monkeypatch):
 
 
 def test_a_reader_that_goes_away_is_no_error(folder):
-    mesh = kl.box()
-    mesh.parts = {f"part_{i}": kl.Part(nodes=np.arange(8)) for i in range(5000)}
+    mesh = kl.box().replace(parts={f"part_{i}": kl.Part(nodes=np.arange(8)) for i in range(5000)})
     kl.write("parts.mdpa", mesh)
     command = [sys.executable, "-m", "kratos_lite", "info", "parts.mdpa"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:

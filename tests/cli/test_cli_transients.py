@@ -25,7 +25,7 @@ def folder(tmp_path, monkeypatch):
     """Return a folder, the current one, with the mesh of a tower."""
     monkeypatch.chdir(tmp_path)
     mesh = kl.box((0.2, 0.2, 2.0), cells=(1, 1, 6))
-    mesh.parts = {}
+    mesh = mesh.replace(parts={})
     kl.write("tower.mdpa", mesh)
     return tmp_path
 

@@ -46,7 +46,8 @@ if PYTHON is None:
 def wheel(kind):
     """Return a hollow cylinder, its cells unlike each other; curved where elements can be."""
     mesh = kl.annulus(0.3, 1.0, 0.2, (3, 10, 2), f"KinematicLinear3D{kind}N")
-    mesh.points += 0.01 * np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    shift = np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    mesh = mesh.replace(points=mesh.points + 0.01 * shift)
     return kl.Model(mesh, MATERIAL)
 
 

@@ -62,14 +62,15 @@ def assert_close(ours, theirs, tolerance):
 
 def distorted_cube(kind, n, amount=0.05):
     mesh = kl.box(cells=(n, n, n), element=name_of(kind))
-    mesh.points += amount / n * np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    shift = np.random.default_rng(kind).uniform(-1, 1, mesh.points.shape)
+    mesh = mesh.replace(points=mesh.points + amount / n * shift)
     return mesh
 
 
 def sheared_cube(kind, n):
     """Return a cube of parallel-sided cells, whose volumes any right node order gives exactly."""
     mesh = kl.box(cells=(n, n, n), element=name_of(kind))
-    mesh.points = mesh.points @ np.array([[1.1, 0.2, 0.1], [-0.1, 0.9, 0.3], [0.2, -0.3, 1.2]])
+    mesh = mesh.replace(points=mesh.points @ np.array([[1.1, 0.2, 0.1], [-0.1, 0.9, 0.3], [0.2, -0.3, 1.2]]))
     return mesh
 
 

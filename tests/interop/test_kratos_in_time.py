@@ -68,8 +68,8 @@ def column(size, cells, element):
         "Top": kl.Part(mesh.nodes("z+"), none, np.arange(count)),
         "Tips": kl.Part(corners, none, np.arange(count, count + 2)),
     }
-    mesh.conditions = [kl.Block(kind, faces.nodes, rows, zero, faces.shape), points]
-    mesh.parts = parts
+    faces = kl.Block(kind, faces.nodes, rows, zero, faces.shape)
+    mesh = mesh.replace(conditions=[faces, points], parts=parts)
     return mesh
 
 

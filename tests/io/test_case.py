@@ -23,7 +23,7 @@ RUN = {"model": "box.mdpa", "material": MATERIAL, "fix": {"z-": "xyz"}, "gravity
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mesh = kl.box()
-    mesh.parts = {}
+    mesh = mesh.replace(parts={})
     kl.write("box.mdpa", mesh)
     return tmp_path
 

@@ -15,8 +15,7 @@ def test_rows_keep_their_order_so_that_values_meet_their_nodes():
 
 
 def test_sides_are_measured_along_their_own_axis():
-    mesh = kl.box((1, 1, 1e-7))
-    mesh.parts.clear()
+    mesh = kl.box((1, 1, 1e-7)).replace(parts={})
     assert len(mesh.nodes("z-")) == len(mesh.nodes("z+")) == 4
     assert not set(mesh.nodes("z-")) & set(mesh.nodes("z+"))
 

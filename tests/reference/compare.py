@@ -6,7 +6,7 @@ import kratos_lite as kl
 from tests.reference import rules, solid
 from tests.reference.problems import random_problem
 
-SINGULAR = 1e-11
+SINGULAR = 3e-14
 """Share of the largest eigenvalue below which the reference calls a stiffness singular."""
 LIMIT = 1e-9
 """Difference, as a share of the largest value, that counts as one."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import changed_at, with_block
 
 import kratos_lite as kl
 
@@ -35,9 +36,8 @@ def model_of(mesh, *, rollers=False):
 def changed(nodes, columns, n=2):
     """Return a cube whose first element has some of its nodes in another order."""
     mesh = kl.box(cells=(n, n, n), element=kind(nodes))
-    first = mesh.blocks[0].nodes[0]
-    first[list(range(len(columns)))] = first[list(columns)]
-    return mesh
+    rows = mesh.blocks[0].nodes
+    return with_block(mesh, nodes=changed_at(rows, (0, list(range(len(columns)))), rows[0, list(columns)]))
 
 
 @pytest.mark.parametrize("nodes", KINDS)
@@ -52,7 +52,7 @@ def test_two_swapped_nodes_are_named(nodes):
 @pytest.mark.parametrize("nodes", [4, 10])
 def test_a_mirrored_tetrahedron_is_called_inverted(nodes):
     mesh = kl.box(element=kind(nodes))
-    mesh.points[:, 0] *= -1
+    mesh = mesh.replace(points=mesh.points * [-1, 1, 1])
     with pytest.raises(kl.MeshError, match=r"inverted; mesh\.reoriented\(\) corrects") as caught:
         model_of(mesh).solve()
     assert len(str(caught.value).splitlines()) == 6
@@ -60,7 +60,7 @@ def test_a_mirrored_tetrahedron_is_called_inverted(nodes):
 
 def test_many_inverted_elements_are_listed_up_to_twenty_and_counted():
     mesh = kl.box(cells=(3, 3, 3))
-    mesh.points[:, 0] *= -1
+    mesh = mesh.replace(points=mesh.points * [-1, 1, 1])
     with pytest.raises(kl.MeshError, match="… and 7 more") as caught:
         model_of(mesh).solve()
     assert len(str(caught.value).splitlines()) == 21
@@ -68,7 +68,8 @@ def test_many_inverted_elements_are_listed_up_to_twenty_and_counted():
 
 def test_slightly_folded_bricks_are_solved_with_a_warning():
     mesh = kl.box()
-    mesh.points[mesh.nodes(lambda X: X.sum(axis=1) == 3)] = (0.65, 0.65, 0.65)
+    corner = mesh.nodes(lambda X: X.sum(axis=1) == 3)
+    mesh = mesh.replace(points=changed_at(mesh.points, corner, (0.65, 0.65, 0.65)))
     warnings = model_of(mesh).solve().report.warnings
     assert any("1 elements have det J slightly < 0 at a node" in text for text in warnings)
 
@@ -76,7 +77,7 @@ def test_slightly_folded_bricks_are_solved_with_a_warning():
 def test_quarter_point_nodes_are_accepted_and_noted():
     mesh = kl.box(element=kind(20))
     edge = mesh.nodes(lambda X: X[:, 0] == 0.5)
-    mesh.points[edge, 0] = 0.25
+    mesh = mesh.replace(points=changed_at(mesh.points, (edge, 0), 0.25))
     warnings = model_of(mesh).solve().report.warnings
     assert "1 elements have det J = 0 at a corner node (singular corner)" in warnings
 
@@ -209,35 +210,55 @@ def test_nearly_incompressible_bricks_warn_that_they_lock():
 
 
 def test_broken_coordinates_and_node_lists_are_named():
-    mesh = kl.box()
-    mesh.points[3, 1] = np.nan
-    with pytest.raises(kl.MeshError, match=r"node 4 has coordinates \[.*nan.*\]; they must be finite"):
-        model_of(mesh).solve()
-    twice = kl.box()
-    twice.blocks[0].nodes[0, 1] = twice.blocks[0].nodes[0, 0]
+    mesh, nodes = kl.box(), kl.box().blocks[0].nodes
+    with pytest.raises(kl.MeshError, match=r"points must be finite; got nan at \[3, 1\]"):
+        mesh.replace(points=changed_at(mesh.points, (3, 1), np.nan))
+    twice = with_block(mesh, nodes=changed_at(nodes, (0, 1), nodes[0, 0]))
     with pytest.raises(kl.MeshError, match=r"element 1 \(KinematicLinear3D8N\) uses node 1 more than once"):
         model_of(twice).solve()
-    for wrong in (-1, 8):
-        outside = kl.box()
-        outside.blocks[0].nodes[0, 6] = wrong
-        with pytest.raises(kl.MeshError, match=r"element 1 .* uses node rows \[.*\]; rows are 0 … 7"):
-            model_of(outside).solve()
+    with pytest.raises(kl.MeshError, match=r"element 1 .* uses node rows \[.*\]; rows are 0 … 7"):
+        with_block(mesh, nodes=changed_at(nodes, (0, 6), 8))
+    with pytest.raises(kl.MeshError, match="nodes are rows of points, from 0; got -1"):
+        with_block(mesh, nodes=changed_at(nodes, (0, 6), -1))
 
 
-@pytest.mark.parametrize("spoil", ["columns", "floats", "properties"])
-def test_blocks_of_the_wrong_form_are_refused(spoil):
-    mesh = kl.box(cells=(2, 1, 1))
-    one = mesh.blocks[0]
-    if spoil == "columns":
-        one.nodes = one.nodes[:, :4]
-    elif spoil == "floats":
-        one.nodes = one.nodes.astype(float)
-    else:
-        one.properties = one.properties[:1]
-    with pytest.raises(
-        kl.MeshError, match=r"block KinematicLinear3D8N: nodes must be whole numbers of shape \(2, 8\)"
-    ):
-        model_of(mesh).solve()
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        ({"nodes": kl.box().blocks[0].nodes[:, :4]}, r"nodes must be whole numbers of shape \(m, 8\)"),
+        ({"nodes": kl.box().blocks[0].nodes * 1.0}, r"nodes must be whole numbers of shape \(m, 8\)"),
+        ({"nodes": [0, 1, 2]}, r"nodes must be whole numbers of shape \(m, 8\)"),
+        ({"nodes": [[0, 1], [2]]}, r"nodes must be whole numbers of shape \(m, 8\)"),
+        ({"nodes": np.full((1, 8), 2**40)}, r"nodes must be below 2\^31"),
+        ({"properties": [1, 2]}, r"properties must be whole numbers of shape \(1,\)"),
+        ({"properties": [True]}, r"properties must be whole numbers of shape \(1,\)"),
+        ({"ids": 3}, r"ids must be whole numbers of shape \(1,\); got shape \(\)"),
+        ({"name": None}, "the name of a block must be a str"),
+    ],
+)
+def test_blocks_of_the_wrong_form_are_refused(spoil, words):
+    with pytest.raises(kl.MeshError, match=words):
+        with_block(kl.box(), **spoil)
+
+
+def test_a_mesh_is_made_of_a_dict_or_of_blocks():
+    box, cells = kl.box(), kl.box().blocks[0].nodes
+    made = kl.Mesh(box.points.tolist(), {"KinematicLinear3D8N": cells.tolist()})
+    assert (made.n_elements, made.blocks[0].shape) == (1, box.blocks[0].shape)
+    np.testing.assert_array_equal(made.points, box.points)
+    made = kl.Mesh(box.points, [kl.Block("KinematicLinear3D8N", [list(range(8))])])
+    assert (made.element_ids.tolist(), made.blocks[0].properties.tolist()) == ([1], [1])
+    made = kl.Mesh(box.points, {"KinematicLinear3D8N": cells, "KinematicLinear3D4N": [[0, 1, 2, 4]] * 2})
+    assert made.element_ids.tolist() == [1, 2, 3]
+    for wrong in ([[0, 1, 2, 3]], "KinematicLinear3D8N", cells, 3, [None], made):
+        with pytest.raises(kl.MeshError, match=r"nodes by element name, as in kl\.Mesh\(points, \{'Kin"):
+            kl.Mesh(box.points, wrong)
+    with pytest.raises(kl.MeshError, match="no element 'tetra'; with 4 nodes there is KinematicLinear3D4N"):
+        kl.Mesh(box.points, {"tetra": [[0, 1, 2, 3]]})
+    with pytest.raises(kl.MeshError, match="no element 'line', nor any with 2 nodes"):
+        kl.Mesh(box.points, {"line": [[0, 1]]})
+    with pytest.raises(kl.MeshError, match="points must be made of real numbers"):
+        kl.Mesh(box.points + 1j)
 
 
 def test_elements_that_cover_each_other_are_reported():

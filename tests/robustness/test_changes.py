@@ -86,16 +86,27 @@ def test_lost_equilibrium_of_prescribed_values_is_an_error(monkeypatch):
         model.solve("dense")
 
 
-def test_a_result_keeps_the_points_it_was_solved_with():
-    model = pressed()
-    result, other = model.solve(), model.solve()
-    right = result.stress("element").copy()
-    with pytest.raises(ValueError, match="read-only"):
-        model.mesh.points[:, 2] *= 2
-    model.mesh.points = model.mesh.points * [1, 1, 2]
-    np.testing.assert_array_equal(other.stress("element"), right)
-    np.testing.assert_array_equal(result.stress("element"), right)
-    assert result.mesh.points[:, 2].max() == other.mesh.points[:, 2].max() == 1
+def test_a_mesh_does_not_change_and_gives_others():
+    points, cells = kl.box().points.copy(), kl.box().blocks[0].nodes.copy()
+    mesh = kl.Mesh(points, {"KinematicLinear3D8N": cells}, parts={"top": kl.Part(nodes=[4, 5])})
+    points += 1
+    cells[:] = 0  # the arrays that it was made of are the caller's
+    assert mesh.points.min() == 0
+    assert mesh.blocks[0].nodes.max() == 7
+    for name, value in (("points", points), ("blocks", ()), ("parts", {}), ("node_ids", [1])):
+        with pytest.raises((kl.MeshError), match=rf"does not change; .* mesh\.replace\({name}=\.\.\.\)"):
+            setattr(mesh, name, value)
+    with pytest.raises(AttributeError):
+        pressed().mesh = mesh
+    with pytest.raises(TypeError):
+        mesh.parts["top"] = kl.Part()
+    with pytest.raises(AttributeError):
+        mesh.blocks[0].nodes = cells
+    with pytest.raises(AttributeError):
+        mesh.parts["top"].nodes = [1]
+    taller = mesh.replace(points=mesh.points * [1, 1, 2])
+    assert (mesh.points[:, 2].max(), taller.points[:, 2].max()) == (1, 2)
+    assert taller.parts == mesh.parts
 
 
 def test_warnings_of_rules_come_once():
@@ -110,7 +121,9 @@ def test_warnings_of_rules_come_once():
 def test_what_a_model_was_checked_with_cannot_be_changed_in_place():
     model = pressed()
     model.stress_free_at(np.zeros_like(model.mesh.points))
-    arrays = [model.mesh.points, model.mesh.blocks[0].nodes, model.prestress, model.initial_displacement]
+    mesh, block = model.mesh, model.mesh.blocks[0]
+    arrays = [mesh.points, mesh.node_ids, mesh.parts["z-"].nodes, block.nodes, block.ids, block.properties]
+    arrays += [model.prestress, model.initial_displacement]
     for array in (*arrays, model.supports.fixed, model.supports.values):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1

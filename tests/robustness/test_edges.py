@@ -113,8 +113,10 @@ def test_traction_refuses_conditions_that_are_no_faces(name):
     mesh = kl.box()
     shape = SHAPES[name]
     nodes = mesh.nodes("z+")[: len(shape.nodes)][None, :].astype(np.int32)
-    mesh.conditions = [kl.Block(name, nodes, np.array([7]), np.array([1]), shape)]
-    mesh.parts["top"] = kl.Part(nodes=mesh.nodes("z+"), conditions=np.array([0]))
+    top = kl.Part(nodes=mesh.nodes("z+"), conditions=np.array([0]))
+    mesh = mesh.replace(
+        conditions=[kl.Block(name, nodes, [7], shape=shape)], parts={**mesh.parts, "top": top}
+    )
     model = kl.Model(mesh, STEEL)
     model.fix("z-")
     model.add(kl.Traction("top", (0, 0, 1.0)))
@@ -127,7 +129,7 @@ def test_traction_refuses_conditions_that_are_no_faces(name):
 def test_checkerboard_of_cells_that_meet_at_edges_is_solved_if_it_is_held():
     mesh = kl.box((2, 2, 1), (2, 2, 1))
     block = mesh.blocks[0]
-    mesh.blocks = [block.take(np.array([0, 3]))]
+    mesh = mesh.replace(blocks=[block.take(np.array([0, 3]))])
     model = kl.Model(mesh, STEEL)
     model.fix(mesh.blocks[0].nodes[0], "xyz")
     with pytest.raises(
@@ -146,7 +148,7 @@ def test_body_whose_nodes_all_belong_to_others_is_still_a_body():
     block = mesh.blocks[0]
     middle = np.round(mesh.points[block.nodes].mean(axis=1) * 2).astype(int)
     odd = (middle.sum(axis=1) // 2) % 2 == 0
-    mesh.blocks = [block.take(odd)]
+    mesh = mesh.replace(blocks=[block.take(odd)])
     model = kl.Model(mesh, STEEL)
     model.fix("z-")
     model.add(kl.Gravity((1.0, 2.0, -9.81)))
@@ -202,7 +204,7 @@ def test_boundary_follows_the_blocks():
     before = sum(len(block) for block in mesh.boundary)
     block = mesh.blocks[0]
     inner = np.linalg.norm(mesh.points[block.nodes].mean(axis=1) - [0.5, 0.5, 5 / 6], axis=1) < 1e-9
-    mesh.blocks[0] = block.take(~inner)
+    mesh = mesh.replace(blocks=[block.take(~inner)])
     assert sum(len(block) for block in mesh.boundary) == before - 1 + 5
     assert len(mesh.element_ids) == 26
     assert sum(len(face) for face in mesh.faces("z+")) == 8

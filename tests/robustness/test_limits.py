@@ -64,7 +64,7 @@ def test_a_gzip_bomb_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch
 
 @pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D27N"])
 def test_a_box_that_no_memory_holds_is_refused_at_once(element):
-    with pytest.raises(kl.InputError, match=r"bricks has [16]e"):
+    with pytest.raises(kl.InputError, match="bricks has more than"):
         kl.box(cells=(10**6,) * 3, element=element)
     with pytest.raises(kl.InputError, match="bricks has"):
         kl.annulus(1.0, 2.0, 1.0, cells=(1e300, 3, 1))
@@ -172,15 +172,6 @@ def test_a_state_with_numbers_that_are_none_is_refused(tmp_path):
     state.values["u"][0] = np.nan
     with pytest.raises(kl.SolveError, match=r"s\.npz: not written: u is not finite"):
         kl.write(tmp_path / "s.npz", state)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("ending", [".vtu", ".vtk", ".mdpa", ".elem", ".msh"])
-def test_a_mesh_with_a_coordinate_that_is_no_number_is_not_written(tmp_path, ending):
-    mesh = kl.box()
-    mesh.points[3, 1] = np.nan
-    with pytest.raises(kl.KratosLiteError, match="not finite"):
-        kl.write(tmp_path / f"a{ending}", mesh)
     assert not list(tmp_path.iterdir())
 
 

@@ -124,7 +124,7 @@ def test_a_turned_body_gives_the_turned_answer():
     R = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
     R = R @ np.array([[1, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
     mesh, turned = (kl.box((3, 1, 1), (3, 1, 1), "KinematicLinear3D20N") for _ in range(2))
-    turned.points[:] = turned.points @ R.T
+    turned = turned.replace(points=turned.points @ R.T)
     one, two = kl.Model(mesh, STEEL), kl.Model(turned, STEEL)
     load = np.array([1.0, 2.0, 3.0])
     for model, force in ((one, load), (two, R @ load)):

@@ -68,7 +68,7 @@ def test_thick_cylinder(nodes, nu):
     r = np.interp(mesh.points[:, 0], range(6), RADII)
     angle = np.deg2rad(10) * mesh.points[:, 1]
     bottom, top = mesh.nodes("y-"), mesh.nodes("y+")
-    mesh.points[:, :2] = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
+    mesh = mesh.replace(points=np.column_stack([r * np.cos(angle), r * np.sin(angle), mesh.points[:, 2]]))
     model = kl.Model(mesh, kl.Isotropic3D(E=1000.0, nu=nu))
     model.fix("z-", "z")
     model.fix("z+", "z")
@@ -132,7 +132,7 @@ def octant(n, nodes, split):
     radius = np.linalg.norm(mesh.points, axis=1)
     shell = np.rint((radius - 1) * 2 * n) / (2 * n) + 1  # mid-edge nodes go out to their sphere
     if nodes > 8:
-        mesh.points *= (shell / radius)[:, None]
+        mesh = mesh.replace(points=mesh.points * (shell / radius)[:, None])
     return mesh, shell
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import with_block
 
 import kratos_lite as kl
 
@@ -57,7 +58,7 @@ def test_pressure_pushes_inward_on_flat_faces(nodes):
 @pytest.mark.parametrize("nodes", KINDS)
 def test_pressure_all_around_a_curved_body_has_no_resultant(nodes):
     mesh = kl.annulus(1.0, 2.0, 0.5, (2, 7, 1), kind(nodes))
-    mesh.points[:] += 0.05 * np.sin(3 * mesh.points[:, [1, 2, 0]])
+    mesh = mesh.replace(points=mesh.points + 0.05 * np.sin(3 * mesh.points[:, [1, 2, 0]]))
     forces = nodal(mesh, kl.Pressure(np.ones(mesh.n_nodes, dtype=bool), 1e3))
     size = np.abs(forces).sum()
     assert size > 1e3
@@ -147,9 +148,8 @@ def test_nodal_gravity_is_interpolated(nodes):
 
 
 def test_volume_loads_can_act_on_a_part_or_a_property():
-    mesh = kl.box(cells=(1, 1, 4))
-    mesh.parts["low"] = kl.Part(elements=np.array([0, 1]))
-    mesh.blocks[0].properties[3] = 7
+    mesh = with_block(kl.box(cells=(1, 1, 4)), properties=[1, 1, 1, 7])
+    mesh = mesh.replace(parts={"low": kl.Part(elements=[0, 1])})
     assert nodal(mesh, kl.Gravity((0, 0, -2), "low"))[:, 2].sum() == pytest.approx(-7850, rel=1e-13)
     assert nodal(mesh, kl.BodyForce((0, 0, -8), 7))[:, 2].sum() == pytest.approx(-2, rel=1e-13)
     assert nodal(mesh, kl.BodyForce((0, 0, -8), [0, 3]))[:, 2].sum() == pytest.approx(-4, rel=1e-13)

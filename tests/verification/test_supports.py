@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from meshes import with_block
 
 import kratos_lite as kl
 
@@ -74,7 +75,7 @@ def test_skew_rollers_let_a_turned_bar_behave_as_the_straight_one(solver):
     straight = stretched().solve()
     mesh = kl.box((2, 1, 1), (2, 2, 2))
     sides = {side: mesh.nodes(side) for side in ("x-", "x+", "y-", "z-")}
-    mesh.points[:] = mesh.points @ turn.T
+    mesh = mesh.replace(points=mesh.points @ turn.T)
     model = kl.Model(mesh, STEEL)
     model.fix(sides["z-"], "z")
     corner = set(sides["x-"]) & set(sides["y-"])
@@ -197,8 +198,7 @@ def test_tied_coincident_nodes_join_two_bodies():
 
 
 def test_two_materials_in_series_share_the_stress():
-    mesh = kl.box((1, 1, 2), (1, 1, 2))
-    mesh.blocks[0].properties[:] = (3, 8)
+    mesh = with_block(kl.box((1, 1, 2), (1, 1, 2)), properties=[3, 8])
     soft, hard = kl.Isotropic3D(E=1.0, nu=0.0), kl.Isotropic3D(E=4.0, nu=0.0)
     model = kl.Model(mesh, {3: soft, 8: hard})
     model.fix("z-")

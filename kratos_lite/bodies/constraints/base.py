@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.free_body import FreeBody
-from kratos_lite.bodies.linear_algebra import Entries
+from kratos_lite.bodies.linear_algebra import Entries, block_entries
 from kratos_lite.bodies.validation import points_of
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
@@ -192,6 +192,43 @@ class Constraint(ABC):
         if body.jacobian_is_constant and not self.turning:
             self._jacobian = H
         return H
+
+    def turning_stiffness(self, x: Array, multipliers: Array) -> Array:
+        """Return the derivative of the reactions as the directions change with the places.
+
+        Parameters
+        ----------
+        x : (m, 3) m, where the points are.
+        multipliers : (m, r) N, along the directions.
+
+        Returns
+        -------
+        (m, 3, 3) float, N/m.
+        """
+        return np.zeros((len(x), 3, 3))
+
+    def tangent_entries(self, body: FreeBody, q: Array, multipliers: Array) -> list[Entries]:
+        """Return the derivative of the generalized reactions with respect to q.
+
+        Parameters
+        ----------
+        body : the one that is held.
+        q : its configuration.
+        multipliers : (m r,) N, along the directions.
+
+        Returns
+        -------
+        list of rows (k,), columns (k,) and values (k,).
+        """
+        if not self.turning:
+            return []
+        x = body.position(self.points, q)
+        changes = self.turning_stiffness(x, multipliers.reshape(self.directions(x).shape[:2]))
+        entries = []
+        for X, change in zip(self.points, changes, strict=True):
+            dofs, H = body.jacobian(X, q)
+            entries.append(block_entries(dofs, dofs, H.T @ change @ H))
+        return entries
 
     def gaps(self, body: FreeBody, q: Array, u: Array, time: float, h: float) -> Array:
         """Return the gaps of a body; see `gap`.

@@ -105,6 +105,13 @@ class RigidLink(Constraint):
         y = x - self.anchor
         return np.asarray(y / np.linalg.norm(y))[:, None]
 
+    def turning_stiffness(self, x: Array, multipliers: Array) -> Array:
+        """Return the reaction over the length, across the link; see `Constraint.turning_stiffness`."""
+        n = self.directions(x)[:, 0]
+        distance = np.linalg.norm(x - self.anchor, axis=1)
+        across = np.eye(3) - n[:, :, None] * n[:, None, :]
+        return np.asarray((multipliers[:, 0] / distance)[:, None, None] * across)
+
     def gap(self, x: Array, v: Array, time: float, h: float) -> Array:
         """Return by how much the link is too long; see `Constraint.gap`."""
         stretch = np.linalg.norm(x - self.anchor, axis=1) - self.length

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Gravity, Load, TimeDependentLoad
@@ -18,6 +19,8 @@ from kratos_lite.typing import Array
 
 Generalized: TypeAlias = Callable[[Array, Array, float], Array]
 """Gives the generalized force (..., dofs) at a configuration, a velocity and a time."""
+Tangent: TypeAlias = Callable[[Array, Array, float], Entries]
+"""Gives the derivative of a generalized force with respect to q, in the velocities at rest."""
 FRAMES = ("spatial", "convected")
 
 
@@ -35,6 +38,8 @@ class AppliedLoad:
     generalized : the generalized force for the amplitude 1.
     acceleration : (3,) m/s² if the load is gravity, alike everywhere.
     spatial, convected : generalized force (..., dofs) fixed in space, or in a rigid body, if that is all.
+    tangent : its derivative with respect to q, of single deformable bodies; None where it does not depend on
+        q, or where a function of the user does not tell.
     potential_energy : of a conservative load for the amplitude 1, (...) in J.
     follows_velocity : whether it may depend on the velocity.
     amplitude : function of the time in s.
@@ -45,6 +50,7 @@ class AppliedLoad:
     acceleration: Array | None = None
     spatial: Array | None = None
     convected: Array | None = None
+    tangent: Tangent | None = None
     potential_energy: Callable[[Array], Array] = no_potential
     follows_velocity: bool = False
     amplitude: Callable[[float], float] = lambda time: 1.0
@@ -60,11 +66,18 @@ class AppliedLoad:
         def potential(q: Array) -> Array:
             return np.asarray(-(mass * (acceleration * q[..., 9:]).sum(axis=-1)))
 
-        return cls(generalized, acceleration, spatial, convected, potential)
+        return cls(generalized, acceleration, spatial, convected, potential_energy=potential)
 
     def __call__(self, q: Array, u: Array, time: float) -> Array:
         """Return the generalized force (..., dofs) at a configuration, a velocity and a time."""
         return self.amplitude(time) * self.generalized(q, u, time)
+
+    def derivative(self, q: Array, u: Array, time: float) -> Entries:
+        """Return the derivative of the generalized force with respect to q."""
+        if self.tangent is None:
+            return NO_ENTRIES
+        row, column, value = self.tangent(q, u, time)
+        return row, column, self.amplitude(time) * value
 
     @property
     def is_constant(self) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import Entries, block_entries
 from kratos_lite.bodies.loads.base import FRAMES, AppliedLoad, BodyLoad, no_potential
 from kratos_lite.bodies.validation import fitting, one_point, vector_of
 from kratos_lite.errors import InputError, ModelError
@@ -37,6 +38,7 @@ class Force(BodyLoad):
             return AppliedLoad(
                 lambda q, u, t: body.generalized_force(X, body.convected(f, X, q), q),
                 convected=body.body_fixed_force(X, f),
+                tangent=lambda q, u, t: _convected_tangent(body, X, f, q),
             )
         central = body.jacobian_is_constant or bool((np.abs(X - body.center) == 0).all())
         return AppliedLoad(
@@ -109,6 +111,15 @@ class Spring(BodyLoad):
             rate = float(direction @ (H @ u[dofs]))
             return body.generalized_force(X, -self._pull(distance - L, rate) * direction, q)
 
+        def tangent(q: Array, u: Array, time: float) -> Entries:
+            y = body.position(X, q) - anchor
+            distance = float(np.linalg.norm(y))
+            dofs, H = body.jacobian(X, q)
+            n = y / distance if distance > 0 else np.zeros(3)
+            along, across = self._stiffness(distance - L, float(n @ (H @ u[dofs])), distance)
+            push = -across * np.eye(3) - (along - across) * np.outer(n, n)
+            return block_entries(dofs, dofs, H.T @ push @ H)
+
         def potential(q: Array) -> Array:
             if callable(self.stiffness):
                 return no_potential(q)
@@ -116,12 +127,33 @@ class Spring(BodyLoad):
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
-        return AppliedLoad(generalized, potential_energy=potential, follows_velocity=damped)
+        return AppliedLoad(generalized, tangent=tangent, potential_energy=potential, follows_velocity=damped)
+
+    def _stiffness(self, elongation: float, rate: float, distance: float) -> tuple[float, float]:
+        """Return the derivative of the pull along the spring, and across it, at rest, in N/m."""
+        if callable(self.stiffness):
+            h = 1e-6 * max(distance, abs(elongation), 1e-12)
+            along = (self._pull(elongation + h, rate) - self._pull(elongation - h, rate)) / (2 * h)
+        else:
+            along = self.stiffness
+        return along, self._pull(elongation, rate) / distance if distance > 0 else along
 
     def _pull(self, elongation: float, rate: float) -> float:
         if callable(self.stiffness):
             return float(self.stiffness(elongation, rate))
         return self.stiffness * elongation + self.damping * rate
+
+
+def _convected_tangent(body: FreeBody, X: Array, force: Array, q: Array) -> Entries:
+    """Return the derivative of a force that moves with a body, whose F is linear in q."""
+    dofs, H = body.jacobian(X, q)
+    zero = np.zeros_like(q)
+    columns = []
+    for dof in dofs:
+        one = zero.copy()
+        one[dof] = 1.0
+        columns.append(body.convected(force, X, one) - body.convected(force, X, zero))
+    return block_entries(dofs, dofs, H.T @ np.transpose(columns))
 
 
 def _checked_frame(frame: str) -> str:

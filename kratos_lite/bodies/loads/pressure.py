@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from kratos_lite.assembly.element_groups import add_nodal
 from kratos_lite.bodies.free_body import FreeBody
+from kratos_lite.bodies.linear_algebra import Entries, block_entries, sum_of
 from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
-from kratos_lite.elements import surface_pressure
+from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
 from kratos_lite.model.loads import outward
@@ -65,4 +68,15 @@ class FollowerPressure(BodyLoad):
                 raise ModelError("a following pressure acts on single bodies; integrate them one by one")
             return body.generalized_nodal_force(nodal(body.position(mesh.points, q)), q)
 
-        return AppliedLoad(generalized)
+        def tangent(q: Array, u: Array, time: float) -> Entries:
+            x = body.position(mesh.points, q)
+            return body.generalized_nodal_tangent(sum_of(changes(x)))
+
+        def changes(x: Array) -> Iterator[Entries]:
+            for block, p in blocks:
+                assert block.shape is not None
+                dofs = (3 * block.nodes[..., None] + np.arange(3)).reshape(len(block.nodes), -1)
+                change = surface_pressure_tangent(block.shape, x[block.nodes], p)
+                yield block_entries(dofs, dofs, change)
+
+        return AppliedLoad(generalized, tangent=tangent)

@@ -45,7 +45,7 @@ def repeated_nodes(ids: Ints, points: Array, lines: NDArray[np.int32]) -> Iterat
         yield row, already(f"node {ids[row]}", int(lines[first]), how), is_same
 
 
-def wrong_nodes(ids: Ints, rows: NDArray[np.int32]) -> Iterator[tuple[int, str]]:
+def wrong_nodes(ids: Ints, rows: Ints) -> Iterator[tuple[int, str]]:
     """Yield cell and message for each node that is missing (row -1) or that a cell names twice.
 
     Parameters

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -186,18 +187,17 @@ class _Reading:
                 # Gmsh 2 files repeat an element for every group it is in: it would be stiff twice.
                 raise InputError(f"{self.path}: {block.name} listed twice; save it from Gmsh as version 4.1")
         used = sorted({int(i) for block in elements for i in np.unique(block.properties)} or {1})
-        for block in conditions:
-            block.properties[:] = used[0]
+        conditions = [replace(block, properties=np.full(len(block), used[0])) for block in conditions]
         if not elements:
             self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
-        node_ids = self._name(elements)
+        elements, node_ids = self._named(elements)
         self._note_lost()
         source, parts, points = self.path.name, self._parts(), self.found.points
         mesh = Mesh(points, elements, node_ids=node_ids, conditions=conditions, parts=parts, source=source)
         return Document(mesh, {i: Properties(i) for i in used}, notes=self.notes)
 
-    def _name(self, elements: list[Block]) -> Ints:
-        """Give the elements the ids that our own files state, and return those of the nodes."""
+    def _named(self, elements: list[Block]) -> tuple[list[Block], Ints]:
+        """Return the elements with the ids that our own files state, and the ids of the nodes."""
         n, m = len(self.found.points), sum(map(len, elements))
         node_ids = _ids([named] if (named := self.found.point_data.get("NODE_ID")) is not None else [], n)
         solids = [b for b, dim in enumerate(self.dims) if dim == 3]
@@ -207,15 +207,14 @@ class _Reading:
         if ids is not None:
             in_order = np.empty_like(ids)
             in_order[rows] = ids
-            for block in elements:
-                block.ids[:] = in_order[block.ids - 1]
+            elements = [replace(block, ids=in_order[block.ids - 1]) for block in elements]
             self.used.add("ELEMENT_ID")
         if node_ids is None:
             node_ids = np.arange(1, n + 1)
             self.notes.append(Note(0, f"nodes are numbered 1 … {n} in the order of the file"))
         else:
             self.used.add("NODE_ID")
-        return node_ids
+        return elements, node_ids
 
     def _sets(self) -> dict[str, list[Ints]]:
         """Return the named groups of cells: rows in each block of meshio."""
@@ -249,10 +248,9 @@ class _Reading:
                 properties.append(self._properties(b)[keep])
             name = _NAMES[kind.nodes.shape[1]].format(len(kind.nodes))
             ids = np.arange(first + 1, start + 1)
-            block = Block(name, np.vstack(nodes).astype(np.int32), ids, np.concatenate(properties), kind)
+            block = Block(name, np.vstack(nodes), ids, np.concatenate(properties), kind)
             if len(block):
-                self._orient_wedges(block)
-                blocks.append(block)
+                blocks.append(self._with_oriented_wedges(block))
         return blocks
 
     def _kept(self, b: int) -> Ints:
@@ -280,19 +278,21 @@ class _Reading:
             raise InputError(f"{self.path}: {key} must be one whole number ≥ 0 for each cell; got {shown}")
         return numbers.astype(np.int64)
 
-    def _orient_wedges(self, block: Block) -> None:
+    def _with_oriented_wedges(self, block: Block) -> Block:
         """Undo the exchange of wedge nodes where a VTK file did not follow the order meshio expects.
 
         VTK's text inverts its linear wedge, VTK's formulas (and most writers) do not; the sign of
         the volume tells which was meant.
         """
         if block.name != "KinematicLinear3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
-            return
+            return block
         X = self.found.points[block.nodes]
         upward = X[:, 3:].sum(axis=1) - X[:, :3].sum(axis=1)
         normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
         inverted = np.einsum("ij,ij->i", normal, upward) < 0
-        block.nodes[inverted] = block.nodes[inverted][:, [0, 2, 1, 3, 5, 4]]
+        return replace(
+            block, nodes=np.where(inverted[:, None], block.nodes[:, [0, 2, 1, 3, 5, 4]], block.nodes)
+        )
 
     def _note_lost(self) -> None:
         """Note cells and data that are not used."""
@@ -323,6 +323,7 @@ class _Reading:
         for name, chosen in self.found.point_sets.items():
             if chosen is None:
                 continue
-            part = parts.setdefault(name, Part())
-            part.nodes = np.unique(np.concatenate([part.nodes, np.asarray(chosen, dtype=np.int64)]))
+            part = parts.get(name, Part())
+            nodes = [part.nodes, np.asarray(chosen, dtype=np.int64)]
+            parts[name] = replace(part, nodes=np.unique(np.concatenate(nodes)))
         return parts

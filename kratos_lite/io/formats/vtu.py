@@ -67,8 +67,7 @@ def write_vtu(
     --------
     >>> import numpy as np
     >>> from kratos_lite.shapes import Tetrahedron4
-    >>> tetra = Block("T", np.array([[0, 1, 2, 3]]), np.array([1]), np.array([1]), Tetrahedron4)
-    >>> mesh = Mesh(Tetrahedron4.nodes, [tetra])
+    >>> mesh = Mesh(Tetrahedron4.nodes, {"KinematicLinear3D4N": [[0, 1, 2, 3]]})
     >>> write_vtu(getfixture("tmp_path") / "one.vtu", mesh, {"TEMPERATURE": np.ones(4)})
     """
     if Path(path).suffix.lower() == ".gz":

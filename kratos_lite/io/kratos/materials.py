@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,11 @@ def _assign(entry: Settings, context: RunContext, document: Document, number: in
     entry.expect(len(rows), "model_part_name", f"{text} are {', '.join(have)}")
     mask = np.zeros(context.mesh.n_elements, dtype=bool)
     mask[rows] = True
-    for block, at in with_rows(context.mesh.blocks):
-        block.properties = np.where(mask[at], number, block.properties)
+    blocks = [
+        replace(block, properties=np.where(mask[at], number, block.properties))
+        for block, at in with_rows(document.mesh.blocks)
+    ]
+    document.mesh = document.mesh.replace(blocks=blocks)
     document.properties.setdefault(number, Properties(number))
 
 

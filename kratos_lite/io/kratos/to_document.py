@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields as constants_of
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,20 +34,16 @@ def document_from(model: Model) -> Document:
     }
     for what, given in unwritten.items():
         if given:
-            raise InputError(f"{what} cannot be written to .mdpa")
+            raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
-    blocks = [
-        Block(block.name, block.nodes, block.ids, numbers[rows], block.shape)
-        for block, rows in with_rows(mesh.blocks)
-    ]
+    blocks = [replace(block, properties=numbers[rows], lines=None) for block, rows in with_rows(mesh.blocks)]
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
-    ids, parts = mesh.node_ids, _parts(mesh)
-    copy = Mesh(mesh.points, blocks, node_ids=ids, conditions=conditions, parts=parts, source=mesh.source)
+    written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
     data = [*_fixed(model), *start, *data]
-    document = Document(copy, properties, nodal_data=data, constraints=_constraints(model))
+    document = Document(written, properties, nodal_data=data, constraints=_constraints(model))
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
@@ -66,7 +63,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
     known: list[tuple[LinearMaterial, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
-            raise InputError("a model with replaced quadrature rules cannot be written to .mdpa")
+            raise InputError("a model with replaced quadrature rules cannot be written to a file of a model")
         prestress = np.zeros((len(group.rows), 6)) if group.prestress is None else group.prestress
         different, which = np.unique(prestress, axis=0, return_inverse=True)
         for i, stress in enumerate(different):
@@ -81,7 +78,7 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
 def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
     name = type(material).__name__
     if name not in KRATOS_LAW:
-        raise InputError(f"material {name} has no name in Kratos; .mdpa files hold {', '.join(KRATOS_LAW)}")
+        raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
     constants = [item.name for item in constants_of(material)]  # type: ignore[arg-type]
     values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
@@ -123,8 +120,7 @@ def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block
     rows = np.flatnonzero((forces != 0).any(axis=1))
     if not len(rows):
         return [], []
-    nodes, ids = rows[:, None].astype(np.int32), np.arange(1, len(rows) + 1)
-    block = Block("PointLoadCondition3D1N", nodes, ids, np.full(len(rows), properties), Point1)
+    block = Block("PointLoadCondition3D1N", rows[:, None], properties=properties, shape=Point1)
     free = np.zeros(len(rows), dtype=bool)
     names = [f"POINT_LOAD_{axis}" for axis in "XYZ"]
     return [block], [Data(n, mesh.node_ids[rows], free, forces[rows, i]) for i, n in enumerate(names)]

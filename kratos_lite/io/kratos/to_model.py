@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def check_elements(document: Document) -> None:
     problems.raise_if_any()
 
 
-def _renamed(blocks: list[Block]) -> list[str]:
+def _renamed(blocks: Sequence[Block]) -> list[str]:
     """Return a note for each kind of element that is solved under another name."""
     notes = {}
     for block in blocks:

@@ -14,10 +14,9 @@ from kratos_lite.bodies import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.io.case import Case
-from kratos_lite.io.runners.in_time import follow, placed
+from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.series import SeriesWriter
-from kratos_lite.io.writers.state import read_state
 from kratos_lite.io.writers.trajectory import draw_trajectory
 from kratos_lite.typing import Array, Progress
 
@@ -27,7 +26,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
     body, time = case.body, case.time
     assert time is not None
     if time.restart is not None:
-        read_state(time.restart).restore(body)
+        restart(time.restart, body)
     for path in case.outputs.results:
         SeriesWriter(path, body)
 

@@ -13,7 +13,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, TimeIntegration
 from kratos_lite.io.writers.recorded import recorded
 from kratos_lite.io.writers.series import SeriesWriter, make_folder
-from kratos_lite.io.writers.state import write_state
+from kratos_lite.io.writers.state import read_state, write_state
 from kratos_lite.validation import fits_memory
 
 STATE = 400.0
@@ -33,6 +33,15 @@ def placed(time: TimeIntegration, action: Callable[[], Iterator[Any]]) -> Iterat
         return action()
     except InputError as error:
         raise InputError(f"{time.place}: {error}" if time.place else str(error)) from None
+
+
+def restart(path: str, subject: Any) -> None:
+    """Let a body or a model go on from the state in a file; InputError, with its name, if it does not fit."""
+    state = read_state(path)
+    try:
+        state.restore(subject)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def follow(case: Case, subject: Any, start: Any, states: Iterator[Any], monitor: Monitor) -> None:

@@ -14,10 +14,9 @@ from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
-from kratos_lite.io.runners.in_time import follow, placed
+from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import draw
-from kratos_lite.io.writers.state import read_state
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import NodalForces, TimeDependentLoad
 from kratos_lite.model.structure import Structure
@@ -34,7 +33,7 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     if not time.balanced and not (time.displacement is None and time.velocity is None):
         transient = TransientAnalysis(_held_at_first(transient), **given)
     if time.restart is not None:
-        read_state(time.restart).restore(transient)
+        restart(time.restart, transient)
 
     def steps() -> Iterator[State]:
         return integrate(transient, time.step, time.steps, every=time.every, progress=progress)

@@ -74,7 +74,7 @@ def draw_trajectory(
     positions = [body.position(body.mesh.points, kept[i]) for i in _telling(body, kept, shown)]
     names = ("kinetic", "internal", "potential", "sum")
     curves = {name: table[:, 1 + i] for i, name in enumerate(names) if table[:, 1 + i].any()}
-    figure = view.motion_figure(
+    figure = view.trajectory_figure(
         body.mesh,
         positions,
         table[:, 6:9],

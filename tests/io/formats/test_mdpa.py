@@ -230,7 +230,7 @@ def test_empty_blocks_are_left_out_and_repeated_blocks_kept(read):
     empty = "Begin Elements Element3D4N\nEnd Elements\nBegin Conditions Odd\nEnd Conditions\n"
     document = read(empty + TETRA + "Begin Elements Element3D4N\n8 1 1 2 3 4\nEnd Elements\n")
     assert [block.ids.tolist() for block in document.mesh.blocks] == [[7], [8]]
-    assert document.mesh.conditions == []
+    assert document.mesh.conditions == ()
 
 
 def test_arrays_have_the_promised_types(read):

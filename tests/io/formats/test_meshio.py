@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,7 +49,9 @@ def test_every_solid_returns_in_kratos_order(tmp_path, name, ending):
 def test_other_formats_keep_the_node_order(tmp_path, ending, names):
     for name in names:
         mesh, path = one(name), tmp_path / f"{name}.{ending}"
-        mesh.points = mesh.points.round(3)  # meshio writes no long negative numbers to Nastran files
+        mesh = mesh.replace(
+            points=mesh.points.round(3)
+        )  # meshio writes no long negative numbers to Nastran files
         write_meshio(path, mesh)
         found = read_meshio(path).mesh
         np.testing.assert_allclose(found.points[found.blocks[0].nodes[0]], mesh.points, rtol=1e-6, atol=1e-12)
@@ -228,8 +231,8 @@ def test_a_format_that_cannot_hold_the_mesh_leaves_the_old_file(tmp_path, capfd,
 
 def test_mixed_cells_keep_their_properties_in_gmsh_files(tmp_path):
     a, b = one("Hexahedron8"), one("Tetrahedron4")
-    b.blocks[0].nodes += 8
-    mesh = Mesh(np.vstack([a.points, b.points + 5]), [*a.blocks, *b.blocks])
+    blocks = [a.blocks[0], replace(b.blocks[0], nodes=b.blocks[0].nodes + 8)]
+    mesh = Mesh(np.vstack([a.points, b.points + 5]), blocks)
     write_meshio(tmp_path / "a.msh", mesh, {}, {"PROPERTIES_ID": np.array([3, 8])})
     found = read_meshio(tmp_path / "a.msh")
     assert [block.properties.tolist() for block in found.mesh.blocks] == [[3], [8]]
@@ -295,11 +298,9 @@ def test_no_gzipped_vtu_is_written(tmp_path, ending):
 @pytest.mark.parametrize("ending", ["vtu", "vtk", "own.vtu"])
 def test_our_own_files_keep_the_ids_of_nodes_and_elements(tmp_path, ending):
     a, b = one("Hexahedron8"), one("Tetrahedron4")
-    b.blocks[0].nodes += 8
-    b.blocks[0].ids[:] = 70
-    a.blocks[0].ids[:] = 90
     points, ids = np.vstack([a.points, b.points + 5]), np.arange(12)[::-1] * 10 + 101
-    mesh = Mesh(points, [*a.blocks, *b.blocks], node_ids=ids)
+    blocks = [replace(a.blocks[0], ids=[90]), replace(b.blocks[0], nodes=b.blocks[0].nodes + 8, ids=[70])]
+    mesh = Mesh(points, blocks, node_ids=ids)
     data = {"ELEMENT_ID": np.array([90, 70]), "PROPERTIES_ID": np.array([4, 4])}
     path = tmp_path / f"a.{ending}"
     (write_vtu if ending == "own.vtu" else write_meshio)(path, mesh, {"NODE_ID": ids}, data)

@@ -25,12 +25,10 @@ def write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mesh = kl.box((0.5, 0.5, 2.0), cells=(1, 1, 4))
     (faces,) = mesh.faces("z+")
-    mesh.parts = {
-        "Bottom": kl.Part(mesh.nodes("z-"), *(np.zeros(0, dtype=np.int64),) * 2),
-        "Top": kl.Part(mesh.nodes("z+"), np.zeros(0, dtype=np.int64), np.arange(1)),
-    }
+    parts = {"Bottom": kl.Part(mesh.nodes("z-")), "Top": kl.Part(mesh.nodes("z+"), conditions=[0])}
     name = "SmallDisplacementSurfaceLoadCondition3D4N"
-    mesh.conditions = [kl.Block(name, faces.nodes, np.ones(1, dtype=np.int64), faces.properties, faces.shape)]
+    face = kl.Block(name, faces.nodes, properties=0, shape=faces.shape)
+    mesh = mesh.replace(conditions=[face], parts=parts)
     kl.write("bare.mdpa", mesh)
     text = (tmp_path / "bare.mdpa").read_text()
     constants = "YOUNG_MODULUS 1e8\nPOISSON_RATIO 0.2\nDENSITY 2000\n"

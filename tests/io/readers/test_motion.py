@@ -24,8 +24,8 @@ def folder(tmp_path, monkeypatch):
         "bar": kl.box((4.0, 0.5, 0.5), cells=(8, 1, 1)),
     }
     for name, mesh in meshes.items():
-        mesh.parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
-        kl.write(f"{name}.mdpa", mesh)
+        parts = {key: part for key, part in mesh.parts.items() if key in ("inner", "outer")}
+        kl.write(f"{name}.mdpa", mesh.replace(parts=parts))
     return tmp_path
 
 
@@ -244,13 +244,13 @@ def test_a_part_that_moves_beside_one_at_rest_in_files_and_in_words(folder):
         kl.Block(b.name, b.nodes + wheel_mesh.n_nodes, b.ids + 12, b.properties, b.shape)
         for b in block.blocks
     ]
-    mesh = kl.Mesh(np.vstack([wheel_mesh.points, np.add(block.points, (2, 0, 0))]), blocks)
     n = wheel_mesh.n_nodes
-    mesh.parts = {
+    parts = {
         "wheel": kl.Part(nodes=np.arange(n), elements=np.arange(12)),
         "hub": kl.Part(nodes=wheel_mesh.nodes("inner")),
         "block": kl.Part(nodes=np.arange(n, n + 8)),
     }
+    mesh = kl.Mesh(np.vstack([wheel_mesh.points, np.add(block.points, (2, 0, 0))]), blocks, parts=parts)
     kl.write("two.mdpa", mesh)
     model = kl.Model(mesh, kl.Isotropic3D(**RUBBER))
     for part in ("hub", "block"):

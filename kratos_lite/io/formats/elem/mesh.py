@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,14 +20,15 @@ from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
 Numbers = TypeVar("Numbers", Ints, Array)
-NO_NODES = np.zeros((0, 0), dtype=np.int32)
 
 
 def read_mesh(files: ElemFiles) -> Mesh:
     """Return the mesh of the set; problems and notes go to `files`."""
     mesh = _nodes(files)
-    mesh.blocks = _cells(files, mesh, "element", ".elem", element_shape)
-    mesh.conditions = _cells(files, mesh, "condition", ".cond", condition_shape)
+    blocks = _cells(files, mesh, "element", ".elem", element_shape)
+    conditions = _cells(files, mesh, "condition", ".cond", condition_shape)
+    if mesh.n_nodes:
+        mesh = mesh.replace(blocks=blocks, conditions=conditions)
     _note_unused(files, mesh)
     return mesh
 
@@ -50,7 +51,8 @@ def _nodes(files: ElemFiles) -> Mesh:
         keep[row] = False
         (source.note if is_same else source.problem)(text, starts[row])
     files.nodes_known &= files.problems.count == before
-    return Mesh(points[keep], node_ids=ids[keep], source=name)
+    finite = np.where(np.isfinite(points), points, 0.0)  # others are problems already
+    return Mesh(finite[keep], node_ids=ids[keep], source=name)
 
 
 def _cells(
@@ -73,29 +75,35 @@ def _cells(
     blocks, end = [], 0
     for name, group in groupby(names):
         rows = slice(end, end := end + len(list(group)))
-        block = Block(name, NO_NODES, ids[rows], properties[rows], shape_of(name), lines[rows])
-        for cell, message in _connect(files, mesh, block, source, (bodies[rows], starts[rows])):
-            source.problem(f"{word} {block.ids[cell]} ({name}){message}", starts[rows.start + cell])
-        blocks.append(block)
+        shape = shape_of(name)
+        nodes, wrong = _connect(files, mesh, shape, source, (bodies[rows], starts[rows]))
+        for cell, message in wrong:
+            source.problem(f"{word} {ids[rows][cell]} ({name}){message}", starts[rows.start + cell])
+        blocks.append(Block(name, nodes, ids[rows], properties[rows], shape, lines[rows]))
     return blocks
 
 
 def _connect(
-    files: ElemFiles, mesh: Mesh, block: Block, source: Source, texts: tuple[list[bytes], list[int]]
-) -> Iterator[tuple[int, str]]:
-    """Fill ``block.nodes`` with the rows of the nodes that each text lists; yield cells and what is wrong."""
+    files: ElemFiles,
+    mesh: Mesh,
+    shape: type[Shape] | None,
+    source: Source,
+    texts: tuple[list[bytes], list[int]],
+) -> tuple[Ints, Iterable[tuple[int, str]]]:
+    """Return the rows of the nodes that each text lists, 0 if unknown, and cells with what is wrong."""
     bodies, starts = texts
     widths = np.array([body.count(b",") + 1 if body else 0 for body in bodies])
-    width = len(block.shape.nodes) if block.shape else max(int(widths[0]), 1)
-    wrong = np.flatnonzero(widths != width).tolist()
-    yield from ((cell, f" has {widths[cell]} nodes; expected {width}") for cell in wrong)
+    width = len(shape.nodes) if shape else max(int(widths[0]), 1)
+    nothing = np.zeros((len(bodies), width), dtype=np.int64)
+    if (widths != width).any():
+        cells = np.flatnonzero(widths != width).tolist()
+        return nothing, [(cell, f" has {widths[cell]} nodes; expected {width}") for cell in cells]
     before = files.problems.count
-    if wrong:
-        return
     nodes = source.integers(bodies, np.repeat(starts, width)).reshape(-1, width)
-    if files.problems.count == before:
-        block.nodes = mesh.node_rows(nodes).astype(np.int32)
-        yield from wrong_nodes(nodes, block.nodes) if files.nodes_known else ()
+    if files.problems.count > before:
+        return nothing, []
+    rows = mesh.node_rows(nodes)
+    return np.maximum(rows, 0), wrong_nodes(nodes, rows) if files.nodes_known else []
 
 
 def _note_unused(files: ElemFiles, mesh: Mesh) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -132,8 +132,6 @@ def _check(document: Document, problems: Problems) -> None:
     mesh = document.mesh
     if not mesh.n_nodes:
         problems.add("there are no nodes to write; expected at least one")
-    if not np.isfinite(mesh.points).all():
-        problems.add("some coordinates are not finite; expected finite numbers")
     for data in document.nodal_data:
         if not _is_scalar(data) and data.fixed.any():
             problems.add(f"{data.variable} is fixed as a whole; fix its components, e.g. {data.variable}_X")
@@ -152,7 +150,7 @@ def _node_lines(mesh: Mesh) -> list[str]:
     return ["NODES = NodesList([", text, "])"]
 
 
-def _cell_lines(mesh: Mesh, blocks: list[Block], word: str) -> list[str]:
+def _cell_lines(mesh: Mesh, blocks: Sequence[Block], word: str) -> list[str]:
     return [
         f"{word}[{cell}] = {block.name}({nodes},{properties});"
         for block in blocks

@@ -26,11 +26,11 @@ def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequen
     if source.problems.count > before:
         # Every element at a broken node would be one more problem without a cause of its own.
         source.problems.raise_if_any()
-    mesh.blocks = read_blocks(source, frames["Elements"], mesh)
-    mesh.conditions = read_blocks(source, frames["Conditions"], mesh)
-    for word, blocks in (("element", mesh.blocks), ("condition", mesh.conditions)):
-        _check_properties(source, blocks, word, properties)
-    return mesh
+    blocks = read_blocks(source, frames["Elements"], mesh)
+    conditions = read_blocks(source, frames["Conditions"], mesh)
+    for word, found in (("element", blocks), ("condition", conditions)):
+        _check_properties(source, found, word, properties)
+    return mesh.replace(blocks=blocks, conditions=conditions)
 
 
 def _read_nodes(source: Source, frames: list[Frame]) -> Mesh:
@@ -73,12 +73,12 @@ def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     layout = Layout(word, "ip"[:head] + "i" * width, "nodes", head, needs, alone=not known)
     rows = read_rows(source, frame.spans[0], layout)
     ids = rows.ints[:, 0] if len(rows.ints) else np.zeros(0, dtype=np.int64)
-    nodes = mesh.node_rows(rows.ints[:, head:]).astype(np.int32).reshape(len(ids), width)
+    nodes = mesh.node_rows(rows.ints[:, head:]).reshape(len(ids), width)
     for row, text in wrong_nodes(rows.ints[:, head:], nodes):
         source.problem_in_line(f"{word} {ids[row]} ({name}){text}", int(rows.lines[row]))
     properties = rows.ints[:, 1] if head == 2 and len(ids) else np.zeros(len(ids), dtype=np.int64)
     shape = {"element": element_shape, "condition": condition_shape}.get(word, lambda _: None)(name)
-    return Block(name, nodes, ids, properties, shape, rows.lines)
+    return Block(name, np.maximum(nodes, 0), ids, properties, shape, rows.lines)
 
 
 def _width(kind: str, name: str) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class PartReader:
         self.source = source
         self.ids = ids
         self.order = {kind: np.argsort(values, kind="stable") for kind, values in ids.items()}
-        self.parts: dict[str, Part] = {}
+        self.fields: dict[str, dict[str, Any]] = {}
         self.lines: dict[str, int] = {}
         self._rows: dict[tuple[str, str], list[Ints]] = {}
 
@@ -33,8 +34,8 @@ class PartReader:
         for frame in frames:
             self._read(frame, "")
         for (name, kind), rows in self._rows.items():
-            setattr(self.parts[name], kind, without_repeats(np.concatenate(rows)))
-        return self.parts
+            self.fields[name][kind] = without_repeats(np.concatenate(rows))
+        return {name: Part(**fields) for name, fields in self.fields.items()}
 
     def _read(self, frame: Frame, parent: str) -> None:
         name = frame.arguments[0]
@@ -51,7 +52,7 @@ class PartReader:
             return
         self.lines[full] = self.source.line(frame.offset)
         for ancestor in _chain(full):
-            self.parts.setdefault(ancestor, Part())
+            self.fields.setdefault(ancestor, {"data": {}})
         for child in frame.children:
             self._read_child(child, full)
 
@@ -59,7 +60,7 @@ class PartReader:
         if child.name == "SubModelPart":
             self._read(child, full)
         elif child.name == "SubModelPartData":
-            self.parts[full].data.update(read_values(self.source, child.spans)[0])
+            self.fields[full]["data"].update(read_values(self.source, child.spans)[0])
         elif child.name in LISTS:
             self._add(child, child.name.removeprefix("SubModelPart").lower(), full)
         else:
@@ -79,8 +80,8 @@ class PartReader:
             report(text, int(read.lines[i]))
         for ancestor in _chain(full) if len(ids) else ():
             if is_number:
-                have = getattr(self.parts[ancestor], kind)
-                setattr(self.parts[ancestor], kind, tuple(dict.fromkeys([*have, *ids[exists].tolist()])))
+                have = self.fields[ancestor].get(kind, ())
+                self.fields[ancestor][kind] = tuple(dict.fromkeys([*have, *ids[exists].tolist()]))
             else:
                 self._rows.setdefault((ancestor, kind), []).append(rows[exists])
 

@@ -85,7 +85,7 @@ def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     document.nodal_data = [read_data(source, f, ids["nodes"]) for f in frames["NodalData"]]
     document.element_data = [read_data(source, f, ids["elements"]) for f in frames["ElementalData"]]
     document.condition_data = [read_data(source, f, ids["conditions"]) for f in frames["ConditionalData"]]
-    mesh.parts = PartReader(source, ids).read(frames["SubModelPart"])
+    document.mesh = mesh.replace(parts=PartReader(source, ids).read(frames["SubModelPart"]))
     return document
 
 

@@ -18,7 +18,7 @@ CHECKED = 100
 """Steps after which the critical step is found anew, as the tangent may have stiffened."""
 
 
-class BodyMotion:
+class BodyStepper:
     """One body, or many of one kind as one, with a clock of its own.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Pictures of motions: positions of a body along its path, and curves against time beneath."""
+"""Pictures of trajectories: positions of a body along its path, and curves against time beneath."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FADED = 0.25
 PATH = "#c8442b"
 
 
-def motion_figure(
+def trajectory_figure(
     mesh: Mesh,
     positions: Sequence[Array],
     centers: Array,

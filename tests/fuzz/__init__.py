@@ -1,0 +1,1 @@
+"""Fuzzers: damaged and random inputs of every format, and what must hold for each of them."""
