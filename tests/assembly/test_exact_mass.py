@@ -114,7 +114,7 @@ def mixed(kind):
         warped[nodes] = linear.N(shape.nodes) @ warped[nodes[: shape.corners]]
     bent = warped[:, 2] > 0.9
     warped[bent] += 0.01 * rng.uniform(-1, 1, (int(bent.sum()), 3))
-    mesh.points = warped
+    mesh = mesh.replace(points=warped)
     model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3, density=3.0))
     groups = model.element_groups()
     return SimpleNamespace(
