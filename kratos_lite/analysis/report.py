@@ -32,8 +32,9 @@ class Report:
     total_load, total_reaction : (3,) N.
     solver, reason, iterations : how it was solved and why that way.
     backward_error : |b - A x| / (|A| |x| + |b|), or None.
-    force_error, moment_error : what loads and reactions miss to equilibrium, relative; None where material
-        that moves through the mesh carries momentum, so that they need not balance.
+    force_error, moment_error : what loads, reactions and the internal load of the stresses miss to
+        equilibrium, relative; None where material that moves through the mesh carries momentum, so that they
+        need not balance.
     seconds : per phase.
     peak_memory : bytes.
     warnings, notes : what the checks and the reader found.

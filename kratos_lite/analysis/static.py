@@ -231,7 +231,8 @@ class StaticAnalysis:
             reactions = model.supports.supported(reactions)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
-            balance = checks.equilibrium(model.mesh.points, case.external, reactions, noise * count)
+            inner = stress_load(model, self.groups, u)
+            balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, noise * count)
             judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
@@ -315,9 +316,10 @@ def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) ->
         )
     if max(balance) > 1e-2:
         raise SolveError(
-            f"loads and reactions miss equilibrium by {balance[0]:.1e} (forces) and {balance[1]:.1e} "
-            "(moments) of their size; look for a large stiffness contrast, spurious modes or nearly free "
-            "parts, and please report a model that has none"
+            f"loads, reactions and stresses miss equilibrium by {balance[0]:.1e} (forces) and "
+            f"{balance[1]:.1e} (moments) of their size; look for a large stiffness contrast, spurious modes, "
+            "nearly free parts or an element class whose stiffness is not that of its stresses, and please "
+            "report a model that has none"
         )
 
 
@@ -336,6 +338,12 @@ def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | N
         return None
     start = np.zeros_like(model.mesh.points) if u0 is None else -u0
     return internal_load(model.mesh.points, groups, start)
+
+
+def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> Array:
+    """Return ∫ B^T σ dV (n, 3) in N of the stresses that a result of u shows, with those of prestress."""
+    u0 = model.initial_displacement
+    return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
 
 
 def _any_axis(mask: Mask) -> Mask:

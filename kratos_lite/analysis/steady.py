@@ -9,7 +9,7 @@ from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMoti
 from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.static import Phases, check_arguments, judge, quality
+from kratos_lite.analysis.static import Phases, check_arguments, initial_loads, judge, quality, stress_load
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
@@ -48,7 +48,10 @@ def solve_steady(
         left = e.system.scatter(A @ u - forces)
         reactions = model.supports.supported(left)
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
-        balance = equilibrium(model.mesh.points, nodal - inner, reactions)
+        stresses = stress_load(model, e.groups, e.system.scatter(u))
+        initial = initial_loads(model, e.groups)
+        stresses = stresses if initial is None else stresses - initial  # as in the load
+        balance = equilibrium(model.mesh.points, nodal - inner, reactions, stresses)
         judge(solution, u, balance)
         critical = None
         if e.terms is not None and e.rates(0.0)[0]:

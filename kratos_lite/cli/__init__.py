@@ -6,13 +6,18 @@ import atexit
 import gc
 import io
 import os
+import signal
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 
 from kratos_lite.cli.options import build_parser, parser_of
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
+
+
+class Terminated(KeyboardInterrupt):
+    """A signal asks the program to end; what Ctrl-C cleans up is cleaned up."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,10 +27,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     debug = "--debug" in words
     try:
-        return _run(words)
-    except KeyboardInterrupt:
-        print("interrupted; nothing half-written is left", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        with _ended_by_signals():
+            return _run(words)
+    except KeyboardInterrupt as error:
+        ended = isinstance(error, Terminated)
+        print(f"{'terminated' if ended else 'interrupted'}; nothing half-written is left", file=sys.stderr)
+        return 128 + error.args[0] if ended else EXIT_INTERRUPTED
     except BrokenPipeError:
         _discard_output()
         return 0
@@ -69,6 +76,27 @@ def _run(words: Sequence[str]) -> int:
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program
     return code
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the program as Ctrl-C does, unless they are ignored or used otherwise."""
+
+    def end(number: int, _: object) -> None:
+        raise Terminated(number)
+
+    ours = []
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+            with suppress(ValueError):  # another thread than the main one
+                signal.signal(number, end)
+                ours.append(number)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def _escape_unknown_characters() -> None:

@@ -56,7 +56,9 @@ def use_threads(count: int | None) -> None:
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.cli.apply_options import case_of
     from kratos_lite.io.run import run
+    from kratos_lite.solvers.blas import reserve_buffers
 
+    reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
     case = case_of(options)

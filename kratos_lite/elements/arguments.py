@@ -15,7 +15,7 @@ def real(value: Any, what: str, tail: tuple[int, ...], cure: str = "", *, error:
     """Return real numbers (..., *tail) as floats; they need not be finite, as results may not be."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind not in "buifO":
+        if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
             raise TypeError
         array = array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
@@ -35,10 +35,10 @@ def points(xi: Any) -> Array:
     return finite(real(xi, "points xi", (3,), "give one point (3,) or many (..., 3)"), "points xi")
 
 
-def elasticity(C: Any) -> Array:
-    """Return C (6, 6) or (..., 6, 6) in Pa."""
-    cure = "give the C of a material, material.C"
-    return finite(real(C, "an elasticity matrix C", (6, 6), cure), "an elasticity matrix C")
+def elasticity(C: Any, X: Array) -> Array:
+    """Return C (6, 6) or (..., 6, 6) in Pa that fits elements placed at X (..., n, 3)."""
+    what = "an elasticity matrix C"
+    return finite(_fitting(real(C, what, (6, 6), "give the C of a material, material.C"), X, what), what)
 
 
 def nodal(u: Any, X: Array, what: str = "displacements u") -> Array:
@@ -62,7 +62,7 @@ def _fitting(values: Array, X: Array, what: str) -> Array:
         np.broadcast_shapes(lead, own)
     except ValueError:
         raise InputError(
-            f"{what} of elements (..., n, 3) = {X.shape} cannot have shape {values.shape}"
+            f"{what} of shape {values.shape} does not fit: leading axes must be {lead}, those of the elements"
         ) from None
     return values
 

@@ -17,6 +17,7 @@ from kratos_lite.elements.own_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
@@ -169,7 +170,9 @@ class PlacedCell:
             If `xi` are not points.
         """
         J = self.J(xi)
-        return self.dN(xi) @ (cofactors(J) / determinant(J)[..., None, None])
+        inverse = cofactors(J)
+        det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
+        return self.dN(xi) @ (inverse / det[..., None, None])
 
     def position(self, xi: ArrayLike) -> Array:
         """Return the places X(xi) of points.
@@ -248,13 +251,19 @@ class PlacedCell:
 
 def _table(shape: type[Shape], name: str, xi: Array, tail: tuple[int, ...]) -> Array:
     """Return N or dN of a shape at points; InputError if the shape does not take them."""
-    values = np.asarray(getattr(shape, name)(xi))
-    if values.shape != (*xi.shape[:-1], *tail):
+    values = _at_point(shape, name, xi.tobytes()).copy() if xi.ndim == 1 else getattr(shape, name)(xi)
+    if np.shape(values) != (*xi.shape[:-1], *tail):
         raise InputError(
             f"{shape.__name__}.{name} must return {(*xi.shape[:-1], *tail)} for points {xi.shape}; "
-            f"got {values.shape}"
+            f"got {np.shape(values)}"
         )
-    return values
+    return np.asarray(values)
+
+
+@remembered
+def _at_point(shape: type[Shape], name: str, xi: bytes) -> Array:
+    """Return N or dN at one point: one element after the other asks for the same ones."""
+    return np.asarray(getattr(shape, name)(np.frombuffer(xi)))
 
 
 def same_methods(cls: type[Any], base: type[Any], *methods: str) -> bool:

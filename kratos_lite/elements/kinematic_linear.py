@@ -29,8 +29,10 @@ from kratos_lite.elements.own_steps import (
     stress_of,
 )
 from kratos_lite.elements.tables import lame_constants, reference_products, tabulate
+from kratos_lite.errors import InputError
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
+from kratos_lite.validation import short
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""
@@ -103,7 +105,14 @@ class KinematicLinear(CellMass):
         -------
         bool
             False if the class overrides one of them.
+
+        Raises
+        ------
+        InputError
+            If `KinematicLinear` has no such method.
         """
+        if unknown := [name for name in methods if not isinstance(name, str) or not hasattr(cls, name)]:
+            raise InputError(f"{cls.__name__} has no method {short(unknown[0])}")
         return same_methods(cls, KinematicLinear, *methods)
 
     # ---- strain --------------------------------------------------------------------------------
@@ -195,8 +204,9 @@ class KinematicLinear(CellMass):
         InputError
             If `C` is not an elasticity matrix or `u` is not made of nodal displacements.
         """
-        C = arguments.elasticity(C)
-        return strain_of(self, u, C) @ np.swapaxes(C, -1, -2)
+        C = arguments.elasticity(C, self.X)
+        strain = strain_of(self, u, C)
+        return strain @ np.swapaxes(arguments.elasticity(C, strain), -1, -2)
 
     def internal_load(self, stress: ArrayLike, C: ArrayLike | None = None) -> Array:
         """Return the internal load r_int = Σ B^T σ γ det J.
@@ -270,7 +280,7 @@ class KinematicLinear(CellMass):
 
     def _stiffness(self, C: ArrayLike) -> Array:
         """Return K (..., 3, n, 3, n) of the steps before it, by a short way where the class inherits them."""
-        C = arguments.elasticity(C)
+        C = arguments.elasticity(C, self.X)
         if C.ndim == 2 and self.inherits(*STRESS, "internal_load"):
             if self.inherits(*GEOMETRY) and self.constant_jacobian:
                 J = self._jacobian(tabulate(self.shape, self.rule)[1][:1])[..., 0, :, :]

@@ -91,7 +91,7 @@ class CellMass(PlacedCell):
         """
         force = arguments.real(b, "a body force b", (3,), "give its x, y and z in N/m³")
         if force.ndim == self.X.ndim and force.shape[-2:] == self.nodes.shape:
-            return self.scalar_mass() @ force
+            return self.scalar_mass() @ arguments.nodal(force, self.X, "a body force b")
         if force.shape[:-1] not in ((), self.X.shape[:-2]):
             raise InputError(
                 f"a body force b must have shape (3,), {(*self.X.shape[:-2], 3)} or {self.X.shape}; "

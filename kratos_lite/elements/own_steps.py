@@ -41,19 +41,29 @@ def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Arr
     if not len(cells):
         return np.zeros((*lead, *tail))
     cut = [_by_element(value, lead) for value in given]
+    placed, at_once = element.__dict__.setdefault("_one_by_one", ({}, {}))
 
     def alone(e: int) -> Array:
-        placed = type(element)(cells[e], element.rule)
-        return _checked(getattr(placed, name)(*[value(e) for value in cut]), type(element), name, tail)
+        if e not in placed:
+            placed[e] = type(element)(cells[e], element.rule)
+        return _checked(getattr(placed[e], name)(*[value(e) for value in cut]), type(element), name, tail)
 
-    ends = alone(0), alone(len(cells) - 1)
+    if name not in at_once:
+        many = _at_once(element, name, len(cells), tail, given)
+        at_once[name] = all(_same(many[e], alone(e)) for e in (0, len(cells) - 1))
+    elif at_once[name]:
+        many = _at_once(element, name, len(cells), tail, given)
+    if not at_once[name]:
+        many = np.stack([alone(e) for e in range(len(cells))])
+    return many.reshape(*lead, *tail)
+
+
+def _at_once(element: Any, name: str, count: int, tail: tuple[int, ...], given: tuple[Any, ...]) -> Array:
+    """Return a step of all elements (count, *tail); not numbers, if the class cannot give it."""
     try:
-        many = np.asarray(getattr(element, name)(*given), dtype=float).reshape(-1, *tail)
-    except Exception:  # as it may, if it was written for one element
-        many = np.empty((0, *tail))
-    if len(many) == len(cells) and _same(many[0], ends[0]) and _same(many[-1], ends[1]):
-        return many.reshape(*lead, *tail)
-    return np.stack([alone(e) for e in range(len(cells))]).reshape(*lead, *tail)
+        return np.asarray(getattr(element, name)(*given), dtype=float).reshape(count, *tail)
+    except Exception:  # of any kind, as the class may be written for one element
+        return np.full((count, *tail), np.nan)
 
 
 def _by_element(value: Any, lead: tuple[int, ...]) -> Callable[[int], Any]:

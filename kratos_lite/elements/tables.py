@@ -9,6 +9,8 @@ from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 
+NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
+
 
 @remembered
 def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
@@ -47,16 +49,20 @@ def lumped(sums: Array, diagonal: Array, shape: type[Shape], rule: Rule) -> Arra
     return np.where((sums > 0).all(axis=-1, keepdims=True), sums, scaled)
 
 
+def _cross(b: Array, c: Array) -> Array:
+    """Return the vector product of (..., 3), for few vectors much faster than that of NumPy."""
+    return b[..., NEXT] * c[..., AFTER] - b[..., AFTER] * c[..., NEXT]
+
+
 def determinant(J: Array) -> Array:
     """Return det of (..., 3, 3)."""
-    a, b, c = np.moveaxis(J, -1, 0)
-    return (a * np.cross(b, c)).sum(axis=-1)
+    return (J[..., 0] * _cross(J[..., 1], J[..., 2])).sum(axis=-1)
 
 
 def cofactors(J: Array) -> Array:
     """Return det(J) J^-1 of (..., 3, 3)."""
-    a, b, c = np.moveaxis(J, -1, 0)
-    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+    a, b, c = J[..., 0], J[..., 1], J[..., 2]
+    return np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-2)
 
 
 def lame_constants(C: Array) -> tuple[float, float] | None:

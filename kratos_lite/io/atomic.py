@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from zipfile import ZipFile
 
 
+FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None), None}
+"""Errors of a full disk, of a file or user that may take no more, and of NumPy, which gives no number."""
+
+
 def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, NDArray[Any]]:
     """Return arrays of an .npz file by name; InputError if it is damaged or not `what` it should be.
 
@@ -157,14 +161,17 @@ def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
 def _text(path: Path, error: OSError, needed: int) -> str:
     """Say what went wrong with `path` and how to cure it; `needed` are the bytes known to be needed."""
     folder = path.absolute().parent
-    if not folder.is_dir():
+    missing = False
+    with suppress(OSError):  # a folder that may not even be looked at is there
+        missing = not folder.is_dir()
+    if missing:
         return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
     cure = "choose a file name in a folder where you may write"
     with suppress(OSError):
         import shutil
 
         free = shutil.disk_usage(folder).free
-        if error.errno == errno.ENOSPC:
+        if error.errno in FULL:
             cure = f"{free} bytes are free; free some space"
             cure = f"at least {needed} bytes are needed, {cure}" if needed else cure
     return f"{path}: cannot be written: {error.strerror or error}; {cure}"

@@ -10,6 +10,8 @@ from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.json_file import Object, read_json
 
 T = TypeVar("T")
+LONGEST = 255
+"""Bytes of the longest name of a file that systems take."""
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 
@@ -183,6 +185,8 @@ def inside(folder: Path, name: str, allow_outside: bool = False) -> Path:
         raise ValueError(
             f"path {name!r} leaves the folder of the run file; give a path inside it, without '..'"
         )
+    if any(len(part.encode()) > LONGEST for part in relative.parts):
+        raise ValueError(f"a name in the path {shown(name)} is longer than {LONGEST} bytes; shorten it")
     return folder / relative
 
 
@@ -195,12 +199,12 @@ def find_file(
     folder, so the last word of the path is looked for beside the run file too.
     """
     name = settings.text(key) + ending
-    if Path(name).is_dir() or (folder / name).is_dir():
-        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
     try:
         path = inside(folder, name, outside)
     except ValueError as error:
         raise settings.error(key, f"{settings.name(key)}: {error}") from None
+    if Path(name).is_dir() or (folder / name).is_dir():
+        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
     beside = folder / path.name
     if path.is_file():
         settings.files.append(path)

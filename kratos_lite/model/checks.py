@@ -287,10 +287,13 @@ def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
         )
 
 
-def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.0) -> tuple[float, float]:
-    """Return |sum of forces| and |sum of moments| of loads and reactions, relative to their sizes.
+def equilibrium(
+    points: Array, loads: Array, reactions: Array, internal: Array, noise: float = 0.0
+) -> tuple[float, float]:
+    """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions.
 
-    Forces that are together below `noise` in N are rounding, and in balance.
+    The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of
+    the stresses.  Forces that are together below `noise` in N are rounding, and in balance.
     """
     total = loads + reactions
     X = points - points.mean(axis=0)
@@ -298,7 +301,8 @@ def equilibrium(points: Array, loads: Array, reactions: Array, noise: float = 0.
     arm = float(np.abs(X).max(initial=0.0))
     if size <= noise:
         return 0.0, 0.0
+    nodal = float(np.abs(total - internal).sum() / size)
     force = float(np.abs(total.sum(axis=0)).max() / size)
     M = X.T @ total
     moment = float(np.abs(M - M.T).max() / (size * arm)) if arm > 0 else 0.0
-    return force, moment
+    return max(force, nodal), moment

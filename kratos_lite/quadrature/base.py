@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from operator import index
 
 from kratos_lite.typing import Array
+from kratos_lite.validation import whole_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,9 @@ class Rule:
         return iter(zip(self.points, self.weights.tolist(), strict=True))
 
     def __getitem__(self, g: int) -> tuple[Array, float]:
-        """Return point (d,) and weight of number g, as iteration does."""
-        return self.points[index(g)], float(self.weights[index(g)])
+        """Return point (d,) and weight of number g; raise InputError for a number without a point."""
+        g = whole_number(g, "the number of a Gauss point", least=0, most=len(self) - 1)
+        return self.points[g], float(self.weights[g])
 
     def __repr__(self) -> str:
         return f"Rule({self.name}: {len(self)} points, degree {self.degree})"

@@ -1,10 +1,28 @@
-"""Threads of dense algebra: more than one only get in each other's way on small arrays."""
+"""Libraries of dense algebra: their memory, and their threads, which small arrays only slow down."""
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from typing import Any, cast
+
+import numpy as np
+
+from kratos_lite.validation import fits_memory
+
+BUFFERS = 1e8
+"""Bytes that such a library takes at its first product; without them OpenBLAS ends the program."""
+
+
+def reserve_buffers(of_scipy: bool = False) -> None:
+    """Let the library of NumPy, or of SciPy, take its memory now; InputError where there is not enough."""
+    fits_memory(BUFFERS, "dense algebra", "end other programs, or raise the limit of memory")
+    if of_scipy:
+        from scipy.linalg.lapack import dpotrf
+
+        dpotrf(np.eye(2))
+    else:
+        np.linalg.inv(np.eye(2))
 
 
 @cache

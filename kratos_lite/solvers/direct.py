@@ -14,6 +14,7 @@ from weakref import finalize
 import numpy as np
 
 from kratos_lite.errors import SolveError
+from kratos_lite.solvers.blas import reserve_buffers
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
@@ -127,6 +128,8 @@ def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
 def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
     from scipy.sparse.linalg import splu
+
+    reserve_buffers(of_scipy=True)
 
     options: dict[str, Any] = {"permc_spec": "COLAMD"}
     if symmetric:

@@ -128,8 +128,8 @@ def skewed(kind: str) -> kl.Mesh:
     """Return a box under a trilinear map, whose cells are no parallelepipeds but have straight edges."""
     mesh = kl.box((1.0, 0.8, 0.6), (3, 3, 3), kind, origin=(0.3, -0.2, 0.1))
     x, y, z = mesh.points.T
-    mesh.points[:] += np.column_stack([0.4 * x * y * z + 0.2 * y * z, 0.3 * x * z - 0.2 * y * x, 0.5 * x * y])
-    return mesh
+    shift = np.column_stack([0.4 * x * y * z + 0.2 * y * z, 0.3 * x * z - 0.2 * y * x, 0.5 * x * y])
+    return mesh.replace(points=mesh.points + shift)
 
 
 @pytest.mark.parametrize(

@@ -194,6 +194,27 @@ def test_velocity_and_acceleration_are_exact_for_affine_displacements(element, w
         assert np.abs(found - expected).max() < 2e-5 * np.abs(expected).max()
 
 
+def test_a_turned_and_shifted_scene_gives_turned_results(wheels):
+    """Mesh, axis, center, Ż and Z̈ turned together, in time, with a rate that changes."""
+    Q, shift, found = exp(np.array([0.5, -1.2, 0.8])), np.array([3.0, -20.0, 7.0]), []
+    field = np.random.default_rng(8).standard_normal(192)
+    for R, place in ((np.eye(3), np.zeros(3)), (Q, shift)):
+        mesh = kl.annulus(0.3, 1.0, 0.2, (2, 16, 1), "KinematicLinear3D8N")
+        assert mesh.n_nodes == 96
+        model = kl.Model(mesh.replace(points=mesh.points @ R.T + place), wheels.steel)
+        model.fix(mesh.nodes("inner"))
+        rates = {"rate": kl.TimeSeries([0.0, 1.0], [10.0, 60.0]), "damping": 2.0}
+        carried = {"center_velocity": R @ (0.1, 0.2, 0.3), "center_acceleration": R @ PULL}
+        model.add(Rotation(R[:, 2], center=place, **rates, **carried))
+        transient = model.transient()
+        *_, state = kl.integrate(transient, 1e-3, 12, every=12)
+        vectors = [state.u, transient.material_velocity(), transient.material_acceleration()]
+        derived = kl.material_derivative(model, field.reshape(96, 2), order=2, time=0.1)
+        found.append((*(v @ R for v in vectors), derived))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())
+
+
 def test_reports_tell_what_the_center_does(wheels):
     result = rotor(wheels, rate=3.0, center_velocity=(1.0, 0, 0), center_acceleration=(0, 2.0, 0)).solve()
     assert result.report.motion["center_velocity"] == [1.0, 0.0, 0.0]

@@ -105,7 +105,7 @@ def _json(data: bytes, rng: Random) -> bytes:
     """Change values, drop keys or exchange subtrees of a JSON text."""
     try:
         value = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return _bytes(data, rng)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         places = _places(value)

@@ -80,7 +80,7 @@ def read_foreign(path: Path) -> Found:
     cells = [Cells(kind, dim, _unpacked(at, arrays)) for kind, dim, at in answer["cells"]]
     counts = [len(one.data) for one in cells]
     for name, values in sets["cell_data"].items():
-        if [-1 if one is None else len(one) for one in values or []] != counts:
+        if not isinstance(values, list) or [-1 if v is None else len(v) for v in values] != counts:
             sets["cell_data"][name] = []  # no numbers: its name is all that is of use
     return Found(_unpacked(answer["points"], arrays), cells, **sets, output=answer["output"])
 

@@ -54,6 +54,7 @@ def read_state(path: str | Path) -> State:
     except (ValueError, TypeError, OverflowError):
         raise InputError(f"{path}: not {WHAT}") from None
     values = read_arrays(path, MODEL_FIELDS if kind == "model" else BODY_FIELDS, WHAT)
-    if head["kind"].dtype.kind != "U" or any(array.dtype != float for array in values.values()):
+    is_counted = head["step"].dtype.kind in "iu" and 0 <= step < 2**62
+    if not is_counted or head["kind"].dtype.kind != "U" or any(a.dtype != float for a in values.values()):
         raise InputError(f"{path}: not {WHAT}")
     return State(kind, integrator, time, step, values)
