@@ -184,7 +184,7 @@ def test_statics_take_one_load_or_several():
         (lambda: model().transient(integrator="central-difference"), "Did you mean central_difference"),
         (lambda: kl.PseudoRigidBody(kl.box(), SOIL, integrator="def_lim"), "Did you mean DEF_LIM"),
         (lambda: kl.RigidBody(kl.box(), SOIL, integrator="Explicit"), "Did you mean explicit"),
-        (lambda: kl.FiniteElementBody(kl.box(), SOIL, formulation="bc_modal"), "Did you mean BC-MODAL"),
+        (lambda: kl.FiniteElementBody(kl.box(), SOIL, formulation="bc_modal"), "Did you mean modal"),
         (lambda: kl.FiniteElementBody(kl.box(), SOIL, formulation="tl"), "Did you mean TL"),
     ],
 )
