@@ -24,6 +24,7 @@ import math
 import operator
 from collections.abc import Iterable
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,6 +36,8 @@ from kratos_lite.typing import Array, Numbers
 
 T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
+LARGEST = 1e50
+"""Size of the largest number that is taken, so that products of some of them are finite."""
 SMALL = 1e7
 """Bytes that every machine has; nobody asks for the free memory before."""
 
@@ -58,7 +61,7 @@ def finite(
     Raises
     ------
     InputError
-        If it is not made of real numbers, not finite, or of another shape.
+        If it is not made of real numbers, not finite, absurdly large, or of another shape.
 
     Examples
     --------
@@ -72,15 +75,17 @@ def finite(
         array = np.asarray(value)
         if array.dtype.kind not in "buifO":
             raise TypeError
-        array = array.astype(float)
+        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
+            array = array.astype(float)
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what} must be made of real numbers; got {short(value)}") from None
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
-    if not np.isfinite(array).all():
-        first = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
+    if not (np.abs(array) <= LARGEST).all():
+        first = tuple(map(int, np.argwhere(~(np.abs(array) <= LARGEST))[0]))
+        wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
-        raise error(f"{what} must be finite; got {found}")
+        raise error(f"{what} must be {wanted}; got {found}")
     return array
 
 
@@ -260,6 +265,36 @@ def function_or_none(value: Any, must: str) -> None:
     """
     if value is not None and not callable(value):
         raise InputError(f"{must}; got {short(value)}")
+
+
+def takes(function: Any, count: int) -> bool:
+    """Return whether something can be called with so many arguments, as far as Python knows.
+
+    >>> takes(lambda t: t, 1), takes(lambda: 0, 1), takes(float, 1), takes(3.0, 1)
+    (True, False, True, False)
+    """
+    import inspect
+
+    if not callable(function):
+        return False
+    try:
+        inspect.signature(function).bind(*[0.0] * count)
+    except TypeError:
+        return False
+    except ValueError:  # compiled functions do not tell
+        pass
+    return True
+
+
+def path_of(value: Any) -> Path:
+    """Return a path to a file.
+
+    >>> path_of("a.json").name
+    'a.json'
+    """
+    if not isinstance(value, (str, PathLike)):
+        raise InputError(f"a path to a file must be text or a pathlib.Path; got {short(value)}")
+    return Path(value)
 
 
 def instance(
