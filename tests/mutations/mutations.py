@@ -96,7 +96,7 @@ MUTATIONS = [
         "elements/surface.py",
         "return -p[..., None, None, None, None]",
         "return p[..., None, None, None, None]",
-        "tests/bodies/test_equilibrium.py",
+        "tests/elements/test_surface.py",
     ),
     Mutation(
         "model/loads/surface.py",
@@ -416,8 +416,8 @@ MUTATIONS = [
     ),
     Mutation(
         "elements/mass.py",
-        "return (N.T * dV[..., None, :]) @ N",
-        "return 0.5 * (N.T * dV[..., None, :]) @ N",
+        "return m * rho[..., None, None]",
+        "return m / rho[..., None, None]",
         "tests/testing tests/elements",
     ),
     # ---- files
