@@ -35,7 +35,8 @@ VALUES = (
 FLAGS = ("--stiffening", "--lumped", "--ignore-initial-displacement", "--lenient", "-v")
 OPTIONS = (
     "--material --fix --gravity --traction --pressure --point-load --rotation --translation --center "
-    "--damping --boundaries --time --restart --integrator --rayleigh --steps --modes --solver --tolerance --json --state"
+    "--damping --boundaries --time "
+    "--restart --integrator --rayleigh --steps --modes --solver --tolerance --json --state"
 ).split()
 
 
