@@ -35,6 +35,8 @@ from kratos_lite.typing import Array, Numbers
 
 T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
+LARGEST = 1e50
+"""Size of the largest number that is taken, so that products of some of them are finite."""
 SMALL = 1e7
 """Bytes that every machine has; nobody asks for the free memory before."""
 
@@ -58,7 +60,7 @@ def finite(
     Raises
     ------
     InputError
-        If it is not made of real numbers, not finite, or of another shape.
+        If it is not made of real numbers, not finite, absurdly large, or of another shape.
 
     Examples
     --------
@@ -72,15 +74,17 @@ def finite(
         array = np.asarray(value)
         if array.dtype.kind not in "buifO":
             raise TypeError
-        array = array.astype(float)
+        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
+            array = array.astype(float)
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what} must be made of real numbers; got {short(value)}") from None
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
-    if not np.isfinite(array).all():
-        first = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
+    if not (np.abs(array) <= LARGEST).all():
+        first = tuple(map(int, np.argwhere(~(np.abs(array) <= LARGEST))[0]))
+        wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
-        raise error(f"{what} must be finite; got {found}")
+        raise error(f"{what} must be {wanted}; got {found}")
     return array
 
 

@@ -25,6 +25,8 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
         return mesh.used_nodes()
     mine = np.zeros(mesh.n_elements, dtype=bool)
     mine[mesh.elements(part)] = True
+    if not mine.any():
+        raise ModelError("a part in motion needs one element at least; got none")
     moving, resting = np.zeros((2, mesh.n_nodes), dtype=bool)
     for block, at in with_rows(mesh.blocks):
         moving[block.nodes[mine[at]]] = True

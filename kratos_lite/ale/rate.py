@@ -35,7 +35,8 @@ class Rate:
         self.steady = not (callable(rate) or callable(acceleration) or acceleration)
         self.is_changing = callable(rate if acceleration is None else acceleration)
         if not callable(rate) and (isinstance(acceleration, TimeSeries) or not callable(acceleration)):
-            self.value = _accelerated(self.value(0.0), acceleration)
+            number = not (acceleration is None or isinstance(acceleration, TimeSeries))
+            self.value = _accelerated(self.value(0.0), self.slope(0.0) if number else acceleration)
 
     def at(self, time: float, step: float = 0.0, steady: bool = False) -> tuple[float, float]:
         """Return rate and acceleration at a time in s.

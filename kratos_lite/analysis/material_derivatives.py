@@ -29,7 +29,7 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
-from kratos_lite.validation import choice, finite
+from kratos_lite.validation import choice, finite, instance
 
 PLACES = ("node", "gauss")
 
@@ -152,6 +152,7 @@ def material_derivative(
     values = finite(field, "a field")
     if values.ndim not in (1, 2) or len(values) != model.mesh.n_nodes:
         raise InputError(f"a field needs shape ({model.mesh.n_nodes},) or (…, k); got {values.shape}")
+    instance(partial, "partial", (list, tuple), "[change]")
     if len(partial) > order:
         raise InputError(f"the order {order} takes up to {order} partial derivatives; got {len(partial)}")
     given = [finite(one, "a partial derivative", values.shape) for one in partial]

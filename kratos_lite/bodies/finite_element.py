@@ -21,6 +21,7 @@ from kratos_lite.bodies.linear_algebra import Entries, Solve
 from kratos_lite.bodies.newton import sparse_step
 from kratos_lite.bodies.rotations import check_rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Located, Mesh
 from kratos_lite.model.mass_properties import MassProperties
@@ -146,7 +147,8 @@ class FiniteElementBody(Deformable):
         moved = self.points + q.reshape(-1, 3)
         for group in self.groups:
             for chunk in group.chunks():
-                lowest = group.at(moved, chunk).dV.min(axis=1)
+                _, dN = tabulate(group.element.shape, group.rule)
+                lowest = group.at(moved, chunk).determinants(dN).min(axis=1)
                 if (lowest <= 0).any():
                     element = self.mesh.element_ids[group.rows[chunk][int(np.argmin(lowest))]]
                     raise InputError(f"these displacements invert element {element}: det J ≤ 0")

@@ -17,7 +17,8 @@ def real(value: Any, what: str, tail: tuple[int, ...], cure: str = "", *, error:
         array = np.asarray(value)
         if array.dtype.kind not in "buifO" or (array.dtype == object and None in array.ravel().tolist()):
             raise TypeError
-        array = array.astype(float, copy=False)
+        with np.errstate(all="ignore"):  # what is too large for a float becomes infinite
+            array = array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         raise _wrong(error, f"{what} must be made of real numbers; got {short(value)}", cure) from None
     if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:

@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.errors import MaterialError
+from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite
 
 MAX_FLOAT = float_info.max
 
@@ -143,8 +144,16 @@ class LinearMaterial:
         Returns
         -------
         (..., 6) float, Pa
+
+        Raises
+        ------
+        InputError
+            The strain has another shape, or is not finite.
         """
-        return np.asarray(strain, dtype=float) @ self.C.T
+        e = finite(strain, "a strain")
+        if e.shape[-1:] != (6,):
+            raise InputError(f"a strain has six components xx yy zz xy yz zx; got shape {e.shape}")
+        return e @ self.C.T
 
     def check_stress(self) -> None:
         """Check that `stress` is C strain, once for each material; what is solved is C.

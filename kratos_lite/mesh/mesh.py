@@ -191,8 +191,13 @@ class Mesh:
         -------
         (...) int
             Rows of `points`; -1 where there is no such id.
+
+        Raises
+        ------
+        MeshError
+            Ids are no whole numbers.
         """
-        ids = np.asarray(ids, dtype=np.int64)
+        ids = whole_numbers(ids, "ids of nodes", error=MeshError)
         if self._is_counting:
             return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
         return rows_of_ids(self.node_ids, ids, self._node_order)

@@ -303,7 +303,7 @@ def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
     try:
-        unknown = np.isnan(np.asarray(value, dtype=float))
+        unknown = np.isnan(value)
     except (TypeError, ValueError):
         unknown = np.False_
     known = finite(np.where(unknown, 1.0, value) if unknown.any() else value, "the volume of a body")
