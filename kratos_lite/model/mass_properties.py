@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.shapes import Shape
@@ -274,13 +273,12 @@ def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Ar
     first, second = np.zeros(3), np.zeros((3, 3))
     for group in groups:
         rule = exact_rule(group.element.shape)
-        N, dN = tabulate(group.element.shape, rule)
         rho = group.material.density
         for chunk in replace(group, rule=rule).chunks():
             element = group.at(X, chunk)
-            dV = element.determinants(dN) * rule.weights
+            dV = element._volumes(rule)
             _check_volumes(dV.sum(axis=1), group, chunk)
-            x, w = (N @ element.X).reshape(-1, 3), dV.ravel()
+            x, w = (element._N(rule) @ element.X).reshape(-1, 3), dV.ravel()
             wx = w[:, None] * x
             mass, volume = mass + rho * float(w.sum()), volume + float(w.sum())
             first += rho * wx.sum(axis=0)
