@@ -12,23 +12,10 @@ from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.quadrature import Rule, rule_for
-from kratos_lite.registry import remembered
-from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constrained_system import among
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.voigt import tensor
-
-
-@remembered
-def exact_rule(shape: type[Shape]) -> Rule:
-    """Return the rule that integrates (c·grad N_i)(c·grad N_j), c linear, over affine cells.
-
-    In each direction of a product c has degree 1 and grad N that of the shape; over a tetrahedron grad N has
-    one less.
-    """
-    return rule_for(shape.cell, 2 * (shape.degree + (0 if shape.cell == "tetrahedron" else 1)))
 
 
 class MotionMatrices:
@@ -121,7 +108,6 @@ class MotionMatrices:
                 self.groups,
                 self._own[0],
                 missing,
-                lambda element: exact_rule(element.shape),
                 velocity,
             )
             self._made |= {name: self._spread(data) for name, data in made.items()}

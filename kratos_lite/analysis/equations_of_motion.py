@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from kratos_lite import solvers
 from kratos_lite.ale import Motion, MotionMatrices
-from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.ale.symmetry import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -90,11 +89,10 @@ class EquationsOfMotion:
         placed = self.system.points, self.system.groups, self.system.pattern
         self.mass = Mass(*placed, lumped)
         self.terms: MotionMatrices | None = None
-        if isinstance(model.motion, Motion):  # by the rule of G and H: then G u = M (L A X) holds for u = L X
-            exact = Mass(*placed, False, lambda element: exact_rule(element.shape))
-            self.mass = Mass(*placed, True, exact.rule_of) if lumped else exact
+        if isinstance(model.motion, Motion):
+            consistent = Mass(*placed, False) if lumped else self.mass
             moving = model.motion.moving(model.mesh)[self.system.nodes]
-            self.terms = MotionMatrices(model.motion, *placed, exact, moving)
+            self.terms = MotionMatrices(model.motion, *placed, consistent, moving)
             check_materials(self.terms)
             self.warnings += model.motion.warnings(model, self.terms.groups)
             if self.rayleigh[1]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
+from kratos_lite.elements.exact import AFFINE, CURVED, ROUNDING, STRAIGHT, geometries, interpolations
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -92,6 +93,32 @@ class ElementGroup:
     def initial_stress(self, chunk: slice) -> Array | float:
         """Return the prestress of a chunk as (m, 1, 6), or 0."""
         return 0.0 if self.prestress is None else self.prestress[chunk, None, :]
+
+
+def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
+    """Cut a group into parts whose rule is exact for a product of shape functions over their cells.
+
+    Parameters
+    ----------
+    points : (n, 3) float, m.
+    group : the elements.
+    factors, flow : see `KinematicLinear.mass_rules`.
+    """
+    parts = group.element.mass_rules(geometries_of(points, group), factors, flow)
+    return [replace(group.take(mask), rule=rule) for mask, rule in parts]
+
+
+def geometries_of(points: Array, group: ElementGroup) -> Ints:
+    """Return AFFINE, STRAIGHT or CURVED of the elements of a group, (m,); see `geometries`."""
+    shape, nodes = group.element.shape, group.tables()[0]
+    if interpolated := getattr(kernels("gauss"), "interpolated", None):
+        found, points = np.full(len(nodes), CURVED), floats(points)
+        for geometry in (STRAIGHT, AFFINE):
+            if spanned := interpolations(shape)[geometry]:
+                found[interpolated(points, nodes, *spanned, ROUNDING) > 0] = geometry
+        return found
+    parts = [geometries(shape, points[nodes[chunk]]) for chunk in group.chunks()]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
 
 
 def add_nodal(total: Array, nodes: Rows, values: Array) -> None:

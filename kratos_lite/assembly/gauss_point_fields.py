@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.mass import MASS
 from kratos_lite.elements.own_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -73,14 +74,12 @@ def volumes(points: Array, group: ElementGroup) -> Array:
 
 def body_force(points: Array, group: ElementGroup, b: Array) -> Array:
     """Return ∫ N b dV of a group as nodal forces (n, 3) in N; b (3,), or nodal (n, 3), in N/m³."""
-    nodal, kind = b.ndim == 2, group.element
-    if nodal and (module := compiled("gauss", kind, *GEOMETRY, "body_force", "scalar_mass")):
-        tables = group.tables(group.element.mass_rule)
-        return module.body_force(floats(points), *tables, floats(b))
-    if not nodal and (module := compiled("gauss", kind, *GEOMETRY, "body_force")):
-        return module.shares(floats(points), *group.tables()) * b
-    total = np.zeros_like(points)
-    for chunk in group.chunks():
+    nodal, total = b.ndim == 2, np.zeros_like(points)
+    module = compiled("gauss", group.element, *MASS, "body_force")
+    for part in by_mass_rule(points, group, 2 if nodal else 1) if module else ():
+        tables = floats(points), *part.tables()
+        total += module.body_force(*tables, floats(b)) if nodal else module.shares(*tables) * b
+    for chunk in () if module else group.chunks():
         nodes = group.nodes[chunk]
         add_nodal(total, nodes, group.at(points, chunk).body_force(b[nodes] if nodal else b))
     return total

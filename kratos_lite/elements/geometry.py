@@ -231,15 +231,6 @@ class PlacedCell:
         """Volume of each Gauss point, γ det J, as (..., g) in m³."""
         return self._gauss[0]
 
-    def volume(self) -> Array:
-        """Return the volume.
-
-        Returns
-        -------
-        (...) float, m³
-        """
-        return self.dV.sum(axis=-1)
-
     def gauss_points(self) -> Array:
         """Return the places X of the Gauss points.
 

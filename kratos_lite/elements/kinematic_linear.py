@@ -3,7 +3,7 @@
 One class serves one element, X (n, 3), or a batch, X (..., n, 3): all methods broadcast over
 the leading axes.  With g Gauss points xi and weights gamma,
 
-    r_int = Σ B^T σ γ det J        r_ext = Σ N ρg γ det J        K = Σ B^T C B γ det J
+    r_int = Σ B^T σ γ det J        r_ext = ∫ N ρg dV        K = Σ B^T C B γ det J
 
 Source: KratosWiki, *Kinematic Linear Element*; Zienkiewicz & Taylor, vol. 1, ch. 6.
 """
@@ -64,7 +64,8 @@ class KinematicLinear(CellMass):
 
     Notes
     -----
-    A subclass states `shape`, `rule` and, where the rule cannot integrate N N, `mass_rule`.
+    A subclass states `shape` and `rule`.  Mass and body forces take rules that are exact for the shape and
+    the geometry of each cell; a subclass that states a `mass_rule` takes that one for the mass of all cells.
     Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
 
     The steps of an element are ``N, dN → J → dNdX → B → B_at_gauss_points → strain → stress → internal_load →
@@ -88,8 +89,6 @@ class KinematicLinear(CellMass):
         if not (hasattr(cls, "shape") and hasattr(cls, "rule")):
             return  # a family of elements, not an element
         cls.nodes = cls.shape.nodes
-        if not hasattr(cls, "mass_rule"):
-            cls.mass_rule = cls.rule
         suffix = cls.__name__.removeprefix("KinematicLinear")
         same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]
         ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same])

@@ -10,4 +10,3 @@ class KinematicLinear3D10N(KinematicLinear):
 
     shape = Tetrahedron10
     rule = tetrahedron(degree=2)
-    mass_rule = tetrahedron(degree=4)

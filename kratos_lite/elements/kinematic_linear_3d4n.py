@@ -10,4 +10,3 @@ class KinematicLinear3D4N(KinematicLinear):
 
     shape = Tetrahedron4
     rule = tetrahedron(degree=1)
-    mass_rule = tetrahedron(degree=2)

@@ -1,25 +1,80 @@
-"""CellMass: body forces and mass of placed cells."""
+"""CellMass: volume, body forces and mass of placed cells."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.geometry import PlacedCell
+from kratos_lite.elements.exact import AFFINE, exact_rule, geometries, has_rules
+from kratos_lite.elements.geometry import GEOMETRY, PlacedCell, same_methods
 from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints, Mask
+
+MASS = (*GEOMETRY, "_N", "_volumes", "mass_rules", "_integrate", "scalar_mass")
+"""What an element class may redefine so that its mass is not that of its shape and geometry."""
 
 
 class CellMass(PlacedCell):
-    """Body forces and mass of a cell: shape × mass rule at the places X of its nodes."""
+    """Volume, body forces and mass of a cell, by rules that are exact for its shape and geometry."""
 
-    mass_rule: Rule
+    mass_rule: ClassVar[Rule | None] = None
+
+    @classmethod
+    def mass_rules(cls, kinds: Ints, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
+        """Return the rules for products of shape functions over cells, each with a mask of its cells.
+
+        Parameters
+        ----------
+        kinds : (...) int, the geometry of each cell; see `geometries`.
+        factors : number of functions in the product.
+        flow : whether it is one of G or H; see `exact_rule`.
+
+        Returns
+        -------
+        list of (mask (...), Rule)
+            For the mass itself a `mass_rule` of the class; the own rule for cells of unknown degree.
+        """
+        stated = cls.mass_rule if factors == 2 and not flow else None
+        if stated is None and not has_rules(cls.shape):
+            stated = cls.rule
+        if stated is not None:
+            return [(np.ones(kinds.shape, dtype=bool), stated)]
+        rules: dict[Rule, Mask] = {}
+        for kind in np.unique(kinds).tolist() or [AFFINE]:
+            rule = exact_rule(cls.shape, factors, kind, flow)
+            rules[rule] = rules.get(rule, np.zeros(kinds.shape, dtype=bool)) | (kinds == kind)
+        return [(mask, rule) for rule, mask in rules.items()]
+
+    def _integrate(self, of: Callable[[Array, Array], Array], factors: int) -> Array:
+        """Return integrals of products of `factors` functions, made of N (g, n) and γ det J (..., g)."""
+        total: Array | None = None
+        for mine, rule in self.mass_rules(geometries(self.shape, self.X), factors):
+            found = of(self._N(rule), self._volumes(rule))
+            if total is not None:
+                found[~mine] = total[~mine]
+            total = found
+        assert total is not None
+        return total
+
+    def volume(self) -> Array:
+        """Return the volume, exact for every geometry of the cell.
+
+        Returns
+        -------
+        (...) float, m³
+        """
+        if not same_methods(type(self), PlacedCell, "dV", "_gauss"):
+            return np.asarray(self.dV.sum(axis=-1))
+        return self._integrate(lambda N, dV: dV.sum(axis=-1), factors=0)
 
     def body_force(self, b: ArrayLike) -> Array:
-        """Return the load r_ext = Σ N b γ det J of a body force.
+        """Return the load r_ext = ∫ N b dV of a body force, exact for every geometry of the cell.
 
         Parameters
         ----------
@@ -42,11 +97,16 @@ class CellMass(PlacedCell):
                 f"a body force b must have shape (3,), {(*self.X.shape[:-2], 3)} or {self.X.shape}; "
                 f"got {force.shape}"
             )
-        share = self.dV @ self._N(self.rule)
+        if same_methods(type(self), PlacedCell, "dV", "_gauss"):
+            share = self._integrate(lambda N, dV: dV @ N, factors=1)
+        else:
+            share = self.dV @ self._N(self.rule)
         return share[..., :, None] * force[..., None, :]
 
     def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
-        """Return the mass matrix of one axis, Σ ρ N N^T γ det J.
+        """Return the mass matrix of one axis, ∫ ρ N N^T dV, exact for every geometry of the cell.
+
+        A `mass_rule` that the class states is used as it is.
 
         Parameters
         ----------
@@ -62,9 +122,8 @@ class CellMass(PlacedCell):
             If the density is none of these.
         """
         rho = arguments.density(density, self.X)
-        N = self._N(self.mass_rule)
-        dV = self._volumes(self.mass_rule) * rho[..., None]
-        return (N.T * dV[..., None, :]) @ N
+        m = self._integrate(lambda N, dV: (N.T * dV[..., None, :]) @ N, factors=2)
+        return m * rho[..., None, None]
 
     def mass(self, density: ArrayLike) -> Array:
         """Return the consistent mass matrix.
@@ -107,5 +166,5 @@ class CellMass(PlacedCell):
             If the density is none of these.
         """
         m = self.scalar_mass(density)
-        diagonal = np.diagonal(m, axis1=-2, axis2=-1)
-        return lumped(m.sum(axis=-1), diagonal, self.shape, self.mass_rule)
+        _, reference = self.mass_rules(geometries(self.shape, self.nodes), factors=2)[0]
+        return lumped(m.sum(axis=-1), np.diagonal(m, axis1=-2, axis2=-1), self.shape, reference)

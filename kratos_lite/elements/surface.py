@@ -12,8 +12,14 @@ from kratos_lite.typing import Array
 
 
 def face_rule(shape: type[Shape]) -> Rule:
-    """Return the rule for loads on a face: exact for N, times N, on plane faces."""
-    return rule_for(shape.cell, 2 * shape.degree + 1)
+    """Return the rule for loads on a face or line: exact for N, times N, times normal and area.
+
+    Per direction of a product the normal times the area has the degree 2p - 1 of functions of degree p, over
+    a triangle 2(p - 1).  The area alone is a square root on faces that are not plane, so that tractions are
+    exact on plane faces, and pressures on all.
+    """
+    p = shape.degree
+    return rule_for(shape.cell, max(4 * p - (2 if shape.cell == "triangle" else 1), 0))
 
 
 def area_vectors(shape: type[Shape], X: ArrayLike, rule: Rule | None = None) -> Array:

@@ -6,17 +6,15 @@ Source: Solfec-1.0 theory, shape mass_properties; Goldstein, Classical Mechanics
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.quadrature import Rule, rule_for
-from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
@@ -258,27 +256,17 @@ class MassProperties:
 # ---- integrals over a mesh -------------------------------------------------------------------------
 
 
-def exact_rule(shape: type[Shape]) -> Rule:
-    """Return the rule that integrates X X^T over any cell of a shape, det J included.
-
-    In each direction of a product X has the degree p of the shape, det J 3p - 1 and X X^T 2p; over a
-    tetrahedron det J has 3(p - 1).  A pyramid is a product in its collapsed coordinates.
-    """
-    return rule_for(shape.cell, 5 * shape.degree - (3 if shape.cell == "tetrahedron" else 1))
-
-
 def _moments(X: Array, groups: Sequence[ElementGroup]) -> tuple[float, float, Array, Array]:
     """Return ∫ρ, ∫1, ∫ρX (3,) and ∫ρXX^T (3, 3) over the elements."""
     mass, volume = 0.0, 0.0
     first, second = np.zeros(3), np.zeros((3, 3))
-    for group in groups:
-        rule = exact_rule(group.element.shape)
+    for group in (part for whole in groups for part in by_mass_rule(X, whole, 2)):
         rho = group.material.density
-        for chunk in replace(group, rule=rule).chunks():
+        for chunk in group.chunks():
             element = group.at(X, chunk)
-            dV = element._volumes(rule)
+            dV = element._volumes(group.rule)
             _check_volumes(dV.sum(axis=1), group, chunk)
-            x, w = (element._N(rule) @ element.X).reshape(-1, 3), dV.ravel()
+            x, w = element.gauss_points().reshape(-1, 3), dV.ravel()
             wx = w[:, None] * x
             mass, volume = mass + rho * float(w.sum()), volume + float(w.sum())
             first += rho * wx.sum(axis=0)
@@ -301,9 +289,9 @@ def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
     try:
-        unknown = np.isnan(value)
+        unknown = np.asarray(np.isnan(value))
     except (TypeError, ValueError):
-        unknown = np.False_
+        unknown = np.asarray(False)
     known = finite(np.where(unknown, 1.0, value) if unknown.any() else value, "the volume of a body")
     return np.where(unknown, np.nan, _check_positive(known, "volume", "m³"))
 

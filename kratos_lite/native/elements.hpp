@@ -17,21 +17,26 @@ namespace kl {
 constexpr int64_t GRAIN = 256;    // elements of one task
 constexpr int64_t BATCH = 16384;  // elements whose vectors are added together
 
-inline Elements elements(Numbers points, Indices nodes, Numbers dN, Numbers weights) {
+inline Elements elements(Numbers points, Indices nodes) {
     require(points.ndim() == 2 && points.shape(1) == 3, "points must be (n, 3)");
     require(nodes.ndim() == 2, "nodes must be (m, k)");
-    require(dN.ndim() == 3 && dN.shape(1) == nodes.shape(1) && dN.shape(2) == 3, "dN must be (g, k, 3)");
-    require(weights.size() == dN.shape(0), "weights must be (g)");
     require(are_rows(nodes, points.shape(0)), "nodes must be rows of points");
     Elements w{};
     w.points = points.data();
     w.n = points.shape(0);
     w.nodes = nodes.data();
     w.k = static_cast<int>(nodes.shape(1));
+    w.last = nodes.shape(0);
+    return w;
+}
+
+inline Elements elements(Numbers points, Indices nodes, Numbers dN, Numbers weights) {
+    Elements w = elements(points, nodes);
+    require(dN.ndim() == 3 && dN.shape(1) == nodes.shape(1) && dN.shape(2) == 3, "dN must be (g, k, 3)");
+    require(weights.size() == dN.shape(0), "weights must be (g)");
     w.g = static_cast<int>(dN.shape(0));
     w.dN = dN.data();
     w.weights = weights.data();
-    w.last = nodes.shape(0);
     return w;
 }
 

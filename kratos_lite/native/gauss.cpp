@@ -40,6 +40,17 @@ Array<double> nodal_force(Numbers points, Indices nodes, Numbers N, Numbers dN, 
     return scattered<3>(body_force, w);
 }
 
+Array<double> interpolated_nodes(Numbers points, Indices nodes, Indices base, Numbers C, double near) {
+    Elements w = elements(points, nodes);
+    require(has_shape(C, w.k, base.size()), "C must be (k, b)");
+    require(are_rows(base, w.k), "base must be nodes of an element");
+    w.g = static_cast<int>(base.size());
+    w.base = base.data();
+    w.to_nodes = C.data();
+    w.near = near;
+    return per_element(interpolated, w, {w.last});
+}
+
 py::tuple nodal_stress(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
                        MaybeNumbers prestress, Numbers to_nodes) {
     Elements w = strained(points, nodes, dN, weights, u, C, prestress);
@@ -70,6 +81,8 @@ PYBIND11_MODULE(_gauss, m) {
     };
     geometry("clearly_positive", [](const Elements& w) { return per_element(clearly_positive, w, {w.last}); },
              "1 for elements with det J clearly > 0 everywhere, else 0: (m,)");
+    define(m, "interpolated", interpolated_nodes, "1 for elements with X = C X[base] to near |X|, else 0: (m,)",
+           "points", "nodes", "base", "C", py::arg("near"));
     geometry("volumes", [](const Elements& w) { return per_element(volumes, w, {w.last, w.g}); }, "γ det J (m, g)");
     weighted("shares", [](const Elements& w) { return scattered<1>(row_sums, w); }, "∫ N dV of each node, (n, 1)");
     weighted("mass_sums", mass_sums, "row sums and diagonal of ∫ N N dV, each (m, k)");

@@ -45,7 +45,9 @@ struct Elements {
     double damping;           // fraction of the stress increment that is added to the mean stress
     Law law;
     const double* prestress;  // (m, 6) or null
-    const double* to_nodes;   // (k, g) extrapolation
+    const double* to_nodes;   // (k, g) extrapolation, or combination of the nodes `base`
+    const int32_t* base;      // (g) nodes of an element, or null
+    double near;              // share of the largest coordinate that a node may be away
     double* space;            // of `vectors()` vectors
     double* out;              // result of the kernel, a row for each element from `origin`
     double* second;           // second result, rows of all elements, or null

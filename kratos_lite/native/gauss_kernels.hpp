@@ -33,6 +33,30 @@ KL_INLINE void clearly_positive_body(const Elements& w) {
     }
 }
 
+// out (m): 1 where every node lies where the combination to_nodes (k, g) of the nodes `base` (g) has it, to
+// `near` times the largest coordinate.
+template <int V>
+KL_INLINE void interpolated_body(const Elements& w) {
+    typedef vec<double, V> Vec;
+    Vec* X = reinterpret_cast<Vec*>(w.space);
+    for (int64_t e = w.first; e < w.last; e += V) {
+        Vec reach, size, distance = {};
+        gather<V>(w, w.points, e, X);
+        largest<V>(X, 3 * w.k, reach);
+        shift_to_first_node<V>(X, w.k);
+        for (int a = 0; a < w.k; ++a) {
+            const double* C = w.to_nodes + static_cast<int64_t>(w.g) * a;
+            Vec gap[3] = {X[3 * a], X[3 * a + 1], X[3 * a + 2]};
+            for (int b = 0; b < w.g; ++b)
+                for (int i = 0; i < 3; ++i) gap[i] -= C[b] * X[3 * w.base[b] + i];
+            largest<V>(gap, 3, size);
+            distance = size > distance ? size : distance;
+        }
+        for (int l = 0; l < V && e + l < w.last; ++l)
+            w.out[e + l - w.origin] = distance[l] <= w.near * reach[l];
+    }
+}
+
 // out (m, g): γ det J.
 template <int V>
 KL_INLINE void volumes_body(const Elements& w) {
@@ -200,6 +224,7 @@ KL_INLINE void averages_body(const Elements& w) {
 }
 
 KL_DISPATCH(clearly_positive, clearly_positive_body, const Elements&)
+KL_DISPATCH(interpolated, interpolated_body, const Elements&)
 KL_DISPATCH(volumes, volumes_body, const Elements&)
 KL_DISPATCH(row_sums, row_sums_body, const Elements&)
 KL_DISPATCH(body_force, body_force_body, const Elements&)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,6 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.inertia import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.elements import KinematicLinear
-from kratos_lite.quadrature import Rule
 from kratos_lite.solvers import direct
 from kratos_lite.typing import Array
 
@@ -31,7 +29,6 @@ class Mass:
     Attributes
     ----------
     lumped : whether the mass stands in the nodes.
-    rule_of : gives the rule of an element class; its own `mass_rule` if not given.
     pattern : the sparsity of matrices on the nodes.
     """
 
@@ -41,10 +38,9 @@ class Mass:
         groups: Sequence[ElementGroup],
         pattern: Pattern,
         lumped: bool,
-        rule_of: Callable[[type[KinematicLinear]], Rule] = lambda element: element.mass_rule,
     ) -> None:
         self._points, self._groups = points, groups
-        self.lumped, self.pattern, self.rule_of = lumped, pattern, rule_of
+        self.lumped, self.pattern = lumped, pattern
 
     @cached_property
     def scalar(self) -> csr_array[Any, Any]:
@@ -53,7 +49,7 @@ class Mass:
 
         if self.lumped:
             return diags_array(self.nodal, format="csr")
-        made = inertia_matrices(self._points, self._groups, self.pattern, "M", self.rule_of)
+        made = inertia_matrices(self._points, self._groups, self.pattern, "M")
         n = self.pattern.n_nodes
         return csr_array((made["M"], self.pattern.indices, self.pattern.indptr), shape=(n, n))
 

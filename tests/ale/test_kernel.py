@@ -10,7 +10,6 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
-from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.assembly import element_groups
 from kratos_lite.assembly.inertia import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
@@ -38,10 +37,6 @@ def parts(kind, cells=(3, 2, 3), amount=0.05):
     return mesh.points, groups, Pattern(mesh.n_nodes, [group.nodes for group in groups])
 
 
-def fine(element):
-    return exact_rule(element.shape)
-
-
 def numpy_matrices(monkeypatch, *arguments):
     with monkeypatch.context() as patch:
         patch.setattr(element_groups, "kernels", lambda name: None)
@@ -57,14 +52,14 @@ def assert_close(ours, theirs, tolerance):
 @compiled
 @pytest.mark.parametrize("kind", KINDS)
 def test_compiled_is_numpy(kind, monkeypatch):
-    arguments = (*parts(kind), "MGH", fine, VELOCITY)
+    arguments = (*parts(kind), "MGH", VELOCITY)
     assert_close(inertia_matrices(*arguments), numpy_matrices(monkeypatch, *arguments), 1e-14)
 
 
 @compiled
 @pytest.mark.parametrize("kind", KINDS)
 def test_threads_change_no_bit(kind):
-    arguments, module = (*parts(kind, (7, 3, 4)), "MGH", fine, VELOCITY), kernels("inertia")
+    arguments, module = (*parts(kind, (7, 3, 4)), "MGH", VELOCITY), kernels("inertia")
     found = []
     for count in (1, 2, 3, 5):
         module.set_threads(count)
@@ -78,8 +73,8 @@ def test_threads_change_no_bit(kind):
 @pytest.mark.parametrize("names", ["M", "G", "H", "MG", "GH"])
 def test_only_what_is_asked_for_is_made_and_nothing_else_changes(names):
     points, groups, pattern = parts(8)
-    every = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
-    some = inertia_matrices(points, groups, pattern, names, fine, VELOCITY)
+    every = inertia_matrices(points, groups, pattern, "MGH", VELOCITY)
+    some = inertia_matrices(points, groups, pattern, names, VELOCITY)
     assert "".join(some) == names
     for name in names:
         np.testing.assert_array_equal(some[name], every[name])
@@ -92,14 +87,14 @@ def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
     code = (
         "import sys, numpy as np\nfrom tests.ale.test_kernel import *\n"
         f"made = {{f'{{kind}}{{name}}': data for kind in {kinds}\n"
-        "        for name, data in inertia_matrices(*parts(kind), 'MGH', fine, VELOCITY).items()}\n"
+        "        for name, data in inertia_matrices(*parts(kind), 'MGH', VELOCITY).items()}\n"
         "np.savez(sys.argv[1], **made)"
     )
     environment = {**os.environ, "KRATOS_LITE_ISA": isa, "PYTHONPATH": os.getcwd()}
     subprocess.run([sys.executable, "-c", code, tmp_path / "made.npz"], check=True, env=environment)
     with np.load(tmp_path / "made.npz") as made:
         for kind in kinds:
-            here = inertia_matrices(*parts(kind), "MGH", fine, VELOCITY)
+            here = inertia_matrices(*parts(kind), "MGH", VELOCITY)
             assert_close({name: made[f"{kind}{name}"] for name in "MGH"}, here, 1e-14)
 
 
@@ -107,7 +102,7 @@ def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
 def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed, monkeypatch):
     base = KinematicLinear
     points, groups, pattern = parts(8)
-    plain = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
+    plain = inertia_matrices(points, groups, pattern, "MGH", VELOCITY)
     ways = {
         "scalar_mass": lambda self, density=1.0: 2 * base.scalar_mass(self, density),
         "_gauss": property(lambda self: (2 * base._gauss.func(self)[0], *base._gauss.func(self)[1:])),
@@ -115,7 +110,7 @@ def test_an_element_that_redefines_a_step_is_computed_by_its_own_methods(changed
     }
     factors = {"scalar_mass": (2, 1, 1), "_gauss": (1, 2, 2), "gauss_points": (1, None, None)}[changed]
     monkeypatch.setattr(kl.KinematicLinear3D8N, changed, ways[changed])
-    own = inertia_matrices(points, groups, pattern, "MGH", fine, VELOCITY)
+    own = inertia_matrices(points, groups, pattern, "MGH", VELOCITY)
     for name, factor in zip("MGH", factors, strict=True):
         if factor:
             assert_close({name: own[name]}, {name: factor * plain[name]}, 1e-14)
@@ -127,11 +122,11 @@ def test_velocity_is_linear_in_its_numbers():
     points, groups, pattern = parts(10)
 
     def made(velocity):
-        return inertia_matrices(points, groups, pattern, "GH", fine, velocity)
+        return inertia_matrices(points, groups, pattern, "GH", velocity)
 
     moved = VELOCITY.copy()
     moved[:, 3] += VELOCITY[:, :3] @ (1.0, 2.0, 3.0)
-    again = inertia_matrices(points - (1.0, 2.0, 3.0), groups, pattern, "GH", fine, moved)
+    again = inertia_matrices(points - (1.0, 2.0, 3.0), groups, pattern, "GH", moved)
     assert_close(again, made(VELOCITY), 1e-13)
     assert_close(made(-2 * VELOCITY), {"G": -2 * made(VELOCITY)["G"], "H": 4 * made(VELOCITY)["H"]}, 1e-14)
 

@@ -102,8 +102,8 @@ def test_kinks_between_the_steps_give_the_whole_impulse(wheels):
     model.add(Rotation("z", kl.TimeSeries([0.0, 0.0203, 0.0517], [0.0, 10.0, 3.0])))
     transient, h = model.transient(), 1e-2
     rates = [0.0]
-    for moment in kl.integrate(transient, h, 8):
-        rates.append(transient.equations.rates(moment.time)[1])
+    for state in kl.integrate(transient, h, 8):
+        rates.append(transient.equations.rates(state.time)[1])
     first = transient.equations.rates(0.0)[1]
     assert h * (first / 2 + sum(rates[1:])) == pytest.approx(3.0, rel=1e-12)
     assert rates[-1] == 0.0
@@ -245,16 +245,16 @@ def test_the_same_in_axes_that_turn_with_the_material(case, element, wheels):
     )
     model.add(kl.NodalForces(contact(wheels, model.mesh)), amplitude=ramp)
     model.add(Rotation("z", rate=rate, acceleration=spin))
-    *_, moment = kl.integrate(model.transient(), T / steps, steps, every=steps)
+    *_, state = kl.integrate(model.transient(), T / steps, steps, every=steps)
     turn = start * T + spin * T * T / 2
     R = exp(np.array([0.0, 0.0, -turn]))
     X = model.mesh.points
     distance = np.abs((X @ R)[:, None] - X[None]).max(axis=2)
     assert distance.min(axis=1).max() < 1e-6  # a whole number of cells, so that nodes come to nodes
     seen = w[distance.argmin(axis=1)] @ R.T
-    assert np.abs(moment.u - seen).max() < tolerance[element] * np.abs(seen).max()
+    assert np.abs(state.u - seen).max() < tolerance[element] * np.abs(seen).max()
     if (case, element) == ("spin-up", "20N"):
-        lowest = moment.u[np.argmin(X[:, 1])]
+        lowest = state.u[np.argmin(X[:, 1])]
         np.testing.assert_allclose(lowest[:2], (5.606998e-02, -1.164555e-02), rtol=2e-6)
 
 
@@ -386,11 +386,11 @@ def test_pulse_through_absorbing_ends(element, n, steps, spin, tolerances, wheel
     u[:, 0], v[:, 0] = pulse(x), -start * x / 0.64 * pulse(x)
     transient = model.transient(displacement=u, velocity=v)
     wanted = iter(tolerances)
-    for moment in kl.integrate(transient, 0.16 / steps, steps, every=steps // 4):
-        z = start * moment.time + spin * moment.time**2 / 2
-        exact = (pulse(x + z - c * moment.time) + pulse(x + z + c * moment.time)) / 2
-        if round(moment.time, 6) != 0.12:
-            assert np.abs(moment.u[:, 0] - exact).max() < next(wanted) * 1e-3
+    for state in kl.integrate(transient, 0.16 / steps, steps, every=steps // 4):
+        z = start * state.time + spin * state.time**2 / 2
+        exact = (pulse(x + z - c * state.time) + pulse(x + z + c * state.time)) / 2
+        if round(state.time, 6) != 0.12:
+            assert np.abs(state.u[:, 0] - exact).max() < next(wanted) * 1e-3
 
 
 ORTHOTROPIC = kl.Orthotropic3D(4e6, 1e6, 2e6, 0.0, 0.0, 0.0, 5e5, 2e5, 3e5, 1000.0)

@@ -72,31 +72,31 @@ def spring(force=0.0):
     "integrator", [kl.HHT(-0.1), kl.Bossak(), kl.GeneralizedAlpha(0.5), kl.Newmark(0.3025, 0.6)]
 )
 def test_what_is_let_go_begins_with_the_acceleration_of_its_new_load(integrator, tmp_path):
-    """A moment of another load, put or read from a file, is the start of a new transient from there."""
+    """A state of another load, put or read from a file, is the start of a new transient from there."""
     model = spring(1e3)
-    *_, moment = kl.integrate(model.transient(integrator=integrator), 1e-3, 100, every=100)
-    kl.write(tmp_path / "loaded.npz", moment)
+    *_, state = kl.integrate(model.transient(integrator=integrator), 1e-3, 100, every=100)
+    kl.write(tmp_path / "loaded.npz", state)
     ends = []
-    for given in (moment, kl.read_state(tmp_path / "loaded.npz")):
+    for given in (state, kl.read_state(tmp_path / "loaded.npz")):
         released = spring(-2e3).transient(integrator=integrator)
         given.restore(released)
         *_, end = kl.integrate(released, 1e-3, 40, every=40)
         ends.append(end.u)
     np.testing.assert_array_equal(*ends)
     e = EquationsOfMotion(spring(-2e3))
-    balance = e.load(0.1) - e.times_stiffness(e.system.gather(moment.u), 0.0)
+    balance = e.load(0.1) - e.times_stiffness(e.system.gather(state.u), 0.0)
     put = spring(-2e3).transient(integrator=integrator)
-    moment.restore(put)
+    state.restore(put)
     kl.integrate(put, 1e-3, 1)
     free = e.system.reduced.free
     assert e.times_mass(put.a)[free] == pytest.approx(balance[free], rel=1e-9)
     again = model.transient(integrator=integrator)
-    moment.restore(again)  # the same load: as it was, so that restarts are bitwise
+    state.restore(again)  # the same load: as it was, so that restarts are bitwise
     kl.integrate(again, 1e-3, 1)
-    np.testing.assert_array_equal(again.a, e.system.gather(moment.a))
+    np.testing.assert_array_equal(again.a, e.system.gather(state.a))
 
 
-def test_supports_that_rest_elsewhere_fit_their_own_moments():
+def test_supports_that_rest_elsewhere_fit_their_own_states():
     """A constant displacement of all supports is no movement of the free nodes."""
     model = kl.Model(kl.box(cells=(1, 1, 2)), kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
     model.fix("z-", "x", 1e-3)
@@ -111,12 +111,12 @@ def test_supports_that_rest_elsewhere_fit_their_own_moments():
     assert "supports are displaced by 0.001 m at the start of a model at rest" in warning
 
 
-def test_reactions_are_saved_with_a_moment(tmp_path):
-    *_, moment = kl.integrate(spring(1e3).transient(), 1e-3, 5)
-    kl.write(tmp_path / "a.npz", moment)
+def test_reactions_are_saved_with_a_state(tmp_path):
+    *_, state = kl.integrate(spring(1e3).transient(), 1e-3, 5)
+    kl.write(tmp_path / "a.npz", state)
     loaded = kl.read_state(tmp_path / "a.npz")
     for name in ("u", "v", "a", "reactions", "time", "step", "imbalance"):
-        np.testing.assert_array_equal(getattr(loaded, name), getattr(moment, name))
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(state, name))
     assert np.abs(loaded.reactions).max() > 1.0
 
 
@@ -152,40 +152,40 @@ def test_a_transient_of_a_model_that_is_held_everywhere():
     [(kl.Newmark(), 1e3), (kl.GeneralizedAlpha(0.5), 0.0), (kl.HHT(-0.3), 0.0)],
     ids=["another load", "generalized-α", "hht"],
 )
-def test_moments_of_another_load_or_scheme_come_to_balance(before, force):
-    *_, moment = kl.integrate(spring().transient(integrator=before), 1e-3, 100, every=100)
+def test_states_of_another_load_or_integrator_come_to_balance(before, force):
+    *_, state = kl.integrate(spring().transient(integrator=before), 1e-3, 100, every=100)
     after = spring(force).transient()
-    moment.restore(after)
+    state.restore(after)
     e = after.equations
     for _ in kl.integrate(after, 1e-3, 20):
         left = e.times_mass(after.a) + e.times_stiffness(after.u, 0.0) - e.load(after.time)
         assert np.abs(e.system.reduced.reduce(left)).max() < 1e-9 * np.abs(e.times_mass(after.a)).max()
 
 
-def test_moments_that_do_not_fit_are_refused():
+def test_states_that_do_not_fit_are_refused():
     model = spring()
     transient = model.transient()
-    (moment,) = kl.integrate(transient, 1e-3, 1)
-    off = moment.u.copy()
+    (state,) = kl.integrate(transient, 1e-3, 1)
+    off = state.u.copy()
     off[0, 0] = 1.0
     for field, value, words in (
-        ("time", -5.0, "time and a number of steps ≥ 0; got -5 s"),
+        ("time", -5.0, "the time of a state must be one number ≥ 0, in s; got -5"),
         ("time", np.nan, "time of a state must be finite"),
-        ("step", -4, "got 0.001 s and -4"),
-        ("step", 1.5, "got 0.001 s and 1.5"),
+        ("step", -4, "the steps of a state must be a whole number ≥ 0; got -4"),
+        ("step", 1.5, "the steps of a state must be a whole number ≥ 0; got 1.5"),
         ("u", off, "at t = 0.001 s the state does not fit the supports: node 1 along x is 1 m off"),
         ("v", np.full_like(off, np.nan), "v of a state must be finite"),
         ("a", off.astype(complex), "a of a state must be made of real numbers"),
     ):
-        wrong = {"values": {**moment.values, field: value}} if field in "uva" else {field: value}
+        wrong = {"values": {**state.values, field: value}} if field in "uva" else {field: value}
         with pytest.raises(kl.InputError, match=words):
-            replace(moment, **wrong).restore(transient)
+            replace(state, **wrong).restore(transient)
 
 
 def test_damaged_files_of_moments_end_in_one_error(tmp_path):
-    (moment,) = kl.integrate(spring().transient(), 1e-3, 1)
-    kl.write(tmp_path / "moment.npz", moment)
-    whole, path = (tmp_path / "moment.npz").read_bytes(), tmp_path / "damaged.npz"
+    (state,) = kl.integrate(spring().transient(), 1e-3, 1)
+    kl.write(tmp_path / "state.npz", state)
+    whole, path = (tmp_path / "state.npz").read_bytes(), tmp_path / "damaged.npz"
     rng = np.random.default_rng(0)
     for trial in range(60):
         data = bytearray(whole[: rng.integers(len(whole))] if trial % 2 else whole)
@@ -225,9 +225,9 @@ def test_nonsense_is_told():
         with pytest.raises(kl.InputError, match="a rate at t = 0 s must be"):
             wheel(kl.ale.Rotation("z", rate=value)).solve()
     transient = wheel().transient()
-    (moment,) = kl.integrate(transient, 1e-3, 1)
-    with pytest.raises(kl.InputError, match="v of a state needs shape"):
-        replace(moment, values={**moment.values, "v": moment.v[:4]}).restore(transient)
+    (state,) = kl.integrate(transient, 1e-3, 1)
+    with pytest.raises(kl.InputError, match="v of a model has shape"):
+        replace(state, values={**state.values, "v": state.v[:4]}).restore(transient)
     with pytest.raises(kl.InputError, match="a State of a model is needed"):
         transient.restore(None)
     with pytest.raises(kl.InputError, match="count must be"):

@@ -9,7 +9,7 @@ from kratos_lite.model.loads import ScaledLoad
 SOIL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 MODULUS = SOIL.C[0, 0]
 INTEGRATORS = [kl.Newmark(), kl.HHT(-0.1), kl.GeneralizedAlpha(0.8), kl.CentralDifference()]
-each_scheme = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda s: s.name)
+each_integrator = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda s: s.name)
 
 
 def column(cells=1, load=None):
@@ -33,7 +33,7 @@ def frequency(lumped):
     return np.sqrt(MODULUS / (SOIL.density * (1 / 2 if lumped else 1 / 3)))
 
 
-@each_scheme
+@each_integrator
 def test_a_step_load_swings_about_the_static_solution_with_order_two(integrator):
     omega = frequency(isinstance(integrator, kl.CentralDifference))
     errors = []
@@ -79,7 +79,7 @@ def test_damping_takes_the_rate_of_rayleigh():
     assert decay == pytest.approx((alpha + beta * omega**2) / 2, rel=2e-3)
 
 
-@each_scheme
+@each_integrator
 def test_a_moving_support_carries_the_column(integrator):
     """A slow rise of the foot: the column follows it as a rigid body."""
     model = kl.Model(kl.box(), SOIL)
@@ -89,16 +89,16 @@ def test_a_moving_support_carries_the_column(integrator):
     h = 1e-3 if not isinstance(integrator, kl.CentralDifference) else 1e-4
     foot, top = model.mesh.nodes("z-"), model.mesh.nodes("z+")
     transient = model.transient(integrator=integrator)
-    for moment in kl.integrate(transient, h, round(0.8 / h), every=100):
-        assert moment.u[foot, 2] == pytest.approx(np.full(4, 1e-3 * np.sin(moment.time) ** 2), rel=1e-12)
-        assert moment.u[top, 2] == pytest.approx(moment.u[foot, 2], abs=2e-7)
+    for state in kl.integrate(transient, h, round(0.8 / h), every=100):
+        assert state.u[foot, 2] == pytest.approx(np.full(4, 1e-3 * np.sin(state.time) ** 2), rel=1e-12)
+        assert state.u[top, 2] == pytest.approx(state.u[foot, 2], abs=2e-7)
     if isinstance(integrator, (kl.HHT, kl.GeneralizedAlpha)):
         return  # its forces balance within the step, not at its end
     inertia = transient.equations.times_mass(transient.a).reshape(-1, 3)[:, 2].sum()
-    assert moment.reactions[:, 2].sum() == pytest.approx(inertia, abs=1e-6 * SOIL.density)
+    assert state.reactions[:, 2].sum() == pytest.approx(inertia, abs=1e-6 * SOIL.density)
 
 
-@each_scheme
+@each_integrator
 def test_a_restart_goes_on_bit_by_bit(integrator, tmp_path):
     def made():
         load = ScaledLoad(kl.Traction("z+", (0, 0, 1e3)), kl.TimeSeries([0, 1e-3, 2e-3], [0, 1, -1]))
@@ -127,9 +127,9 @@ def test_tied_columns_swing_as_one():
     model.add(kl.PointLoad([int(top[0])], (0, 0, 2e3)))
     omega = frequency(False)
     period = 2 * np.pi / omega
-    for moment in kl.integrate(model.transient(), period / 200, 200, every=50):
-        exact = 1e3 / MODULUS * (1 - np.cos(omega * moment.time))
-        assert moment.u[top, 2] == pytest.approx(np.full(6, exact), abs=2e-3 * 1e3 / MODULUS)
+    for state in kl.integrate(model.transient(), period / 200, 200, every=50):
+        exact = 1e3 / MODULUS * (1 - np.cos(omega * state.time))
+        assert state.u[top, 2] == pytest.approx(np.full(6, exact), abs=2e-3 * 1e3 / MODULUS)
 
 
 @pytest.mark.parametrize("lumped", [False, True])

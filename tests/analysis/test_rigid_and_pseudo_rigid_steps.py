@@ -111,7 +111,7 @@ def rotation_at_one():
 @pytest.mark.parametrize(
     ("h", "integrator", "error", "drift"), [line.split() for line in TOP.split("\n")[1:-1]]
 )
-def test_free_top_has_the_errors_of_its_scheme(h, integrator, error, drift, rotation_at_one):
+def test_free_top_has_the_errors_of_its_integrator(h, integrator, error, drift, rotation_at_one):
     q, u, J = top(float(h), integrator)
     assert np.linalg.norm(q[:9] - rotation_at_one) == pytest.approx(float(error), rel=0.05)
     assert u[:3] @ J @ u[:3] / 2 / 160.002 - 1 == pytest.approx(float(drift), rel=0.05)
@@ -234,7 +234,7 @@ energy_momentum 2.5e-4  8.05e-5
 
 
 @pytest.mark.parametrize(("integrator", "h", "error"), [line.split() for line in SPINNING.split("\n")[1:-1]])
-def test_spinning_box_has_the_errors_of_its_scheme(integrator, h, error):
+def test_spinning_box_has_the_errors_of_its_integrator(integrator, h, error):
     q, u, constant = spinning_box(1e6)
     pseudo_rigid.steps(q, u, *constant, NONE3, NONE12, float(h), round(1 / float(h)), integrator)
     assert np.linalg.norm(q[:9].reshape(3, 3) - ROTATED) == pytest.approx(float(error), rel=0.05)

@@ -44,8 +44,8 @@ def shape(model: kl.Model) -> np.ndarray:
 
 
 def last(transient, dt: float, steps: int) -> State:
-    *_, moment = kl.integrate(transient, dt, steps, every=steps)
-    return moment
+    *_, state = kl.integrate(transient, dt, steps, every=steps)
+    return state
 
 
 # ---- one frequency: a closed form --------------------------------------------------------------------
@@ -75,9 +75,9 @@ def test_trapezoidal_rule_step_by_step(share):
     model, omega = bar(), wave(4, lumped=False)
     mode = shape(model)
     transient = model.transient(displacement=mode)
-    for k, moment in enumerate(kl.integrate(transient, share / omega, 10), start=1):
+    for k, state in enumerate(kl.integrate(transient, share / omega, 10), start=1):
         turned = np.cos(2 * k * np.arctan(share / 2))
-        np.testing.assert_allclose(moment.u, turned * mode, atol=1e-12)
+        np.testing.assert_allclose(state.u, turned * mode, atol=1e-12)
 
 
 def amplification(integrator, omega: float, h: float) -> np.ndarray:
@@ -122,8 +122,8 @@ def test_central_difference_turns_by_its_own_angle():
     mode, h = shape(bar()), 0.2 / wave(4, lumped=True)
     transient = model.transient(integrator=CentralDifference(), displacement=mode)
     theta = np.arccos(1 - (omega * h) ** 2 / 2)
-    for k, moment in enumerate(kl.integrate(transient, h, 20), start=1):
-        np.testing.assert_allclose(moment.u, np.cos(k * theta) * mode, atol=1e-12)
+    for k, state in enumerate(kl.integrate(transient, h, 20), start=1):
+        np.testing.assert_allclose(state.u, np.cos(k * theta) * mode, atol=1e-12)
 
 
 def test_critical_step():
@@ -184,9 +184,9 @@ def pulled(factor) -> kl.Model:
 def test_load_at_once():
     """A load put on at rest swings about the static answer: u = (F / k)(1 - cos ωt) of one cell."""
     model, omega = pulled(None), wave(1, lumped=False)
-    for moment in kl.integrate(model.transient(), 0.01 / omega, 600, every=60):
-        exact = 1e3 / E * (1 - np.cos(omega * moment.time))
-        assert moment.u[:, 2].max() == pytest.approx(exact, abs=2e-7)
+    for state in kl.integrate(model.transient(), 0.01 / omega, 600, every=60):
+        exact = 1e3 / E * (1 - np.cos(omega * state.time))
+        assert state.u[:, 2].max() == pytest.approx(exact, abs=2e-7)
 
 
 def test_harmonic_load():
@@ -278,9 +278,9 @@ def test_reactions_balance_load_and_inertia(tied):
         model.constrain((top, "z"), {(middle, "z"): 1.0})
     model.add(kl.Gravity((0, 0, -9.81)))
     e = model.transient()
-    for moment in kl.integrate(e, 1e-3, 20):
+    for state in kl.integrate(e, 1e-3, 20):
         inertia = e.equations.mass.times(e.a).reshape(-1, 3).sum(axis=0)
-        total = moment.reactions.sum(axis=0) + RHO * np.array([0, 0, -9.81])
+        total = state.reactions.sum(axis=0) + RHO * np.array([0, 0, -9.81])
         np.testing.assert_allclose(total, inertia, atol=1e-8 * RHO)
 
 
@@ -307,9 +307,9 @@ def test_restart_is_the_same_bit_by_bit(name, tmp_path):
 
     whole = last(made(), 1e-3, 60)
     first = last(made(), 1e-3, 25)
-    kl.write(tmp_path / "moment.npz", first)
+    kl.write(tmp_path / "state.npz", first)
     again = made()
-    kl.read_state(tmp_path / "moment.npz").restore(again)
+    kl.read_state(tmp_path / "state.npz").restore(again)
     second = last(again, 1e-3, 35)
     for field in ("u", "v", "a", "reactions"):
         assert (getattr(second, field) == getattr(whole, field)).all()
@@ -390,7 +390,7 @@ def test_wrong_arguments_of_integrate(options, text):
         lambda: GeneralizedAlpha("0.8"),
     ],
 )
-def test_wrong_schemes(make):
+def test_wrong_integrators(make):
     with pytest.raises(InputError, match=r"Newmark|HHT|generalized-α"):
         make()
 
@@ -412,12 +412,12 @@ def test_central_differences_take_neither_motion_nor_constraints():
         tied.transient(integrator=CentralDifference())
 
 
-def test_files_that_are_no_moments(tmp_path):
+def test_files_that_are_no_states(tmp_path):
     with pytest.raises(InputError, match="there is no such file"):
         kl.read_state(tmp_path / "none.npz")
-    (tmp_path / "text.npz").write_text("no moment")
+    (tmp_path / "text.npz").write_text("no state")
     with pytest.raises(InputError, match=r"not a state that kl\.write wrote"):
         kl.read_state(tmp_path / "text.npz")
     other = bar(2).transient().state()
-    with pytest.raises(InputError, match="u of a state needs shape"):
+    with pytest.raises(InputError, match="u of a model has shape"):
         other.restore(bar(4).transient())

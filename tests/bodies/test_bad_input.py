@@ -119,7 +119,7 @@ def test_an_inertia_that_no_deformable_body_has():
         (kl.FiniteElementBody, "DEF_IMP", "integrators of a finite-element body are .*; got 'DEF_IMP'"),
     ],
 )
-def test_a_scheme_of_another_kind(kind, integrator, words, refused):
+def test_an_integrator_of_another_kind(kind, integrator, words, refused):
     with pytest.raises(kl.InputError, match=words):
         body_of(kind, integrator=integrator)
     refused(body_of(kind), lambda body: setattr(body, "integrator", integrator), kl.InputError, words)

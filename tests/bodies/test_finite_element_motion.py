@@ -13,7 +13,7 @@ from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
 
 INTEGRATORS = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")
-each_scheme = pytest.mark.parametrize("integrator", INTEGRATORS)
+each_integrator = pytest.mark.parametrize("integrator", INTEGRATORS)
 SPIN, FLIGHT, G = (0.05, 10, 0.05), (1, 2, 3), (0, 0, -9.81)
 MOMENTUM = np.array([1.36, 232, 0.52])
 """Angular momentum of the box about its mass center."""
@@ -133,7 +133,7 @@ def test_errors_of_all_nodes_against_the_equations_of_the_element(integrator, er
 
 
 @pytest.mark.parametrize("cells", [1, 2])
-@each_scheme
+@each_integrator
 def test_consistent_mass_is_exact_for_rigid_motion(cells, integrator, brick, drift):
     body = thrown(brick, cells, integrator)
     rigid = brick(kl.RigidBody)
@@ -201,7 +201,7 @@ def test_few_modes_leave_rigid_motion_exact(modes, brick, drift):
 
 
 @pytest.mark.parametrize("name", ALL)
-@each_scheme
+@each_integrator
 def test_every_element_spins_freely(name, integrator, brick, drift):
     body = brick(E=1e6, cells=(1, 1, 1), element=name, integrator=integrator)
     body.set_velocity(FLIGHT, SPIN)
@@ -219,7 +219,7 @@ def test_every_element_spins_freely(name, integrator, brick, drift):
 
 
 @pytest.mark.parametrize("lumped", [False, True])
-@each_scheme
+@each_integrator
 def test_a_mesh_of_four_kinds_of_elements_spins_freely(integrator, lumped, drift):
     body = mixed(integrator=integrator, lumped=lumped)
     body.set_velocity(FLIGHT, (0.5, 3.0, -1.0))

@@ -10,7 +10,7 @@ import pytest
 import kratos_lite as kl
 
 INTEGRATORS = ("DEF_EXP", "DEF_LIM", "ENERGY_MOMENTUM")
-each_scheme = pytest.mark.parametrize("integrator", INTEGRATORS)
+each_integrator = pytest.mark.parametrize("integrator", INTEGRATORS)
 SPIN = (0.05, 10, 0.05)
 MOMENTUM = np.array([1.36, 232, 0.52])
 """Angular momentum of the box under this spin."""
@@ -88,7 +88,7 @@ def test_frequencies_of_a_box(brick):
     [(OMEGA_B, np.eye(3), 0, 3e-6), (OMEGA_S, np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]), 1, 3e-7)],
     ids=["breathing", "shear"],
 )
-@each_scheme
+@each_integrator
 def test_small_vibrations_are_cosines(integrator, omega, shape, entry, error):
     body, size = deformed(cube(integrator), np.eye(3) + 1e-6 * shape), 1e-6
     periods, each = 5, 600
@@ -103,7 +103,7 @@ def test_small_vibrations_are_cosines(integrator, omega, shape, entry, error):
 
 
 @pytest.mark.parametrize("omega_h", [0.2, 0.8, 1.6])
-@each_scheme
+@each_integrator
 def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega_h):
     amplitude = 1e-7
     body = deformed(cube(integrator), (1 + amplitude) * np.eye(3))
@@ -113,7 +113,7 @@ def test_the_frequency_of_small_vibrations_is_that_of_the_step(integrator, omega
     assert seen_frequency(seen, h) == pytest.approx(2 / h * inverse(omega_h / 2), rel=1e-6)
 
 
-@each_scheme
+@each_integrator
 def test_period_and_turning_point_of_large_breathing(integrator):
     body = deformed(cube(integrator), 1.1 * np.eye(3))
     period, lowest = 0.0182917027, np.sqrt(2 - 1.1**2)
@@ -191,7 +191,7 @@ def test_errors_of_a_box_that_rotates_freely(
     np.testing.assert_allclose(body.linear_momentum(), 0, atol=1e-12)
 
 
-@each_scheme
+@each_integrator
 def test_errors_fall_with_the_second_power_of_the_step(integrator, brick):
     def at_a_tenth(steps):
         body = brick(kl.PseudoRigidBody, integrator=integrator)
@@ -233,7 +233,7 @@ def test_stretches_and_nearness_to_the_rigid_body(E, stretches, apart, brick, co
 
 
 @pytest.mark.parametrize(("E", "h", "steps"), [(1e6, 5e-2, 15), (1e8, 2e-2, 97), (2e11, 1e-3, 50)])
-def test_steps_that_blow_the_linearly_implicit_scheme_up(E, h, steps, brick, caplog):
+def test_steps_that_blow_the_linearly_implicit_integrator_up(E, h, steps, brick, caplog):
     """What the warning is about: without damping the energy grows without bound."""
     body = brick(kl.PseudoRigidBody, E, integrator="DEF_LIM")
     body.set_velocity(angular=SPIN)

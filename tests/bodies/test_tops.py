@@ -12,7 +12,7 @@ from kratos_lite.bodies.rotations import exp
 
 INTEGRATORS = ("RIG_POS", "RIG_NEG", "RIG_IMP")
 EXACT = ("RIG_NEG", "RIG_IMP")
-each_scheme = pytest.mark.parametrize("integrator", INTEGRATORS)
+each_integrator = pytest.mark.parametrize("integrator", INTEGRATORS)
 
 FREE_AT_1 = np.array(
     [
@@ -117,7 +117,7 @@ def test_energy_of_the_free_top_after_twenty_seconds(integrator, h, at_end):
     assert body.energy() / 160.002 - 1 == pytest.approx(at_end, rel=0.02)
 
 
-def test_the_implicit_scheme_keeps_the_energy_over_twenty_seconds():
+def test_the_implicit_integrator_keeps_the_energy_over_twenty_seconds():
     body = free("RIG_IMP")
     change = gains(body, 0.01, 2000) / 160.002
     assert abs(change[-1]) < 1e-6
@@ -125,7 +125,7 @@ def test_the_implicit_scheme_keeps_the_energy_over_twenty_seconds():
     assert change.max() < 1e-12
 
 
-def test_the_implicit_scheme_retraces_its_way():
+def test_the_implicit_integrator_retraces_its_way():
     body = free("RIG_IMP")
     q = body.q.copy()
     end(body, 0.01, 100)
@@ -154,7 +154,7 @@ def test_the_motion_of_the_free_top_follows_eulers_equations():
         np.testing.assert_allclose(state.u[:3], spins[i], atol=6e-4)
 
 
-@each_scheme
+@each_integrator
 def test_a_top_turns_over_at_the_times_of_jacobi(integrator):
     body = top((1, 2, 3), (1e-3, 2, 1e-3), integrator)
     E, pi = body.energy(), body.angular_momentum()
@@ -191,7 +191,7 @@ TABLE = {
 
 
 @pytest.mark.parametrize("h", [0.001, 0.003, 0.009])
-@each_scheme
+@each_integrator
 def test_energy_of_the_heavy_top(integrator, h, compiled):
     if h < 0.009 and not compiled:
         pytest.skip("so many steps need the compiled kernels")
@@ -292,7 +292,7 @@ def test_a_constant_torque_in_space_adds_to_the_momentum_exactly(integrator):
     np.testing.assert_allclose(body.angular_momentum(), (41.5, -0.8, 2.5), rtol=1e-12, atol=1e-12)
 
 
-@each_scheme
+@each_integrator
 def test_a_torque_about_a_principal_axis_spins_the_body_up(integrator):
     body = top((5, 10, 1), (0, 0, 0), integrator)
     body.add(kl.Torque((0, 3.0, 0), frame="convected"), amplitude=kl.TimeSeries([0, 1], [0, 2]))
@@ -303,7 +303,7 @@ def test_a_torque_about_a_principal_axis_spins_the_body_up(integrator):
     assert angle == pytest.approx(0.1, rel=1e-4)  # W = 0.3 t²
 
 
-@each_scheme
+@each_integrator
 def test_a_tower_of_callbacks_in_nine_or_six_numbers_is_the_same(integrator):
     nine, _ = heavy(integrator, 25.0, 0.5)
     six, _ = heavy(integrator, 25.0, 0.5)

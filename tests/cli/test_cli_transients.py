@@ -55,10 +55,10 @@ def integrated(model, **options):
     return [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
 
 
-def assert_same(path, moments):
+def assert_same(path, states):
     with np.load(path) as file:
         for name in ("time", "step", "u", "v", "a", "reactions"):
-            expected = np.array([getattr(moment, name) for moment in moments])
+            expected = np.array([getattr(state, name) for state in states])
             assert np.array_equal(file[name], expected), name
 
 
@@ -132,8 +132,8 @@ def test_loads_and_supports_that_change(run, folder):
     model.add(kl.Pressure("x-", 10.0), amplitude=kl.TimeSeries([0, 1], [1, 2]))
     model.add(kl.Gravity((0, 0, -9.81)), amplitude=kl.TimeSeries([0.0], [0.5]))
     transient = model.transient()
-    moments = kl.integrate(transient, dt=1e-3, steps=20, every=5)
-    assert_same("file.npz", [transient.state(), *moments])
+    states = kl.integrate(transient, dt=1e-3, steps=20, every=5)
+    assert_same("file.npz", [transient.state(), *states])
 
 
 def test_at_rest_what_changes_is_that_of_the_time_0(run, folder):
@@ -182,8 +182,8 @@ def test_a_summary_with_the_numbers(run, folder):
     model = tower()
     model.add(kl.Gravity((0, 0, -9.81)))
     transient = model.transient()
-    moments = [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
-    largest = max(moments, key=lambda moment: np.linalg.norm(moment.u, axis=1).max())
+    states = [transient.state(), *kl.integrate(transient, dt=1e-3, steps=20, every=5)]
+    largest = max(states, key=lambda state: np.linalg.norm(state.u, axis=1).max())
     size = np.linalg.norm(largest.u, axis=1)
     rows = done.rows
     assert rows["nodes"] == "28"
@@ -193,11 +193,11 @@ def test_a_summary_with_the_numbers(run, folder):
     assert rows["time"] == "0 … 0.02 s, 20 steps of 0.001 s"
     node = model.mesh.node_ids[size.argmax()]
     assert rows["largest displacement"] == (
-        f"{size.max():.6e} m at node {node}, t = {largest.time:.6g} s, of {len(moments)} kept"
+        f"{size.max():.6e} m at node {node}, t = {largest.time:.6g} s, of {len(states)} kept"
     )
     assert rows["energy"] == f"0.000000e+00 J at the start, {transient.energy():.6e} J at the end"
     force = [float(f) for f in re.findall(r"-?[\d.]+(?:e[+-]\d+)?", rows["total reaction"])]
-    np.testing.assert_allclose(force, moments[-1].reactions.sum(axis=0), rtol=1e-5, atol=1e-8)
+    np.testing.assert_allclose(force, states[-1].reactions.sum(axis=0), rtol=1e-5, atol=1e-8)
     assert re.match(r"\S+ s, \S+ s in all", rows["time per step"])
     assert run("solve", "run.json", "-q").out == ""
 

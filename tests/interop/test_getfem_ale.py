@@ -13,9 +13,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
-from kratos_lite.ale.matrices import exact_rule
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
+from kratos_lite.elements.exact import exact_rule
 from kratos_lite.elements.tables import lame_constants
 from kratos_lite.solvers.mass import Mass
 
@@ -62,7 +62,8 @@ def computed(model):
     found = {name: data[:, None, None] for name, data in found.items()}
     found["K"] = assemble_stiffness(points, groups, pattern).data
     found |= {"centrifugal": terms.centrifugal, "euler": terms.euler}
-    rules = [element.mass_rule, *[exact_rule(element.shape)] * 2, element.rule, *[element.mass_rule] * 2]
+    mass, flow = (exact_rule(element.shape, 2, flow=flow) for flow in (False, True))
+    rules = [mass, flow, flow, element.rule, mass, mass]
     gauss = [round(len(rule) ** (1 / 3)) for rule in rules]
     return found, dict(zip(found, gauss, strict=True))
 

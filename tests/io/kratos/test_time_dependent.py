@@ -67,7 +67,7 @@ def write(tmp_path, monkeypatch):
     return write
 
 
-def moments(scene):
+def states(scene):
     return list(prepare(scene)[1])
 
 
@@ -109,7 +109,7 @@ def test_loads_of_steady_processes_are_assembled_once(write, monkeypatch):
             return forces(self, mesh, groups)
 
         monkeypatch.setattr(kind, "forces", counted)
-    moments(scene)
+    states(scene)
     assert sorted(calls) == ["ConditionLoads", "Gravity"]
 
 
@@ -123,7 +123,7 @@ def test_a_load_stays_at_its_last_value_and_changes_no_more(write):
     assert forces[4] is forces[3]
     ramp = kl.TimeSeries([0.0, 0.05], [0.0, 0.05])
     expected = by_hand(ScaledLoad(kl.Traction("Top", (1e5, 0.0, 0.0)), ramp), integrator=kl.Bossak())
-    for one, other in zip(moments(scene), expected, strict=True):
+    for one, other in zip(states(scene), expected, strict=True):
         same(one, other)
 
 
@@ -141,7 +141,7 @@ def test_supports_that_move_with_t(write):
     model.fix("Bottom", "x", lambda t: 0.01 * t * t)
     model.fix("Bottom", "yz")
     expected = list(kl.integrate(model.transient(integrator=kl.Bossak()), dt=0.01, steps=20))
-    same(moments(scene)[-1], expected[-1])
+    same(states(scene)[-1], expected[-1])
     assert any("Kratos takes Newmark's formulas" in note for note in scene.model.notes)
 
 
@@ -156,7 +156,7 @@ def test_a_start_on_a_support_leaves_its_movement(write):
     pulled = ("Structure", "DISPLACEMENT_X", "0.01*Z", {"interval": [0.0, 0.0], "constrained": False})
     scene = read_case(write(*CLAMP, ("Bottom", "DISPLACEMENT_X", "0.01*t"), pulled))
     assert len(scene.model.supports.motions) == 1
-    end = moments(scene)[-1]
+    end = states(scene)[-1]
     bottom = scene.model.mesh.nodes("Bottom")
     np.testing.assert_allclose(end.u[bottom, 0], 0.01 * end.time, rtol=1e-12)
     assert scene.time.displacement[:, 0].max() == 0.02
@@ -185,7 +185,7 @@ def test_nodal_data_of_the_mesh_file_is_the_start(write):
     assert velocity[:, 0].tolist() == pytest.approx([i * 0.01 for i in range(1, 21)])
     told = [note for note in scene.model.notes if "VELOCITY" in note]
     assert told == ["VELOCITY of fixed nodes is left out; Kratos keeps it in the first step"]
-    assert np.abs(moments(scene)[-1].u).max() > 0
+    assert np.abs(states(scene)[-1].u).max() > 0
 
 
 def test_a_velocity_that_the_mesh_file_fixes_is_refused(write):
@@ -212,7 +212,7 @@ def test_options_change_a_dynamic_run_file(write, run):
 @pytest.mark.parametrize(("value", "word", "code"), [(0.0, "failed", 3), (None, "passed", 0)])
 def test_expected_values_are_compared_at_the_end_of_the_run(write, run, value, word, code):
     push = ("Top", "SURFACE_LOAD_X", "1e5*t")
-    end = moments(read_case(write(*CLAMP, push)))[-1]
+    end = states(read_case(write(*CLAMP, push)))[-1]
     mesh = kl.read("mesh.mdpa").mesh
     found = float(end.u[mesh.nodes("Top"), 0].mean())
     check = {

@@ -25,45 +25,45 @@ def wheel(element="KinematicLinear3D20N", **options):
     return model
 
 
-def test_frames_table_and_arrays_hold_each_moment(tmp_path):
+def test_frames_table_and_arrays_hold_each_state(tmp_path):
     meshio = pytest.importorskip("meshio")
     model = shaken_bar()
     transient = model.transient()
     endings = [kl.SeriesWriter(tmp_path / f"swing{ending}", transient) for ending in (".pvd", ".csv", ".npz")]
-    moments = [transient.state()]
+    states = [transient.state()]
     for series in endings:
         series.add()
-    for moment in kl.integrate(transient, dt=0.01, steps=6, every=3):
-        moments.append(moment)
+    for state in kl.integrate(transient, dt=0.01, steps=6, every=3):
+        states.append(state)
         for series in endings:
-            series.add(moment)
+            series.add(state)
     for series in endings:
         series.close()
     index = re.findall(r'timestep="(\S+)" part="0" file="(\S+)"', (tmp_path / "swing.pvd").read_text())
-    assert [float(time) for time, _ in index] == [moment.time for moment in moments]
-    for moment, (_, name) in zip(moments, index, strict=True):
+    assert [float(time) for time, _ in index] == [state.time for state in states]
+    for state, (_, name) in zip(states, index, strict=True):
         frame = meshio.read(tmp_path / name)
         np.testing.assert_array_equal(frame.points, model.mesh.points)
         names = {"DISPLACEMENT": "u", "VELOCITY": "v", "ACCELERATION": "a", "REACTION": "reactions"}
         for kratos, ours in names.items():
-            np.testing.assert_array_equal(frame.point_data[kratos], getattr(moment, ours))
-        result = transient.result(moment)
+            np.testing.assert_array_equal(frame.point_data[kratos], getattr(state, ours))
+        result = transient.result(state)
         np.testing.assert_array_equal(frame.point_data["VON_MISES_STRESS"], result.von_mises("node"))
         np.testing.assert_array_equal(frame.cell_data["CAUCHY_STRESS_VECTOR"][0], result.stress("element"))
     arrays = np.load(tmp_path / "swing.npz")
     assert sorted(arrays) == ["a", "reactions", "step", "time", "u", "v"]
-    np.testing.assert_array_equal(arrays["v"], [moment.v for moment in moments])
+    np.testing.assert_array_equal(arrays["v"], [state.v for state in states])
     assert arrays["step"].tolist() == [0, 3, 6]
     lines = (tmp_path / "swing.csv").read_text().splitlines()
     assert lines[0].split(",") == list(MOMENT_COLUMNS)
     last = np.array([float(word) for word in lines[-1].split(",")])
-    assert last[0] == moments[-1].time
+    assert last[0] == states[-1].time
     assert last[1] == transient.energy() > 0
-    assert last[2] == np.linalg.norm(moments[-1].u, axis=1).max() > 0
-    np.testing.assert_array_equal(last[3:], moments[-1].reactions.sum(axis=0))
+    assert last[2] == np.linalg.norm(states[-1].u, axis=1).max() > 0
+    np.testing.assert_array_equal(last[3:], states[-1].reactions.sum(axis=0))
 
 
-def test_the_energy_of_an_earlier_moment_is_that_of_then():
+def test_the_energy_of_an_earlier_state_is_that_of_then():
     transient = shaken_bar().transient()
     then = transient.state()
     start = transient.energy()
@@ -72,8 +72,8 @@ def test_the_energy_of_an_earlier_moment_is_that_of_then():
     assert transient.energy() > 10 * abs(start)
 
 
-def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
-    """A bar that has come to rest has the stress of statics; a moment has summary and files of results."""
+def test_stress_of_a_state_is_that_of_its_displacement(tmp_path):
+    """A bar that has come to rest has the stress of statics; a state has summary and files of results."""
     model = shaken_bar()
     transient = model.transient(rayleigh=(2 * model.modes(1)[0][0], 0.0))
     *_, late = kl.integrate(transient, dt=0.02, steps=600, every=600)
@@ -88,11 +88,11 @@ def test_stress_of_a_moment_is_that_of_its_displacement(tmp_path):
     kl.write(tmp_path / "late.json", result)
 
 
-def test_a_moment_is_drawn_deformed(tmp_path):
+def test_a_state_is_drawn_deformed(tmp_path):
     pytest.importorskip("matplotlib")
     transient = shaken_bar().transient()
-    *_, moment = kl.integrate(transient, dt=0.02, steps=5)
-    kl.draw(tmp_path / "bar.png", transient.equations.model.mesh, moment.u, moment.u[:, 0])
+    *_, state = kl.integrate(transient, dt=0.02, steps=5)
+    kl.draw(tmp_path / "bar.png", transient.equations.model.mesh, state.u, state.u[:, 0])
     assert (tmp_path / "bar.png").stat().st_size > 10_000
 
 
@@ -123,7 +123,7 @@ def test_a_clamp_carries_the_weight_of_a_bar_and_its_moment():
     force, moment = kl.reaction_resultant(model, model.solve(), "z-", center=(0.1, 0.1, 0.0))
     np.testing.assert_allclose(force, (-weight, 0, 0), atol=1e-9 * weight)
     np.testing.assert_allclose(moment, (0, -weight * 0.5, 0), atol=1e-9 * weight)
-    # In motion: d/dt of the momentum is weight + reaction, here at the first moment, at rest but accelerated.
+    # In motion: d/dt of the momentum is weight + reaction, here at the first state, at rest but accelerated.
     transient = model.transient()
     start = transient.state()
     mass = transient.equations.mass.nodal

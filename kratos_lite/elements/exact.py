@@ -1,0 +1,134 @@
+"""Exact rules: quadrature chosen by the polynomial degree of N N det J and by the geometry of a cell.
+
+In the coordinates of its rule (x / (1 - z), y / (1 - z) and z for a pyramid) a cell has polynomial shape
+functions.  With functions of degree p in each direction of a product, det J has degree 3p - 1; if the edges
+are straight and mid-edge nodes in the middle, 2; if the cell is affine, 0.  Over a tetrahedron, where degrees
+are total ones, it has 3(p - 1) or 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kratos_lite.quadrature import CELLS, Rule, rule_for
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array, Ints
+
+AFFINE, STRAIGHT, CURVED = range(3)
+"""Geometry of a cell: constant J; that of its corners alone; any."""
+ROUNDING = 8 * np.finfo(float).eps
+"""How far, relative to the largest coordinate, rounding may move a node from where its geometry has it."""
+MOST = 11
+"""Highest degree of shape functions that is recognized."""
+
+_LINES = {
+    "tetrahedron": [((0.05, 0.1, 0.2), (0.7, 0.2, 0.05)), ((0.1, 0.05, 0.7), (0.2, 0.6, 0.05))],
+    "hexahedron": [
+        ((-0.9, -0.3, 0.4), (0.9, -0.3, 0.4)),
+        ((0.2, -0.9, 0.4), (0.2, 0.9, 0.4)),
+        ((0.2, -0.3, -0.9), (0.2, -0.3, 0.9)),
+    ],
+    "wedge": [
+        ((0.1, 0.2, -0.3), (0.7, 0.1, -0.3)),
+        ((0.2, 0.7, 0.4), (0.1, 0.1, 0.4)),
+        ((0.2, 0.3, -0.9), (0.2, 0.3, 0.9)),
+    ],
+    "pyramid": [
+        ((-0.6, 0.2, 0.3), (0.6, 0.2, 0.3)),
+        ((0.2, -0.6, 0.3), (0.2, 0.6, 0.3)),
+        ((0.6, -0.4, 0.0), (0.06, -0.04, 0.9)),
+    ],
+}
+"""Lines in reference cells along which one coordinate of the rule varies alone; of a tetrahedron, any."""
+
+
+@remembered
+def degree_of(shape: type[Shape]) -> int:
+    """Return the polynomial degree of shape functions along the directions of a rule.
+
+    Functions that are no polynomials count as those that they span, `Shape.degree`.
+
+    >>> from kratos_lite.shapes import Hexahedron20, Tetrahedron4
+    >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
+    (2, 1)
+    """
+    found, t = 0, np.cos(np.pi * (np.arange(MOST + 2) + 0.5) / (MOST + 2))
+    for start, end in np.array(_LINES[shape.cell]):
+        N = np.array([shape.N(xi) for xi in start + (1 + t[:, None]) / 2 * (end - start)], dtype=float)
+        size = np.abs(np.polynomial.chebyshev.chebfit(t, N, MOST + 1)).max(axis=1)
+        found = max(found, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
+    return found if found <= MOST else shape.degree
+
+
+@remembered
+def exact_rule(shape: type[Shape], factors: int, geometry: int = CURVED, flow: bool = False) -> Rule:
+    """Return the rule that integrates a product of shape functions, det J included.
+
+    Parameters
+    ----------
+    shape : of the cell.
+    factors : number of functions in the product; coordinates X = Σ N_a X_a count, too.
+    geometry : AFFINE, STRAIGHT or CURVED.
+    flow : whether the integrand is N_a c·grad N_b or (c·grad N_a)(c·grad N_b) with a linear c.  The first is
+        a polynomial of the degree of N N det J; the second is one over affine cells alone.
+    """
+    p, simplex = degree_of(shape), shape.cell == "tetrahedron"
+    curved = 3 * (p - 1) if simplex else 3 * p - 1
+    degree = factors * p + (0, 0 if simplex else 2, curved)[geometry]
+    if flow and not simplex:
+        degree = max(degree, 2 * p + 2)
+    return rule_for(shape.cell, min(degree, 40))
+
+
+def has_rules(shape: type[Shape]) -> bool:
+    """Return whether the family of a cell is one whose degrees are known."""
+    return shape.cell in CELLS and shape.cell in _LINES
+
+
+@remembered
+def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
+    """Return nodes (b,) and C (n, b) of AFFINE and STRAIGHT: a cell has that geometry if X = C X[nodes].
+
+    None stands for a geometry that the functions of the shape do not span.
+    """
+    if not has_rules(shape):
+        return [None, None]
+    xi = shape.nodes
+    base = [0]  # corners that span the cell
+    for a in range(1, shape.corners):
+        if np.linalg.matrix_rank(xi[[*base[1:], a]] - xi[0]) == len(base):
+            base.append(a)
+
+    def affine(points: Array) -> Array:
+        ones = np.ones((len(points), 1))
+        return np.hstack([ones, points]) @ np.linalg.inv(np.column_stack([np.ones(4), xi[base]]))
+
+    linear = shape.linear()
+    found: list[tuple[Array, Array] | None] = [_spanned(shape, np.array(base), affine)]
+    return [*found, _spanned(shape, np.arange(shape.corners), linear.N) if linear else None]
+
+
+def _spanned(
+    shape: type[Shape], nodes: Ints, functions: Callable[[Array], Array]
+) -> tuple[Array, Array] | None:
+    """Return nodes and functions at the nodes of a shape, or None if it does not span these functions."""
+    C = functions(shape.nodes)
+    points = np.array([xi for line in _LINES[shape.cell] for xi in line])
+    if np.abs(shape.N(points) @ C - functions(points)).max() > 1e-12:
+        return None
+    return nodes.astype(np.int32), np.ascontiguousarray(C, dtype=float)
+
+
+def geometries(shape: type[Shape], X: Array) -> Ints:
+    """Return AFFINE, STRAIGHT or CURVED of cells X (..., n, 3)."""
+    near = ROUNDING * np.abs(X).max(axis=(-2, -1))
+    X = X - X[..., :1, :]
+    found = np.full(X.shape[:-2], CURVED)
+    for geometry in (STRAIGHT, AFFINE):
+        if spanned := interpolations(shape)[geometry]:
+            nodes, C = spanned
+            found[np.abs(X - C @ X[..., nodes, :]).max(axis=(-2, -1)) <= near] = geometry
+    return found
