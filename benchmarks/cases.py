@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,17 @@ def prepared(folder: Path, target: Path) -> list[Path]:
         if case.get("parse_only") or case.get("pin_minimal"):
             continue
         model = model_of(statement.parent, case)
-        for block in model.mesh.blocks:
-            block.name = f"SmallDisplacementElement3D{block.nodes.shape[1]}N"
         path = target / f"{statement.parent.name}.mdpa"
-        kl.write(path, model)
+        write_for_kratos(path, model)
         written.append(path)
     return written
+
+
+def write_for_kratos(path: Path, model: kl.Model) -> None:
+    """Write a model as `.mdpa` with the names that Kratos has for its elements."""
+    kl.write(path, model)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r"\bKinematicLinear3D", "SmallDisplacementElement3D", text), encoding="utf-8")
 
 
 def model_of(folder: Path, case: dict[str, Any]) -> kl.Model:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import kratos_lite as kl
+from benchmarks.cases import write_for_kratos
 from kratos_lite.verification import scenes as shared
 from kratos_lite.verification.meshes import element, joined, on_plane
 from kratos_lite.verification.scenes import Scene, bending, cavity, cube, l_domain, manufactured, sphere
@@ -35,8 +36,7 @@ def write(scene: Scene, folder: Path) -> Path:
         forces=scene.forces(),
         elasticity=np.array([material.E, material.nu]),
     )
-    block.name = f"SmallDisplacementElement3D{len(block.shape.nodes)}N"
-    kl.write(f"{stem}.mdpa", scene.model)
+    write_for_kratos(Path(f"{stem}.mdpa"), scene.model)
     return stem
 
 

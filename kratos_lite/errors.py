@@ -92,11 +92,18 @@ RENAMED = {
 """Words that other programs, or earlier versions, have for what is known here by another word."""
 
 
+def _plain(word: str) -> str:
+    """Return a word without what is often mistaken: capitals, and what joins its parts."""
+    return word.lower().replace("-", "_").replace(" ", "_")
+
+
 def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     """Return a hint that names the known words closest to `name`, or an empty string.
 
     >>> nearest("KinematicLinear3D9N", ["KinematicLinear3D8N", "Isotropic3D"])
     ' Did you mean KinematicLinear3D8N?'
+    >>> nearest("HHT", ["hht"])
+    ' Did you mean hht?'
     """
     from difflib import get_close_matches
 
@@ -104,4 +111,7 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     if RENAMED.get(name) in known:
         return f" It is called {RENAMED[name]} here."
     close = get_close_matches(name, known, n=count, cutoff=0.6)
+    if not close:
+        plain = {_plain(word): word for word in known}
+        close = [plain[word] for word in get_close_matches(_plain(name), list(plain), n=count, cutoff=0.6)]
     return f" Did you mean {' or '.join(close)}?" if close else ""

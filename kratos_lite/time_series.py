@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
-from kratos_lite.validation import finite, number
+from kratos_lite.validation import finite, number, short, takes
 
 
 class TimeSeries:
@@ -96,6 +96,8 @@ def function_of(value: Factor, what: str) -> Callable[[float], float]:
     if isinstance(value, TimeSeries):
         return value
     if callable(value):
+        if isinstance(value, type) or not takes(value, 1):
+            raise InputError(f"{what} must be a function of the time alone; got {short(value)}")
         given = value
 
         def checked(time: float) -> float:

@@ -24,6 +24,7 @@ import math
 import operator
 from collections.abc import Iterable
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -264,6 +265,36 @@ def function_or_none(value: Any, must: str) -> None:
     """
     if value is not None and not callable(value):
         raise InputError(f"{must}; got {short(value)}")
+
+
+def takes(function: Any, count: int) -> bool:
+    """Return whether something can be called with so many arguments, as far as Python knows.
+
+    >>> takes(lambda t: t, 1), takes(lambda: 0, 1), takes(float, 1), takes(3.0, 1)
+    (True, False, True, False)
+    """
+    import inspect
+
+    if not callable(function):
+        return False
+    try:
+        inspect.signature(function).bind(*[0.0] * count)
+    except TypeError:
+        return False
+    except ValueError:  # compiled functions do not tell
+        pass
+    return True
+
+
+def path_of(value: Any) -> Path:
+    """Return a path to a file.
+
+    >>> path_of("a.json").name
+    'a.json'
+    """
+    if not isinstance(value, (str, PathLike)):
+        raise InputError(f"a path to a file must be text or a pathlib.Path; got {short(value)}")
+    return Path(value)
 
 
 def instance(

@@ -281,7 +281,6 @@ class Motion(Attachment):
                 f"velocity passes through its boundary; {self.cure}"
             )
         self._bind(structure)
-        structure.motion = self
 
     def _bind(self, structure: Structure) -> None:
         """Tie or fix boundaries."""

@@ -109,7 +109,7 @@ class Model(Structure):
 
     def solve_cases(
         self,
-        cases: Mapping[str, Sequence[Load]],
+        cases: Mapping[str, Load | Sequence[Load]],
         solver: str = "auto",
         tolerance: float = 1e-10,
         progress: Progress | None = None,

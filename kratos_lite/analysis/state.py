@@ -12,6 +12,7 @@ import numpy as np
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite, number, short, whole_number
 
 BODY_FIELDS = ("q", "u", "external_work")
 MODEL_FIELDS = ("u", "v", "a", "reactions", "imbalance")
@@ -72,7 +73,13 @@ class State:
         Returns
         -------
         State
+
+        Raises
+        ------
+        InputError
+            It is neither.
         """
+        _check_subject(subject)
         return subject.state() if not isinstance(subject, Body) else state_of_body(subject)
 
     def restore(self, subject: Body | InTime) -> None:
@@ -85,17 +92,13 @@ class State:
         Raises
         ------
         InputError
-            It is of another kind or size, or, of a model, not where the supports hold it at that time.
+            The state is of another kind or size, not finite, or, of a model, not where the supports are then.
         """
+        _check_subject(subject)
         if not isinstance(subject, Body):
             subject.restore(self)
             return
-        mine, its = ([np.shape(_value(one, name)) for name in BODY_FIELDS] for one in (self, subject))
-        if subject.kind != self.kind or mine != its:
-            shapes = "q {}, u {} and work {}".format
-            whose = "model" if self.kind == "model" else f"{self.kind} body with {shapes(*mine)}"
-            text = f"it does not fit a {subject.kind} body with {shapes(*its)}"
-            raise InputError(f"this is the state of a {whose}; {text}")
+        check_state_of_body(self, subject)
         q, u = self.values["q"], self.values["u"]
         subject.q[...], subject.u[...] = q, u  # bodies that advance together share these arrays
         subject.time, subject.step = self.time, self.step
@@ -110,9 +113,44 @@ class State:
         return found
 
 
-def _value(owner: State | Body, name: str) -> Array:
-    """Return an array of a state, empty where it has none, or of a body."""
-    return owner.values.get(name, np.zeros(0)) if isinstance(owner, State) else getattr(owner, name)
+def _check_subject(subject: object) -> None:
+    """Raise InputError for what has no states."""
+    if not isinstance(subject, Body) and not hasattr(subject, "restore"):
+        raise InputError(
+            f"a body, or a model in time, model.transient(), has states; got {type(subject).__name__}"
+        )
+
+
+def check_state(state: object, kind: str, shapes: Mapping[str, tuple[int, ...]]) -> State:
+    """Return a state of a kind of body, or of models, whose arrays have these shapes and are finite.
+
+    Raises
+    ------
+    InputError
+        It is another one, or no state.
+    """
+    whose = "a model" if kind == "model" else f"a {kind} body"
+    if not isinstance(state, State):
+        raise InputError(f"a State of {whose} is needed, such as kl.read_state gives; got {short(state)}")
+    if state.kind != kind:
+        other = "a model" if state.kind == "model" else f"a {state.kind} body"
+        raise InputError(f"this is the state of {other}; one of {whose} is needed")
+    for name, shape in shapes.items():
+        found = np.shape(state.values[name]) if name in state.values else "none"
+        if found != shape:
+            raise InputError(
+                f"this state does not fit: {name} of {whose} has shape {shape} here; got {found}"
+            )
+    number(state.time, "the time of a state", least=0, unit="s")
+    whole_number(state.step, "the steps of a state", least=0)
+    for name in shapes:
+        finite(state.values[name], f"{name} of a state")
+    return state
+
+
+def check_state_of_body(state: object, body: Body) -> State:
+    """Return a state that is one of a body; InputError otherwise."""
+    return check_state(state, body.kind, {name: np.shape(getattr(body, name)) for name in BODY_FIELDS})
 
 
 def state_of_body(body: Body, substeps: int = 1) -> State:
@@ -123,7 +161,8 @@ def state_of_body(body: Body, substeps: int = 1) -> State:
 
 @contextmanager
 def at(body: Body, state: State) -> Iterator[None]:
-    """Let a body be in a state for a while."""
+    """Let a body be in a state for a while; InputError unless it is one of this body."""
+    check_state_of_body(state, body)
     if state.time == body.time and np.array_equal(state.q, body.q) and np.array_equal(state.u, body.u):
         yield
         return

@@ -98,12 +98,12 @@ class StaticAnalysis:
         self._phase = Phases()
         self._prepare()
 
-    def solve(self, loads: Sequence[Load] | None = None) -> Result:
+    def solve(self, loads: Load | Sequence[Load] | None = None) -> Result:
         """Solve for some loads, or for those of the model.
 
         Parameters
         ----------
-        loads : in place of those of the model.
+        loads : one or several, in place of those of the model.
 
         Returns
         -------
@@ -120,7 +120,7 @@ class StaticAnalysis:
         case = self._load(self.model.loads if loads is None else loads)
         return self._solve(case, case.moving)
 
-    def solve_cases(self, cases: Mapping[str, Sequence[Load]]) -> dict[str, Result]:
+    def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
             raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
@@ -172,9 +172,12 @@ class StaticAnalysis:
             if self.system:
                 self._prescribed = supports.constraint_map(self.system.nodes).c
 
-    def _load(self, loads: Sequence[Load]) -> LoadSet:
+    def _load(self, given: Load | Sequence[Load]) -> LoadSet:
         """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
         phase, self._phase = self._phase, Phases()
+        if not isinstance(given, (Load, list, tuple)):
+            raise InputError(f"a load, or a list of them, is needed; got {type(given).__name__}")
+        loads = [given] if isinstance(given, Load) else list(given)
         for load in loads:
             if not isinstance(load, Load):
                 raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
@@ -186,7 +189,7 @@ class StaticAnalysis:
             checks.check_carried(mesh, forces, self._used)
             moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
             moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
-        return LoadSet(list(loads), external, forces, moving, phase)
+        return LoadSet(loads, external, forces, moving, phase)
 
     def _system_of(self, moving: Mask) -> ConstrainedSystem:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""

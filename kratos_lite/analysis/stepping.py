@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from math import ceil, inf
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Progress
-from kratos_lite.validation import function_or_none, positive_step, whole_number
+from kratos_lite.validation import function_or_none, positive_step, short, takes, whole_number
 
 _log = logging.getLogger("kratos_lite")
 SAFETY = 0.95
@@ -98,7 +98,8 @@ def integrate(
     """
     h, every = positive_step(dt), whole_number(every, "every")
     count = None if steps is None else whole_number(steps, "steps")
-    function_or_none(until, "until must be a function of a state")
+    if until is not None and not takes(until, 1):
+        raise InputError(f"until must be a function of a state; got {short(until)}")
     function_or_none(progress, "progress must be a function of a phase and a share")
     stepper: Stepper = subject if isinstance(subject, TransientAnalysis) else BodyStepper(subject)
     parts = 1 if substeps == "auto" else whole_number(substeps, "substeps", ", or 'auto'")
@@ -113,6 +114,16 @@ def integrate(
         )
     stepper.prepare(h, parts)
     return _states(stepper, h, count, every, until, progress)
+
+
+def _ends(answer: Any) -> bool:
+    """Return whether the loop ends, from what `until` returned."""
+    try:
+        return bool(answer)
+    except ValueError:
+        raise InputError(
+            f"until must return True or False; got {short(answer)}; use .any() or .all()"
+        ) from None
 
 
 def _states(
@@ -134,7 +145,7 @@ def _states(
             progress("integrate", done / count)
         state = stepper.state()
         yield state
-        if until and until(state):
+        if until and _ends(until(state)):
             return
 
 

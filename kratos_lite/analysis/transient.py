@@ -17,12 +17,12 @@ from kratos_lite.analysis.material_derivatives import acceleration_of_material, 
 from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.state import State
+from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
-from kratos_lite.validation import finite, flag, function_or_none, number
+from kratos_lite.validation import finite, flag, function_or_none
 
 _log = logging.getLogger("kratos_lite")
 DIVERGED = 1e9
@@ -173,10 +173,7 @@ class TransientAnalysis:
             The model has changed.
         """
         e = self.equations
-        if self._version != _version(e.model):
-            raise ModelError(
-                "the model has changed since this transient was made; make a new one and restore the state"
-            )
+        self._check_unchanged()
         check_stable(str(self.integrator), h / parts, self.critical_step(), "Newmark()")
         e.step, self.parts = h / parts, parts
         if not self.step and e.model.supports.motions:
@@ -192,7 +189,13 @@ class TransientAnalysis:
         ----------
         h : step in s.
         count : their number.
+
+        Raises
+        ------
+        ModelError
+            The model has changed.
         """
+        self._check_unchanged()
         part = h / self.parts
         for _ in range(count):
             now = self.u, self.v, self.a
@@ -203,6 +206,13 @@ class TransientAnalysis:
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
+
+    def _check_unchanged(self) -> None:
+        """Raise ModelError if the model has changed."""
+        if self._version != _version(self.equations.model):
+            raise ModelError(
+                "the model has changed since this transient was made; make a new one and restore the state"
+            )
 
     def diverged(self) -> bool:
         """Return whether the motion has lost its stability.
@@ -262,16 +272,31 @@ class TransientAnalysis:
             It is no state of a model, has another size, or does not lie where the supports hold the model at
             its time.
         """
-        if not isinstance(state, State) or state.kind != "model":
-            found = f"that of a {state.kind} body" if isinstance(state, State) else type(state).__name__
-            raise InputError(f"a State of a model is needed, such as kl.read_state gives; got {found}")
-        u, v, a = (self._nodal(getattr(state, name), f"{name} of a state") for name in "uva")
-        time, step = number(state.time, "the time of a state"), state.step
-        if time < 0 or isinstance(step, bool) or not isinstance(step, (int, np.integer)) or step < 0:
-            raise InputError(f"a state has a time and a number of steps ≥ 0; got {time:g} s and {step!r}")
+        self.check_state(state)
+        u, v, a = (self.equations.system.gather(getattr(state, name)).copy() for name in "uva")
+        time, step = float(state.time), state.step
         self._check_supports(u, self.equations.prescribed(time), f"at t = {time:g} s the state")
         self.u, self.v, self.a, self.time, self.step = u, v, a, time, int(step)
         self._restored = state
+
+    def check_state(self, state: object) -> State:
+        """Return a state that is one of a model of this mesh.
+
+        Parameters
+        ----------
+        state : to be checked.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        InputError
+            It is another one, is not finite, or no state.
+        """
+        shape = (self.equations.system.n_nodes, 3)
+        return check_state(state, "model", {**dict.fromkeys(MODEL_FIELDS[:4], shape), "imbalance": ()})
 
     def _settle(self, state: State) -> None:
         """Balance the acceleration of a state of another integrator, or of another load."""
@@ -314,7 +339,11 @@ class TransientAnalysis:
             With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, local, left = self.state() if state is None else state, self.equations.system.gather, None
+        at, local, left = (
+            self.state() if state is None else self.check_state(state),
+            self.equations.system.gather,
+            None,
+        )
         if self.integrator.balanced:
             free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
             left = free / largest if largest else 0.0
@@ -376,6 +405,7 @@ class TransientAnalysis:
         if state is None:
             return self.u, self.v, self.a, self.time
         local = self.equations.system.gather
+        self.check_state(state)
         return local(state.u), local(state.v), local(state.a), state.time
 
     def _whole(self, x: Array) -> Array:

@@ -17,7 +17,7 @@ from kratos_lite.bodies.constraints.base import Constraint
 from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad, apply_load
 from kratos_lite.bodies.validation import Material
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.mass_properties import MassProperties
@@ -198,7 +198,10 @@ class Body(FreeBody):
         words = [word for word, alias in self.integrators.items() if name in (word, alias or word)]
         if not words:
             known = ", ".join(self.integrators) or "none"
-            raise InputError(f"the integrators of a {self.kind} body are {known}; got {name!r}")
+            aliases = [alias for alias in self.integrators.values() if alias]
+            hint = nearest(name, [*self.integrators, *aliases], 1) if isinstance(name, str) else ""
+            text = f"the integrators of a {self.kind} body are {known}; got {name!r}"
+            raise InputError(f"{text}.{hint}" if hint else text)
         self._integrator = words[0]
 
     @property

@@ -9,6 +9,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import ending, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.validation import path_of
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
@@ -75,7 +76,7 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
-    path = Path(path)
+    path = path_of(path)
     if ending(path) == ".json":
         from kratos_lite.io.settings import read_settings
 
@@ -135,6 +136,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     from kratos_lite.io.writers.state import write_state
     from kratos_lite.mesh import Mesh
 
+    path = path_of(path)
     if isinstance(thing, Result):
         write_result(path, thing, mode)
         return []

@@ -30,7 +30,7 @@ class Attachment(ABC):
 
     @abstractmethod
     def attach(self, structure: Structure) -> None:
-        """Become part of a structure: check it, and set what it needs.
+        """Become the motion of a structure: check it, and set what it needs.
 
         Parameters
         ----------
@@ -55,7 +55,6 @@ class Structure:
     ----------
     supports : what is prescribed; see `fix` and `constrain`.
     loads : those added; the list may be changed.
-    motion : of the material through the mesh, a `kratos_lite.ale.Motion`, or None.
     notes : what readers of files found, for the report.
 
     Raises
@@ -72,7 +71,7 @@ class Structure:
         self._mesh = checks.checked_mesh(mesh)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
-        self.motion: Attachment | None = None
+        self._motion: Attachment | None = None
         self.notes: list[str] = []
         self.patterns = PatternCache()
         self._initial_displacement: Array | None = None
@@ -97,6 +96,17 @@ class Structure:
     def version(self) -> tuple[int, int]:
         """Change counters of everything that affects the equations except prescribed values and loads."""
         return self._changes, self.supports.version
+
+    @property
+    def motion(self) -> Attachment | None:
+        """Motion of the material through the mesh, or None; `add` takes one, None takes it away."""
+        return self._motion
+
+    @motion.setter
+    def motion(self, value: None) -> None:
+        if value is not None:
+            raise ModelError("a motion also ties or fixes boundaries: give it to model.add(...)")
+        self._motion = None
 
     # ---- elements -----------------------------------------------------------------------------
 
@@ -321,6 +331,7 @@ class Structure:
             if amplitude is not None:
                 raise InputError("a motion takes no amplitude; its rate may be a function of time")
             load.attach(self)
+            self._motion = load
             return
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")

@@ -76,6 +76,8 @@ def couple(X: Array) -> Array:
 def torsion_constant(a: float, b: float) -> float:
     """Return J of a rectangle a ≥ b.
 
+    Fine meshes tend to the twist that it gives; the 0.03208 of MacNeal & Harder is 6 % less.
+
     >>> round(torsion_constant(2.0, 1.0) / 2, 4)  # 0.229 in the table of the book
     0.2287
     """

@@ -45,19 +45,8 @@ def split(points: Array, bricks: Ints | Rows, kind: str) -> Mesh:
         corners = np.column_stack([corners, len(points) + np.arange(len(corners))])
         points = np.vstack([points, points[corners[:, :8]].mean(axis=1)])
     pieces = np.array(SPLITS[shape.cell])
-    return _mesh(*raise_order(points, corners[:, pieces].reshape(-1, pieces.shape[1]), shape), kind)
-
-
-def _mesh(points: Array, nodes: Ints, kind: str) -> Mesh:
-    m = len(nodes)
-    block = Block(
-        element(kind),
-        nodes.astype(np.int32),
-        np.arange(1, m + 1),
-        np.ones(m, dtype=np.int64),
-        kind_of(kind).shape,
-    )
-    return Mesh(points, [block])
+    points, nodes = raise_order(points, corners[:, pieces].reshape(-1, pieces.shape[1]), shape)
+    return Mesh(points, [Block(element(kind), nodes)])
 
 
 def warped(kind: str, n: int, amount: float = 0.2, seed: int = 3) -> Mesh:
@@ -88,7 +77,7 @@ def joined(pieces: Sequence[Mesh]) -> Mesh:
     points = np.vstack([piece.points for piece in pieces])
     nodes = np.vstack([piece.blocks[0].nodes + start for piece, start in zip(pieces, starts, strict=False)])
     _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
-    return _mesh(points[first], same.ravel()[nodes], pieces[0].blocks[0].name)
+    return Mesh(points[first], [Block(pieces[0].blocks[0].name, same.ravel()[nodes])])
 
 
 def octant(n: int, kind: str, outer: Place) -> Mesh:
@@ -118,7 +107,7 @@ def octant(n: int, kind: str, outer: Place) -> Mesh:
 
 def on_plane(mesh: Mesh, axis: int, value: float) -> Mask:
     """Return a mask of the nodes with coordinate `value` along an axis."""
-    return np.abs(mesh.points[:, axis] - value) < 1e-9 * max(1.0, float(np.abs(mesh.points).max()))
+    return np.abs(mesh.points[:, axis] - value) < 1e-7 * float(np.ptp(mesh.points[:, axis]))
 
 
 def on_boundary(mesh: Mesh) -> Mask:

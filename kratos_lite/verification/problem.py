@@ -53,8 +53,13 @@ class Problem:
     takes: Of | None = every
 
     def __post_init__(self) -> None:
-        if self.source.partition(",")[0] not in SOURCES:
+        if self.cited not in SOURCES:
             raise ValueError(f"{self.name}: {self.source!r} names none of the sources")
+
+    @property
+    def cited(self) -> str:
+        """The word of the source in `SOURCES`."""
+        return self.source.replace(":", ",").partition(",")[0]
 
     def error(self, value: float) -> float:
         """Return how far a value is from the reference."""
@@ -66,7 +71,7 @@ class Problem:
         error = self.error(value)
         if self.tolerance is not None and self.exact(element):
             return PASS if error <= self.tolerance else FAIL
-        return next((letter for limit, letter in GRADES if error <= limit), "F")
+        return next((letter for limit, letter in GRADES if error <= limit * (1 + 1e-9)), "F")
 
     def elements(self, wanted: tuple[str, ...] = ELEMENTS) -> tuple[str, ...]:
         """Return those of some elements that the problem is for; ("",) where it has none."""

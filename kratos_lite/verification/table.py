@@ -9,17 +9,34 @@ from kratos_lite.errors import InputError, nearest
 from kratos_lite.verification import (
     concentrations,
     macneal_harder,
+    moving_material,
     nafems,
     orders,
     patch,
     pressure,
     shells,
+    stepping,
+    tops,
     uniform,
+    vibration,
 )
 from kratos_lite.verification.meshes import element, kind_of
 from kratos_lite.verification.problem import ELEMENTS, Problem, Row, solved
 
-FAMILIES = (uniform, patch, macneal_harder, shells, pressure, concentrations, nafems, orders)
+FAMILIES = (
+    uniform,
+    patch,
+    macneal_harder,
+    shells,
+    pressure,
+    concentrations,
+    nafems,
+    orders,
+    vibration,
+    stepping,
+    tops,
+    moving_material,
+)
 """Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""
 PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for problem in family.PROBLEMS}
 """Every problem by its name."""

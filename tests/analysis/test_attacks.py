@@ -169,10 +169,10 @@ def test_states_that_do_not_fit_are_refused():
     off = state.u.copy()
     off[0, 0] = 1.0
     for field, value, words in (
-        ("time", -5.0, "time and a number of steps ≥ 0; got -5 s"),
+        ("time", -5.0, "the time of a state must be one number ≥ 0, in s; got -5"),
         ("time", np.nan, "time of a state must be finite"),
-        ("step", -4, "got 0.001 s and -4"),
-        ("step", 1.5, "got 0.001 s and 1.5"),
+        ("step", -4, "the steps of a state must be a whole number ≥ 0; got -4"),
+        ("step", 1.5, "the steps of a state must be a whole number ≥ 0; got 1.5"),
         ("u", off, "at t = 0.001 s the state does not fit the supports: node 1 along x is 1 m off"),
         ("v", np.full_like(off, np.nan), "v of a state must be finite"),
         ("a", off.astype(complex), "a of a state must be made of real numbers"),
@@ -226,7 +226,7 @@ def test_nonsense_is_told():
             wheel(kl.ale.Rotation("z", rate=value)).solve()
     transient = wheel().transient()
     (state,) = kl.integrate(transient, 1e-3, 1)
-    with pytest.raises(kl.InputError, match="v of a state needs shape"):
+    with pytest.raises(kl.InputError, match="v of a model has shape"):
         replace(state, values={**state.values, "v": state.v[:4]}).restore(transient)
     with pytest.raises(kl.InputError, match="a State of a model is needed"):
         transient.restore(None)

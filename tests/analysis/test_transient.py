@@ -419,5 +419,5 @@ def test_files_that_are_no_states(tmp_path):
     with pytest.raises(InputError, match=r"not a state that kl\.write wrote"):
         kl.read_state(tmp_path / "text.npz")
     other = bar(2).transient().state()
-    with pytest.raises(InputError, match="u of a state needs shape"):
+    with pytest.raises(InputError, match="u of a model has shape"):
         other.restore(bar(4).transient())

@@ -101,6 +101,24 @@ def test_energy_is_the_sum_over_integration_points(solved):
     assert abs((density * weight).sum() - result.energy()) < 1e-12 * result.energy()
 
 
+def test_energy_of_prestressed_elements_with_a_stress_of_their_own_is_that_of_the_result():
+    with kl.ELEMENTS.temporary():
+
+        class HalfAsStiff(kl.KinematicLinear3D8N):
+            def stress(self, C, u):
+                return 0.5 * super().stress(C, u)
+
+        mesh = distorted("HalfAsStiff")
+        model = held_model(mesh, linear(mesh.points)[0])
+        model.add_prestress([1e3, 0.0, 0.0, 0.0, 50.0, 0.0])
+        result = model.solve()
+        density, weight = map(result.at_integration_points, ("STRAIN_ENERGY", "INTEGRATION_WEIGHT"))
+        eps = linear(mesh.points)[1][0]
+        by_hand = (LAM * eps[:3].sum() ** 2 + 2 * MU * (eps[:3] ** 2).sum() + MU * (eps[3:] ** 2).sum()) / 4
+        assert np.abs(density - by_hand).max() < 1e-12 * by_hand
+        assert abs((density * weight).sum() - result.energy()) < 1e-12 * result.energy()
+
+
 def test_elements_with_different_rules_give_a_list():
     mesh = kl.box(cells=(2, 1, 1))
     model = held_model(mesh, 1e-3 * mesh.points)

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kratos_lite.analysis.state import State, at
+from kratos_lite.analysis.state import State, at, check_state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
@@ -52,6 +52,9 @@ class Recorded(Protocol):
     def now(self) -> Any:
         """Return the state of the subject as it is now."""
 
+    def checked(self, state: Any) -> State:
+        """Return a state of the subject; InputError for another."""
+
     def mesh(self) -> Mesh:
         """Return the mesh that is shown."""
 
@@ -77,6 +80,10 @@ class RecordedBody:
     def now(self) -> State:
         """Return the state of the body as it is now."""
         return State.of(self.body)
+
+    def checked(self, state: Any) -> State:
+        """Return a state of the body; InputError for another."""
+        return check_state_of_body(state, self.body)
 
     def mesh(self) -> Mesh:
         """Return the mesh; ModelError for a body without one."""
@@ -121,6 +128,10 @@ class RecordedModel:
     def now(self) -> Any:
         """Return the state of the model as it is now."""
         return self.transient.state()
+
+    def checked(self, state: Any) -> State:
+        """Return a state of the model; InputError for another."""
+        return self.transient.check_state(state)
 
     def mesh(self) -> Mesh:
         """Return the mesh of the model."""

@@ -146,10 +146,16 @@ class SeriesWriter:
         Parameters
         ----------
         state : of the owner; as it is now if none is given.
+
+        Raises
+        ------
+        InputError
+            It is a state of another body or mesh, or none.
         """
+        taken = self._subject.now() if state is None else self._subject.checked(state)
         if not self.count:
             make_folder(self._writer.path)
-        self._writer.add(self._subject.now() if state is None else state)
+        self._writer.add(taken)
         self.count += 1
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from kratos_lite.analysis.state import BODY_FIELDS, MODEL_FIELDS, State
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import read_arrays, write_arrays
 
-HEAD = ("kind", "integrator", "time", "step")
+HEAD = ("kind", "integrator", "time", "step", "substeps")
 WHAT = "a state that kl.write wrote"
 
 
@@ -50,11 +50,13 @@ def read_state(path: str | Path) -> State:
         raise InputError(f"{path}: a series of states, not one that kl.write wrote")
     try:
         kind, integrator = str(head["kind"].item()), str(head["integrator"].item())
-        time, step = float(head["time"]), int(head["step"])
+        time, step, substeps = float(head["time"]), int(head["step"]), int(head["substeps"])
     except (ValueError, TypeError, OverflowError):
         raise InputError(f"{path}: not {WHAT}") from None
     values = read_arrays(path, MODEL_FIELDS if kind == "model" else BODY_FIELDS, WHAT)
     is_counted = head["step"].dtype.kind in "iu" and 0 <= step < 2**62
     if not is_counted or head["kind"].dtype.kind != "U" or any(a.dtype != float for a in values.values()):
         raise InputError(f"{path}: not {WHAT}")
-    return State(kind, integrator, time, step, values)
+    if not np.isfinite([time, *(np.abs(array).max(initial=0.0) for array in values.values())]).all():
+        raise InputError(f"{path}: a state that is not finite, so nothing can go on from it")
+    return State(kind, integrator, time, step, values, substeps)

@@ -15,6 +15,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.writers.pictures import save_figure
 from kratos_lite.io.writers.recorded import RecordedBody, check_single
 from kratos_lite.typing import Array
+from kratos_lite.validation import short
 
 SHOWN = 6
 """Positions in a picture."""
@@ -48,7 +49,7 @@ def draw_trajectory(
     Raises
     ------
     InputError
-        There are no states, or the file cannot be written.
+        There are no states, one is not of this body, or the file cannot be written.
     ModelError
         The body has no mesh, or is a batch of bodies.
     KratosLiteError
@@ -61,6 +62,10 @@ def draw_trajectory(
     >>> body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
     >>> draw_trajectory(getfixture("tmp_path") / "spin.png", body, kl.integrate(body, 0.01, 100, every=10))
     """
+    if not isinstance(body, Body):
+        raise InputError(f"{path}: a path is that of a body, such as kl.RigidBody; got {type(body).__name__}")
+    if not isinstance(states, Iterable):
+        raise InputError(f"{path}: states in the order of time are needed; got {short(states)}")
     check_single(body, path)
     if body.mesh is None:
         raise ModelError(f"{path}: this body has no mesh to be drawn")

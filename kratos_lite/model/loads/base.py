@@ -13,7 +13,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, takes
 
 
 class Load(ABC):
@@ -66,7 +66,7 @@ class TimeDependentLoad(Load):
     """
 
     def __init__(self, function: Callable[[float], Load | None]) -> None:
-        if not callable(function) or isinstance(function, Load):
+        if isinstance(function, (Load, type)) or not takes(function, 1):
             raise InputError(f"a function of time that returns a load is needed; got {function!r}")
         self.function = function
 

@@ -1,0 +1,184 @@
+"""The page of verification, with what other programs find: ``python -m benchmarks.verification``.
+
+Every problem at rest is given to Kratos, CalculiX and scikit-fem as the same nodes, elements, supports and
+nodal forces; the quantity of the table follows from their nodal displacements.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import kratos_lite as kl
+from benchmarks.driver import ROOT
+from benchmarks.programs import PROGRAMS
+from benchmarks.scenes import write
+from kratos_lite.verification import page
+from kratos_lite.verification.problem import Row, StaticProblem
+from kratos_lite.verification.scenes import Scene
+from kratos_lite.verification.table import verify
+
+PAGE = ROOT / "docs" / "verification.md"
+RESULTS = ROOT / "benchmarks" / "results" / "verification.json"
+COMMAND = "python -m benchmarks.verification"
+PEERS = ("Kratos", "CalculiX", "scikit-fem")
+LU = json.dumps({"solver_type": "LinearSolversApplication.sparse_lu"})
+CURVED = 1e-9
+"""Distance of a mid-edge node from the middle / size of the mesh, from which an edge is curved."""
+
+
+@dataclass
+class Given:
+    """A model as the programs get it, and their displacements by program."""
+
+    scene: Scene
+    forces: np.ndarray
+    stem: Path
+    curved: bool
+
+    def result(self, u: np.ndarray) -> kl.Result:
+        """Return a result with the displacements of another program."""
+        model = self.scene.model
+        zero = np.zeros_like(u)
+        return kl.Result(model.mesh, model.element_groups(), u, zero, self.forces.copy(), None)
+
+    def job(self, program: str) -> dict[str, str]:
+        """Return the job for a program."""
+        return {
+            "task": "solve",
+            "stem": str(self.stem),
+            "kind": self.scene.kind,
+            "folder": str(self.stem.parent),
+            "displacement": f"{self.stem}.{PROGRAMS[program].module}.npy",
+            "kratos_solver": LU,
+        }
+
+
+def is_curved(mesh: kl.Mesh) -> bool:
+    """Return whether a mid-edge node lies off the middle of its edge."""
+    (block,) = mesh.blocks
+    shape, X = block.shape, mesh.points[block.nodes]
+    if len(shape.nodes) == shape.corners:
+        return False
+    ends = np.array(shape.edges)
+    middles = X[:, shape.corners : shape.corners + len(ends)]
+    return bool(np.abs(middles - X[:, ends].mean(axis=2)).max() > CURVED * np.ptp(mesh.points))
+
+
+def given(model: kl.Model, kind: str, folder: Path, number: int) -> Given | None:
+    """Write a model for the programs; None where it ties displacements to others, which not all can."""
+    if model.supports.constraints or model.motion is not None:
+        return None
+    scene = Scene("m", kind, number, model)
+    forces = scene.forces()
+    model.loads.clear()
+    model.add(kl.NodalForces(forces))
+    return Given(scene, forces, write(scene, folder), is_curved(model.mesh))
+
+
+def prepared(rows: list[Row], folder: Path) -> dict[int, list[Given]]:
+    """Write the models of all rows that are problems at rest; rows with the same models share them."""
+    known: dict[object, list[Given | None]] = {}
+    for row in rows:
+        if isinstance(row.problem, StaticProblem):
+            key = row.problem.models, row.element
+            if key not in known:
+                models = row.problem.models(row.element)
+                known[key] = [given(m, row.kind, folder, 10 * len(known) + i) for i, m in enumerate(models)]
+    return {
+        i: known[row.problem.models, row.element]
+        for i, row in enumerate(rows)
+        if isinstance(row.problem, StaticProblem) and None not in known[row.problem.models, row.element]
+    }
+
+
+def takes(program: str, one: Given) -> bool:
+    """Return whether a program has this element, with edges as these are."""
+    has = PROGRAMS[program]
+    return one.scene.kind in has.kinds and (not one.curved or one.scene.kind in has.curved)
+
+
+def solved(program: str, python: str, jobs: list[dict[str, str]], folder: Path) -> str:
+    """Let a program do its jobs; return its version, or "" where it is absent."""
+    path = folder / f"{PROGRAMS[program].module}.json"
+    path.write_text(json.dumps(jobs))
+    words = [python, "-m", "benchmarks.programs.batch", PROGRAMS[program].module, str(path)]
+    variables = os.environ | {"PYTHONPATH": str(ROOT)} | PROGRAMS[program].environment
+    with (folder / f"{PROGRAMS[program].module}.log").open("w") as log:
+        subprocess.run(words, env=variables, cwd=folder, check=True, stdout=log, stderr=subprocess.STDOUT)
+    told = json.loads(path.with_suffix(".answer.json").read_text())
+    if "absent" in told:
+        print(f"{program} is left out: {told['absent']}")
+        return ""
+    for line in told["failed"]:
+        print(f"{program}: {line}")
+    return str(told["version"])
+
+
+def beside(rows: list[Row], python: str, folder: Path) -> tuple[list[Row], dict[str, str]]:
+    """Return the rows with what other programs find, and the versions of these."""
+    ready, versions = prepared(rows, folder), {}
+    for program in PEERS:
+        jobs = {
+            str(one.stem): one.job(program)
+            for models in ready.values()
+            for one in models
+            if takes(program, one)
+        }
+        version = solved(program, python, list(jobs.values()), folder)
+        if not version:
+            continue
+        versions[program] = version
+        for i, models in ready.items():
+            paths = [Path(one.job(program)["displacement"]) for one in models]
+            if all(takes(program, one) for one in models) and all(path.exists() for path in paths):
+                results = [one.result(np.load(path)) for one, path in zip(models, paths, strict=True)]
+                value = float(rows[i].problem.measure(*results))
+                rows[i] = replace(rows[i], others=rows[i].others | {program: value})
+    return rows, versions
+
+
+def keep(rows: list[Row], versions: dict[str, str]) -> None:
+    """Write what the other programs find, to four digits more than the page shows."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for row in rows:
+        if row.others:
+            values = {name: float(f"{value:.8g}") for name, value in row.others.items()}
+            found.setdefault(row.problem.name, {})[row.kind] = values
+    problems = ",\n".join(f"  {json.dumps(name)}: {json.dumps(kinds)}" for name, kinds in found.items())
+    text = f'{{\n "versions": {json.dumps(versions)},\n "problems": {{\n{problems}\n }}\n}}\n'
+    RESULTS.write_text(text, encoding="utf-8")
+
+
+def kept(rows: list[Row]) -> tuple[list[Row], dict[str, str]]:
+    """Return the rows with what the other programs found when they last ran."""
+    told = json.loads(RESULTS.read_text(encoding="utf-8"))
+    known = told["problems"]
+    rows = [replace(row, others=known.get(row.problem.name, {}).get(row.kind, {})) for row in rows]
+    return rows, told["versions"]
+
+
+def main() -> None:
+    """Compute the table, let the other programs solve its problems, and write the page."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
+    parser.add_argument("--python", help="let the programs of this interpreter solve the problems anew")
+    options = parser.parse_args()
+    rows = list(verify())
+    if options.python:
+        with tempfile.TemporaryDirectory(prefix="kratos_lite_verify_") as folder:
+            rows, versions = beside(rows, options.python, Path(folder))
+        keep(rows, versions)
+    rows, versions = kept(rows)
+    PAGE.write_text(page.markdown(rows, versions, COMMAND), encoding="utf-8")
+    print(page.summary(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,224 @@
+"""The table of known values: rows pass, the page shows them, graded ones agree with another program."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.cli import main
+from kratos_lite.verification import page, pressure, scenes
+from kratos_lite.verification.problem import ELEMENTS, Problem, Row
+from kratos_lite.verification.sources import SOURCES
+from kratos_lite.verification.table import PROBLEMS, chosen, verify
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "verification.md").read_text(encoding="utf-8")
+FAMILIES = list(dict.fromkeys(name.partition("/")[0] for name in PROBLEMS))
+
+
+def rows_of_page(family):
+    """Return the rows of a family as the page has them: problem and element to the cells by their heads."""
+    section = PAGE.split(f"\n## {page.TITLES[family]}\n")[1].split("\n## ")[0]
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if "|" in line]
+    head, _, *body = (cells for cells in lines if len(cells) > 6)
+    return {(cells[0], cells[1]): dict(zip(head, cells, strict=True)) for cells in body}
+
+
+def same(text, value):
+    """Return whether a value is the one that stands on the page, but for its last digit."""
+    return text == value or abs(float(text) - float(value)) <= 2e-3 * abs(float(value))
+
+
+# ---- rows --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_rows_pass_and_stand_on_the_page(family):
+    rows, shown = list(verify([family])), rows_of_page(family)
+    assert [page.line(row) for row in rows if row.failed] == []
+    assert [(row.problem.name.partition("/")[2], row.kind or "–") for row in rows] == list(shown)
+    for row in rows:
+        cells = shown[row.problem.name.partition("/")[2], row.kind or "–"]
+        assert cells["reference"] == page.number(row.problem.reference), row.problem.name
+        assert cells["limit"] == page.limit(row.problem)
+        assert cells["source"] == row.problem.source
+        assert f"**{row.problem.cited}**" in PAGE
+        assert cells["grade"] == row.grade, page.line(row)
+        assert same(cells["value"], page.found(row, row.value)), (page.line(row), cells)
+
+
+def test_there_are_rows_enough_for_every_element():
+    for name in ELEMENTS:
+        assert sum(name in problem.elements() for problem in PROBLEMS.values()) >= 50
+    assert sum(len(problem.elements()) for problem in PROBLEMS.values()) >= 500
+
+
+def test_the_problems_of_the_families_are_all_there():
+    assert set(page.TITLES) == set(FAMILIES)
+    assert all(problem.name == name and problem.quantity for name, problem in PROBLEMS.items())
+    used = {problem.cited for problem in PROBLEMS.values()}
+    assert used <= set(SOURCES)
+
+
+BEAM = {
+    8: ((0.986, 0.093, 0.025), (0.986, 0.026, 0.010), (0.986, 0.032, 0.014)),
+    20: ((0.994, 0.970, 0.961), (0.994, 0.886, 0.920), (0.994, 0.967, 0.941)),
+    27: ((0.994, 0.978, 0.977), (0.994, 0.968, 0.966), (0.994, 0.969, 0.967)),
+    4: ((0.978, 0.031, 0.009), (0.980, 0.019, 0.006), (0.980, 0.022, 0.007)),
+    10: ((0.993, 0.962, 0.957), (0.994, 0.945, 0.943), (0.994, 0.951, 0.945)),
+}
+"""Displacement of the end / truth, by an independent program: extension, in plane, out of plane."""
+
+
+@pytest.mark.parametrize("nodes", sorted(BEAM))
+def test_straight_cantilevers_agree_with_an_independent_program(nodes):
+    forms, loads = ("rectangular", "trapezoidal", "parallelogram"), ("extension", "in_plane", "out_of_plane")
+    for form, wanted in zip(forms, BEAM[nodes], strict=True):
+        problems = [PROBLEMS[f"macneal_harder/straight_{form}_{load}"] for load in loads]
+        ratios = [p.row(f"KinematicLinear3D{nodes}N").value / p.reference for p in problems]
+        np.testing.assert_allclose(ratios, wanted, rtol=0, atol=0.0006)
+
+
+def test_bricks_in_the_thick_cylinder_agree_with_an_independent_program():
+    flat = np.sin(np.radians(10)) / np.radians(10)  # the pressure of 8-node bricks acts on plane faces
+    for nu, wanted in ((0.3, (0.9908, 0.9996, 0.9998)), (0.4999, (0.0534, 0.8793, 0.8793))):
+        problem = PROBLEMS[f"pressure/thick_cylinder_{nu}"]
+        found = [problem.row(f"KinematicLinear3D{n}N").value / problem.reference for n in (8, 20, 27)]
+        assert found == pytest.approx(np.array(wanted) * (flat, 1, 1), abs=5e-4)
+
+
+@pytest.mark.parametrize("nodes", [10, 13, 15, 20, 27])
+def test_energy_and_loads_of_a_sphere_and_a_cylinder_under_pressure(nodes):
+    sphere = scenes.sphere(f"{nodes}N", 3).model.solve()
+    assert sphere.energy() == pytest.approx(0.5 * 0.8 * np.pi / 2, rel=1.3e-2)
+    np.testing.assert_allclose(sphere.report.total_load, np.pi / 4, rtol=5e-4)
+    cylinder = pressure.cylinder(f"{nodes}N")[0].solve()
+    assert cylinder.energy() == pytest.approx(0.5 * 1.906666667 * 2 * np.pi * 0.25, rel=2e-3)
+    np.testing.assert_allclose(cylinder.report.total_load, 0, atol=1e-13)
+
+
+# ---- grades ------------------------------------------------------------------------------------------
+
+
+def row(value, **options):
+    given = {"name": "a/b", "quantity": "q", "source": "Hooke", "reference": 2.0, "of": lambda kind: value}
+    return Problem(**given | options).row("KinematicLinear3D8N")
+
+
+@pytest.mark.parametrize(
+    ("value", "grade"), [(2.04, "A"), (1.96, "A"), (2.05, "B"), (2.3, "C"), (1.1, "D"), (-2.0, "F")]
+)
+def test_grades_follow_the_relative_error(value, grade):
+    assert row(value).grade == grade
+
+
+def test_a_tolerance_is_met_or_not_whatever_the_sign_and_no_number_fails():
+    assert row(2.01, tolerance=0.01).grade == "pass"
+    for value in (2.03, 1.97, -2.0, float("nan"), float("inf")):
+        assert row(value, tolerance=0.01).failed
+    assert row(float("nan")).grade == "F"
+    assert row(1e-12, reference=0.0, tolerance=1e-11).grade == "pass"
+    assert row(-1e-10, reference=0.0, tolerance=1e-11).failed
+    assert row(1.5, tolerance=0.01, exact=lambda kind: False).grade == "D"
+
+
+def test_an_error_of_the_library_is_a_row_that_fails_with_its_words():
+    def of(kind):
+        raise kl.MeshError("element 1 is inverted\nand more")
+
+    failed = row(None, of=of)
+    assert failed.failed
+    assert "element 1 is inverted" in page.line(failed)
+    assert "more" not in page.line(failed)
+
+
+def test_a_problem_needs_a_source_that_is_cited():
+    with pytest.raises(ValueError, match="names none of the sources"):
+        row(1.0, source="my own result")
+
+
+def test_problems_are_chosen_by_name_family_and_pattern():
+    assert len(chosen()) == len(PROBLEMS)
+    assert [p.name for p in chosen(["patch/linear"])] == ["patch/linear"]
+    assert {p.name.partition("/")[0] for p in chosen(["patch", "*lame*"])} == {
+        "patch",
+        "pressure",
+        "vibration",
+    }
+    with pytest.raises(
+        kl.InputError, match=r"no problem fits 'pach'; the families are element, .* Did you mean patch"
+    ):
+        chosen(["pach"])
+
+
+# ---- texts -------------------------------------------------------------------------------------------
+
+
+def test_the_page_shows_other_programs_beside_ours():
+    known = PROBLEMS["patch/linear"]
+    rows = [
+        Row(known, "KinematicLinear3D8N", 1e-15, {"Kratos": 1e-16, "CalculiX": 2.365e-7}),
+        Row(known, "KinematicLinear3D27N", 1e-15),
+        Row(PROBLEMS["time/order_newmark"], "", 1.9999),
+    ]
+    text = page.markdown(rows, {"Kratos": "10.4", "CalculiX": "2.20"})
+    assert "| linear | 8N | < 1e-11 | < 1e-11 | 2.365e-07 | 0 | exact | pass | Irons |" in text
+    assert "| linear | 27N | < 1e-11 |  |  | 0 | exact | pass | Irons |" in text
+    assert "| order_newmark | – | 2 | 2 | 0.05 | pass | Newmark, β = 1/4, γ = 1/2 |" in text
+    assert "Kratos 10.4, CalculiX 2.20" in text
+    assert "Kratos" not in page.markdown(rows[1:])
+    assert page.summary(rows) == "3 rows: 3 pass"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+OWN = """
+from kratos_lite import KinematicLinear, KinematicLinear3D8N
+from kratos_lite.shapes import Hexahedron8
+
+class {name}(KinematicLinear):
+    shape, rule = Hexahedron8, KinematicLinear3D8N.rule
+{more}
+"""
+
+
+def test_an_element_of_ones_own_gets_the_same_rows(folder, capsys):
+    Path("own.py").write_text(OWN.format(name="My8N", more=""))
+    assert main(["verify", "own.py", "element", "patch", "-o", "own.json"]) == 0
+    rows = {row["problem"]: row for row in json.loads(Path("own.json").read_text())["rows"]}
+    assert set(rows) == {p.name for p in chosen(["element", "patch"]) if ELEMENTS[3] in p.elements()}
+    assert {row["element"] for row in rows.values()} == {"My8N"}
+    bent = PROBLEMS["element/bending"].row("KinematicLinear3D8N").value
+    assert rows["element/bending"]["value"] == pytest.approx(bent, rel=1e-12)
+    assert "My8N" not in kl.ELEMENTS
+    assert " pass" in capsys.readouterr().out.splitlines()[-1]
+
+
+def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
+    more = "    def stiffness(self, C):\n        return super().stiffness(C) * 1.01"
+    Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
+    assert main(["verify", "own.py", "element/uniaxial", "--element", "Stiff8N", "-o", "own.md"]) == 1
+    assert "FAIL" in capsys.readouterr().out
+    assert "| uniaxial | Stiff8N |" in Path("own.md").read_text()
+
+
+def test_the_command_lists_and_refuses(folder, capsys):
+    assert main(["verify", "--list", "shells"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 5
+    assert "[MacNeal, table 4]" in out
+    Path("none.py").write_text("x = 1")
+    for words, text in (
+        (["nothing"], "no problem fits 'nothing'"),
+        (["patch", "--element", "3D9N"], "unknown element '3D9N'"),
+        (["patch", "-o", "page.txt"], "is written as .md or .json"),
+        (["none.py"], "none.py: defines no element"),
+        (["gone.py"], "gone.py: cannot be read"),
+    ):
+        assert main(["verify", *words]) == 2
+        assert text in capsys.readouterr().err
