@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 MAX_PROBLEMS = 20
@@ -90,6 +91,24 @@ RENAMED = {
     **{"pvd": "output", "csv": "output", "npz": "output", "generalised_alpha": "generalized_alpha"},
 }
 """Words that other programs, or earlier versions, have for what is known here by another word."""
+
+
+@contextmanager
+def naming(source: str) -> Iterator[None]:
+    """Let errors of the library name the file that they come from, where they do not yet.
+
+    >>> with naming("a/beam.msh"):
+    ...     raise MeshError("points must be finite")
+    Traceback (most recent call last):
+    kratos_lite.errors.MeshError: a/beam.msh: points must be finite
+    """
+    try:
+        yield
+    except KratosLiteError as error:
+        stem = source.rpartition("/")[2].partition(".")[0]
+        if not source or f"{stem}." in str(error):
+            raise
+        raise type(error)(f"{source}: {error}") from None
 
 
 def _plain(word: str) -> str:

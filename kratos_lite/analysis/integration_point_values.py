@@ -12,7 +12,6 @@ from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import at_gauss
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.typing import Array
 
 
@@ -41,7 +40,7 @@ class GaussPoints:
     @cached_property
     def N(self) -> Array:
         """Shape functions (g, k)."""
-        return tabulate(self.group.element.shape, self.group.rule)[0]
+        return self.element._N(self.group.rule)
 
     def strain(self) -> Array:
         """Return ε (m, g, 6), engineering shear."""

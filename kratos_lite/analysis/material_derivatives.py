@@ -25,7 +25,6 @@ from numpy.typing import ArrayLike
 from kratos_lite.ale import Motion
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.gauss_point_fields import in_order
-from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
@@ -211,11 +210,12 @@ def _at_gauss(e: EquationsOfMotion, number: int, still: Array, carried: Array) -
     """Return a + (c·grad) b (m, g, k) at the Gauss points of the elements of a group."""
     assert e.terms is not None
     group, points, motion = e.system.groups[number], e.system.points, e.terms.motion
-    N, out = tabulate(group.element.shape, group.rule)[0], []
+    out = []
     for chunk in group.chunks():
         element, nodes = group.at(points, chunk), group.nodes[chunk]
         c = motion.field(element.gauss_points()) * e.terms.moving[nodes[:, :1, None]]
         gradient = element._gauss[1] @ carried[nodes][:, None]
+        N = element._N(group.rule)
         out.append(N @ still[nodes] + (c[..., None, :] @ gradient)[..., 0, :])
     return np.concatenate(out)
 

@@ -235,13 +235,21 @@ class StaticAnalysis:
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
             inner = stress_load(model, self.groups, u)
-            balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, noise * count)
+            rounding = count * max(noise, self._initial_noise())
+            balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
             judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         return Result(model.mesh, self.groups, u, reactions, case.external, report, u0)
+
+    def _initial_noise(self) -> float:
+        """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
+        u0 = self.model.initial_displacement
+        if u0 is None or self.system is None:
+            return 0.0
+        return float(np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0))
 
     def _report(
         self,

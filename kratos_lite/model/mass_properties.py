@@ -289,9 +289,9 @@ def _check_volumes(volumes: Array, group: ElementGroup, chunk: slice) -> None:
 def _volume(value: ArrayLike) -> Array:
     """Return volumes; nan stands for one that is not known."""
     try:
-        unknown = np.isnan(value)
+        unknown = np.asarray(np.isnan(value))
     except (TypeError, ValueError):
-        unknown = np.False_
+        unknown = np.asarray(False)
     known = finite(np.where(unknown, 1.0, value) if unknown.any() else value, "the volume of a body")
     return np.where(unknown, np.nan, _check_positive(known, "volume", "m³"))
 

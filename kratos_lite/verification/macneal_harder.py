@@ -137,7 +137,7 @@ G = STRAIGHT.E / (2 * (1 + STRAIGHT.nu))
 PROBLEMS: list[Problem] = [
     *(
         problem(f"straight_{form}_{load}", f"displacement of the end, {form} cells, {load.replace('_', ' ')}",
-                "MacNeal, table 3", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)))
+                "MacNeal, straight beam", TIPS[load], _loaded(form, evenly(vector, DEPTH * WIDTH)))
         for form in FORMS
         for load, vector in UNIT_LOADS.items()
     ),
@@ -147,13 +147,13 @@ PROBLEMS: list[Problem] = [
                 _loaded(form, couple))
         for form in FORMS
     ),
-    problem("curved_in_plane", "displacement of the end, in plane", "MacNeal, table 3", 0.08734,
+    problem("curved_in_plane", "displacement of the end, in plane", "MacNeal, curved beam", 0.08734,
             curved_beam((1.0, 0.0, 0.0))),
-    problem("curved_out_of_plane", "displacement of the end, out of plane", "MacNeal, table 3", 0.5022,
+    problem("curved_out_of_plane", "displacement of the end, out of plane", "MacNeal, curved beam", 0.5022,
             curved_beam((0.0, 0.0, 1.0))),
-    problem("twisted_in_plane", "displacement of the end, in plane", "MacNeal, table 3", 0.005424,
+    problem("twisted_in_plane", "displacement of the end, in plane", "MacNeal, twisted beam", 0.005424,
             twisted_beam((0.0, 0.0, 1.0))),
-    problem("twisted_out_of_plane", "displacement of the end, out of plane", "MacNeal, table 3", 0.001754,
-            twisted_beam((0.0, 1.0, 0.0))),
+    problem("twisted_out_of_plane", "displacement of the end, out of plane", "MacNeal, twisted beam",
+            0.001754, twisted_beam((0.0, 1.0, 0.0))),
 ]  # fmt: skip
 """The rows of this family."""

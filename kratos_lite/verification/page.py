@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Any
 
-from kratos_lite.verification.problem import FAIL, GRADES, PASS, Problem, Row
+from kratos_lite.verification.problem import FAIL, GRADES, PASS, Row
 from kratos_lite.verification.sources import SOURCES
 
 TITLES = {
@@ -47,11 +47,12 @@ def found(row: Row, value: float) -> str:
     return number(value)
 
 
-def limit(problem: Problem) -> str:
+def limit(row: Row) -> str:
     """Return what a row has to meet."""
-    if problem.tolerance is None:
+    tolerance = row.problem.tolerance
+    if tolerance is None or not row.problem.exact(row.element):
         return "graded"
-    return "exact" if problem.tolerance <= SMALL else f"{problem.tolerance:.2g}"
+    return "exact" if tolerance <= SMALL else f"{tolerance:.2g}"
 
 
 def by_family(rows: Iterable[Row]) -> dict[str, list[Row]]:
@@ -149,7 +150,7 @@ def _table(rows: Sequence[Row], programs: Iterable[str]) -> str:
         others = [found(row, row.others[name]) if name in row.others else "" for name in named]
         problem = row.problem
         first = [problem.name.partition("/")[2], row.kind or "–", found(row, row.value)]
-        last = [number(problem.reference), limit(problem), row.grade, problem.source]
+        last = [number(problem.reference), limit(row), row.grade, problem.source]
         text += _cells([*first, *others, *last])
     quantities = dict.fromkeys((row.problem.name, row.problem.quantity) for row in rows)
     told = "".join(f"- {name.partition('/')[2]}: {quantity}\n" for name, quantity in quantities)

@@ -172,7 +172,7 @@ PROBLEMS: list[Problem] = [
     problem("linear", f"{U}: linear field held on 3 × 3 × 3 distorted bricks", "Irons",
             _ON_WARPED, off(linear)),
     problem("linear_stress", f"{SIGMA}: the same", "Irons", _ON_WARPED, stress_off(constant)),
-    problem("seven_bricks", f"{U}: linear field held on seven bricks", "MacNeal, figure 3",
+    problem("seven_bricks", f"{U}: linear field held on seven bricks", "MacNeal, patch test for solids",
             _linear(seven_bricks), off(linear), takes=BRICKS),
     problem("traction", f"{U}: constant stress by tractions on 2 × 2 × 2 distorted bricks", "Irons",
             _pulled, off(linear)),

@@ -95,7 +95,7 @@ def _thick() -> list[Problem]:
         StaticProblem(
             name=f"pressure/thick_cylinder_{nu:g}",
             quantity=f"u_r at the inner radius 3, segments of 10°, five bricks along the radius, ν = {nu:g}",
-            source="MacNeal, table 6; closed form of Lamé",
+            source="MacNeal, thick-walled cylinder; closed form of Lamé",
             reference=lame_cylinder(nu, 1000.0, 3.0, 9.0, 3.0),
             models=thick_cylinder(nu),
             measure=_inner(3.0),

@@ -75,7 +75,7 @@ def _plates() -> list[Problem]:
         StaticProblem(
             name=f"shells/plate_{name}",
             quantity=f"deflection of the middle of a thin plate, {name.replace('_', ' ')}, 8 × 8 × 1 bricks",
-            source="MacNeal, table 4",
+            source="MacNeal, rectangular plates",
             reference=value,
             models=plate(length, clamped),
             measure=middle,
@@ -89,7 +89,7 @@ PROBLEMS: list[Problem] = [
     StaticProblem(
         name="shells/scordelis_lo",
         quantity="deflection of the free edge of the roof of Scordelis and Lo, 8 × 8 × 1 bricks",
-        source="MacNeal, section on the roof",
+        source="MacNeal, Scordelis-Lo roof",
         reference=0.3024,
         models=roof,
         measure=edge,

@@ -100,7 +100,7 @@ PROBLEMS: list[Problem] = [
     Problem(
         name="vibration/lame_mode",
         quantity="frequency of the mode without change of volume of a free cube, 3 × 3 × 3 bricks / exact",
-        source="Lame, lesson 14: π √(2 μ/ρ)/L",
+        source="Lame: π √(2 μ/ρ)/L",
         reference=1,
         of=equivoluminal,
     ),

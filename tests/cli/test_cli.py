@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from children import FOREVER
 
 import kratos_lite as kl
 from kratos_lite.cli import commands, main, progress
@@ -53,7 +54,7 @@ def held(mesh):
 def process(*words, **options):
     """Run a command in a process of its own."""
     command = [sys.executable, "-m", "kratos_lite", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=FOREVER, check=False, **options)
 
 
 def displacement(path):
@@ -581,7 +582,9 @@ def test_a_full_disk_behind_the_output_is_an_error_in_one_line(box, command):
         pytest.skip("no /dev/full on this system")
     words = [sys.executable, "-m", "kratos_lite", command[0], "box.vtu", *command[1:]]
     with open("/dev/full", "w") as full:
-        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+        done = subprocess.run(
+            words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=FOREVER, check=False
+        )
     assert (done.returncode, done.stderr) == (2, "error: the output: No space left on device\n")
 
 
@@ -703,7 +706,7 @@ def test_a_reader_that_goes_away_is_no_error(folder):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         running.stdout.close()
         told = running.stderr.read()
-        running.wait(timeout=120)
+        running.wait(timeout=FOREVER)
     assert (running.returncode, told) == (0, b"")
 
 

@@ -3,13 +3,12 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
+from children import interrupted
 
 import kratos_lite as kl
 
@@ -154,11 +153,7 @@ def test_ctrl_c_keeps_what_is_there(folder):
     write(body="finite-element", time={"step": 0.001, "steps": 1_000_000})
     words = [sys.executable, "-m", "kratos_lite", "solve", "box.json", "-o", "o.pvd", "--state", "end.npz"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not (folder / "o_00003.vtu").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = interrupted(process, folder / "o_00003.vtu")
     assert (process.returncode, out) == (130, "")
     assert "interrupted" in err
     index = re.findall(r'file="(\S+)"', (folder / "o.pvd").read_text())

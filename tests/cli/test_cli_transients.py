@@ -3,13 +3,12 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
+from children import interrupted
 
 import kratos_lite as kl
 from kratos_lite.io.files import read_case
@@ -241,11 +240,7 @@ def test_ctrl_c_keeps_the_series_and_the_state(folder):
     code = "import sys; from kratos_lite.cli import main; sys.exit(main(sys.argv[1:]))"
     words = [sys.executable, "-c", code, "solve", "run.json", "--time", "1e-5:10000000", "-o", "out/t.pvd"]
     process = subprocess.Popen([*words, "--state", "s.npz"], stderr=subprocess.PIPE, text=True)
-    clock = time.monotonic()
-    while not (folder / "out" / "t_00003.vtu").exists() and time.monotonic() - clock < 60:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = interrupted(process, folder / "out" / "t_00003.vtu")
     assert process.returncode == 130
     assert "interrupted" in err
     frames = len(re.findall("<DataSet", (folder / "out" / "t.pvd").read_text()))

@@ -152,7 +152,7 @@ def _shorten() -> None:
 
     case.MOST_STEPS = context.MAX_STEPS = 200
     stepping.MOST_SUBSTEPS = 100
-    validation.free_memory = lambda: 5e7
+    validation.free_memory = lambda: 2e8
 
 
 if __name__ == "__main__":

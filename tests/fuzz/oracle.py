@@ -19,20 +19,7 @@ from tests.fuzz.seeds import Seed
 SECONDS = 20.0
 """Computing time of one command."""
 NO_NUMBER = re.compile(r"(?<![\w.\"'/-])[-+]?(nan|inf|infinity)(?![\w.])", re.IGNORECASE)
-PLACES = (
-    "node",
-    "element",
-    "part",
-    "constraint",
-    "load",
-    "Properties",
-    "propert",
-    "support",
-    "step",
-    "motion",
-    "mode",
-    "out/",
-)
+PLACES = tuple("node element part constraint load propert Propert support step motion mode out/ --".split())
 ENDINGS = (".mdpa", ".elem", ".vtu", ".vtk", ".msh", ".inp")
 
 
@@ -40,8 +27,35 @@ class TooLong(BaseException):
     """A command takes more computing time than it may."""
 
 
+VALUES = (
+    "0 1 -1 2.5 1e-3 1e308 nan x z:1 y:1e200:5 x:0 1e-3:5 1e-3:5:2 1:0 1e-9:99999999999 z+:1,2,3 "
+    "Top:1 z-:xyz x-:x=1e308 E=1e9,nu=0.3 E=1e9,nu=0.5 Top:E=1,nu=0 0,0,-9.81 1e308,1e308,1e308 1,2 hht:-0.1 "
+    "newmark:0.1,0.1 auto amg fixed , : ="
+).split(" ")
+FLAGS = ("--stiffening", "--lumped", "--ignore-initial-displacement", "--lenient", "-v")
+OPTIONS = (
+    "--material --fix --gravity --traction --pressure --point-load --rotation --translation --center "
+    "--damping --boundaries --time "
+    "--restart --integrator --rayleigh --steps --modes --solver --tolerance --json --state"
+).split()
+
+
+def with_options(words: list[str], rng: Random) -> list[str]:
+    """Return a command with some options, of which most make no sense."""
+    for _ in range(rng.choice((0, 0, 0, 1, 2))):
+        option = rng.choice((*FLAGS, *OPTIONS))
+        value = f"out/{rng.choice('abc')}.json" if option == "--json" else rng.choice(VALUES)
+        words = [*words, option] if option in FLAGS else [*words, f"{option}={value}"]
+    return words
+
+
 def command_of(seed: Seed, rng: Random) -> list[str]:
     """Return a command for an input."""
+    words = _command_of(seed, rng)
+    return with_options(words, rng) if words[0] == "solve" else words
+
+
+def _command_of(seed: Seed, rng: Random) -> list[str]:
     kinds = ["check", "info", "solve", "solve", "solve"] + (["convert"] * 2 if seed.convertible else [])
     kind = rng.choice(kinds)
     if kind in ("check", "info"):
@@ -74,13 +88,15 @@ def findings(words: list[str], files: list[str]) -> list[str]:
         with redirect_stdout(told), redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("error")
             code = main(words)
+    except SystemExit as end:  # of the parser of options, which says how they are used
+        code = end.code
     except TooLong:
         why = f"takes more than {SECONDS:g} s"
     except BaseException as error:
         why = f"{type(error).__name__}: {error}"
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
-    found = [why] if why else [*_of_words(code, told.getvalue(), said.getvalue(), files)]
+    found = [why] if why else [*_of_words(code, told.getvalue(), said.getvalue(), files, words)]
     return found + _of_files(out, code)
 
 
@@ -88,7 +104,7 @@ def _stop(*_: object) -> None:
     raise TooLong
 
 
-def _of_words(code: int | None, told: str, said: str, files: list[str]) -> list[str]:
+def _of_words(code: int | None, told: str, said: str, files: list[str], words: list[str]) -> list[str]:
     """Return what is wrong with the exit code and the words of a command."""
     found = []
     if code not in (0, 2) and not (code == 3 and " failed " in told):
@@ -97,7 +113,11 @@ def _of_words(code: int | None, told: str, said: str, files: list[str]) -> list[
         found.append(f"says {said[-300:]}")
     if code == 2 and said.count("error: ") != 1:
         found.append(f"exit code 2 with {said!r}")
-    if code == 2 and not any(word in said for word in (*files, *PLACES)):
+    if said.startswith("usage: "):
+        return found
+    values = tuple(f"{word.partition('=')[2]}:" for word in words)
+    is_of_option = said.removeprefix("error: ").startswith(values)
+    if code == 2 and not is_of_option and not any(word in said for word in (*files, *PLACES)):
         found.append(f"an error without a place: {said}")
     if "not enough memory" in said:
         found.append(said)

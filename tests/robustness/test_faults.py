@@ -11,13 +11,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from children import FOREVER
 
 import kratos_lite as kl
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and limits are those of Unix")
 DRIVER = Path(__file__).parent.parent / "fixtures" / "faults.py"
-FOREVER = 300
-"""Seconds after which a run counts as one that does not end."""
 HELD = ("--fix", "z-:xyz", "--gravity", "0,0,-9.81")
 STATIC = ("solve", "cube.mdpa", *HELD)
 MOTION = (*STATIC, "--time", "1e-5:1000000")

@@ -183,3 +183,13 @@ def test_elements_with_different_rules_give_a_list_of_stresses():
     np.testing.assert_allclose(
         result.u, clamped(kl.box((2, 1, 1), (2, 1, 1))).solve().u, rtol=1e-10, atol=1e-20
     )
+
+
+@pytest.mark.parametrize("distance", [1e-3, 1.0, 1e3])
+def test_a_rigid_displacement_without_stress_leaves_a_held_body_without_stress(distance):
+    model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=1e9, nu=0.3))
+    model.fix("z-")
+    model.stress_free_at(np.full((27, 3), distance))
+    result = model.solve()
+    assert np.abs(result.u).max() < 1e-14 * distance
+    assert np.abs(result.stress()).max() < 1e-5 * distance  # rounding of 1e9 Pa times the distance

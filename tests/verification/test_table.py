@@ -41,7 +41,7 @@ def test_rows_pass_and_stand_on_the_page(family):
     for row in rows:
         cells = shown[row.problem.name.partition("/")[2], row.kind or "–"]
         assert cells["reference"] == page.number(row.problem.reference), row.problem.name
-        assert cells["limit"] == page.limit(row.problem)
+        assert cells["limit"] == page.limit(row)
         assert cells["source"] == row.problem.source
         assert f"**{row.problem.cited}**" in PAGE
         assert cells["grade"] == row.grade, page.line(row)
@@ -211,7 +211,7 @@ def test_the_command_lists_and_refuses(folder, capsys):
     assert main(["verify", "--list", "shells"]) == 0
     out = capsys.readouterr().out
     assert out.count("\n") == 5
-    assert "[MacNeal, table 4]" in out
+    assert "[MacNeal, rectangular plates]" in out
     Path("none.py").write_text("x = 1")
     for words, text in (
         (["nothing"], "no problem fits 'nothing'"),

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite import native
 from kratos_lite.errors import SolveError
 from kratos_lite.typing import Array
+
+Arrays: TypeAlias = tuple[Array, ...]
+"""q, u and what a step takes besides."""
+Plain: TypeAlias = Callable[..., int]
+"""Takes a step in NumPy; returns the first body that failed, or -1."""
+PlainStep: TypeAlias = Callable[..., tuple[Array, int]]
+"""The same under constant loads; returns the load at mid-step too."""
 
 
 def compiled(name: str, *arguments: Any) -> Any:
@@ -22,13 +31,75 @@ def compiled(name: str, *arguments: Any) -> Any:
         return NotImplemented
 
 
-def failure(name: str, q: Array, body: int, h: float, why: str, step: int | None = None) -> SolveError:
-    """Return the error of a body, counted through all leading axes, whose step failed."""
-    place = tuple(int(i) for i in np.unravel_index(body, q.shape[:-1]))
-    whose = f" of body {place[0] if len(place) == 1 else place}" if place else ""
-    when = "" if step is None else f" number {step + 1}"
-    return SolveError(f"{name}: step{when}{whose}, h = {h:g} s, failed: {why}; use a shorter step")
+@dataclass(frozen=True)
+class StepKernel:
+    """Compiled steps of a kind of body beside those in NumPy.
+
+    Attributes
+    ----------
+    word : with which its functions start.
+    methods : names by their numbers in the kernel.
+    newton : the one that iterates.
+    """
+
+    word: str
+    methods: tuple[str, ...]
+    newton: str
+
+    def finish(self, plain: Plain, arrays: Arrays, h: float, method: str, tolerance: float) -> None:
+        """Take a step of bodies, the first of the arrays, by the kernel or else in NumPy.
+
+        Raises
+        ------
+        SolveError
+            Newton's method found no velocity, or a velocity grew without bound.
+        """
+        number = self.methods.index(method)
+        failed = compiled(f"{self.word}_finish", *arrays, h, number, tolerance)
+        if failed is NotImplemented:
+            failed = plain(*arrays, h, method, tolerance)
+        if failed >= 0:
+            raise self._failure(method, arrays[0], failed, h)
+
+    def steps(
+        self,
+        plain: PlainStep,
+        arrays: Arrays,
+        h: float,
+        count: int,
+        method: str,
+        tolerance: float,
+        work: Array | None,
+    ) -> None:
+        """Take steps of bodies under constant loads; errors are those of `finish`."""
+        number = self.methods.index(method)
+        failed = compiled(f"{self.word}_steps", *arrays, h, count, number, tolerance, work)
+        if failed is NotImplemented:
+            failed = _in_numpy(plain, arrays, h, count, method, tolerance, work)
+        if failed[0] >= 0:
+            raise self._failure(method, arrays[0], failed[0], h, failed[1])
+
+    def _failure(self, method: str, q: Array, body: int, h: float, step: int | None = None) -> SolveError:
+        """Return the error of a body, counted through all leading axes, whose step failed."""
+        place = tuple(int(i) for i in np.unravel_index(body, q.shape[:-1]))
+        whose = f" of body {place[0] if len(place) == 1 else place}" if place else ""
+        when = "" if step is None else f" number {step + 1}"
+        why = "its velocity grew beyond all numbers"
+        if method == self.newton:
+            why = "Newton's method found no velocity at its end"
+        return SolveError(f"{method}: step{when}{whose}, h = {h:g} s, failed: {why}; use a shorter step")
 
 
-NO_NEWTON = "Newton's method found no velocity at its end"
-TOO_FAST = "its velocity grew beyond all numbers"
+def _in_numpy(
+    plain: PlainStep, arrays: Arrays, h: float, count: int, method: str, tolerance: float, work: Array | None
+) -> tuple[int, int]:
+    """Take steps in NumPy; return the first body that failed, or -1, and in which step."""
+    u = arrays[1]
+    for step in range(count):
+        before = u.copy()
+        load, failed = plain(*arrays, h, method, tolerance)
+        if failed >= 0:
+            return failed, step
+        if work is not None:
+            work += h / 2 * ((before + u) * load).sum(axis=-1)
+    return -1, 0

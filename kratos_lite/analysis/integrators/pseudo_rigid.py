@@ -13,21 +13,22 @@ Sources: Zhang & Skeel, Appl. Numer. Math. 25 (1997) 297-302 (linearly implicit)
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
 from kratos_lite.analysis.integrators.finite_element import warn_of_stiffness
-from kratos_lite.analysis.integrators.kernels import NO_NEWTON, TOO_FAST, compiled, failure
+from kratos_lite.analysis.integrators.kernels import StepKernel
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
 from kratos_lite.bodies.strain import by_rows, green_strain, strain_operator
-from kratos_lite.errors import SolveError
 from kratos_lite.typing import Array, Mask
 from kratos_lite.voigt import tensor
 
 METHODS = ("explicit", "linearly_implicit", "energy_momentum")
-"""Names by their numbers in the kernel."""
+KERNEL = StepKernel("pseudo", METHODS, newton="energy_momentum")
 TOLERANCE = 1e-12
 """Last change of the rate of F beside that rate in the energy-momentum method."""
 NEWTON_MAX = 50
@@ -119,11 +120,7 @@ def finish_step(
         Newton's method found no velocity, or a velocity grew without bound.  q and u are then of no use.
     """
     constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
-    failed = compiled("pseudo_finish", q, u, load, *constant, h, METHODS.index(method), tolerance)
-    if failed is NotImplemented:
-        failed = _finish(q, u, load, *constant, h, method, tolerance)
-    if failed >= 0:
-        raise _failure(method, q, failed, h)
+    KERNEL.finish(_finish, (q, u, load, *constant), h, method, tolerance)
 
 
 def steps(
@@ -155,28 +152,27 @@ def steps(
     SolveError
         As `finish_step`.
     """
-    number = METHODS.index(method)
     constant = (euler, np.asarray(mass), np.asarray(volume), C, np.asarray(damping))
-    failed = compiled(
-        "pseudo_steps", q, u, *constant, acceleration, spatial, h, count, number, tolerance, work
-    )
-    if failed is not NotImplemented:
-        if failed[0] >= 0:
-            raise _failure(method, q, failed[0], h, failed[1])
-        return
+    arrays = (q, u, *constant, acceleration, spatial)
+    KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
+
+
+def _step(
+    q: Array,
+    u: Array,
+    euler: Array,
+    mass: Array,
+    volume: Array,
+    C: Array,
+    damping: Array,
+    acceleration: Array,
+    spatial: Array,
+    *numbers: Any,
+) -> tuple[Array, int]:
+    """Take a step under constant loads; return the load, and the first body that failed or -1."""
     load = np.broadcast_to(spatial, u.shape).copy()
-    load[..., 9:] += np.asarray(mass)[..., None] * acceleration
-    for step in range(count):
-        before = u.copy()
-        body = _finish(q, u, load, *constant, h, method, tolerance)
-        if body >= 0:
-            raise _failure(method, q, body, h, step)
-        if work is not None:
-            work += h / 2 * ((before + u) * load).sum(axis=-1)
-
-
-def _failure(method: str, q: Array, body: int, h: float, step: int | None = None) -> SolveError:
-    return failure(method, q, body, h, NO_NEWTON if method == "energy_momentum" else TOO_FAST, step)
+    load[..., 9:] += mass[..., None] * acceleration
+    return load, _finish(q, u, load, euler, mass, volume, C, damping, *numbers)
 
 
 def _finish(

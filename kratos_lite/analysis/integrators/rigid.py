@@ -13,19 +13,20 @@ Source: Koziara & Bicanic, Int. J. Numer. Meth. Eng. 81 (2010) 1073-1092.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from kratos_lite.analysis.integrators.base import BodyIntegrator
-from kratos_lite.analysis.integrators.kernels import NO_NEWTON, TOO_FAST, compiled, failure
+from kratos_lite.analysis.integrators.kernels import StepKernel, compiled
 from kratos_lite.bodies.constraint_projection import Step, constrained_step
 from kratos_lite.bodies.linear_algebra import apply, first, length, solve, transposed
 from kratos_lite.bodies.rigid import Obstacle, RigidBody
 from kratos_lite.bodies.rotations import exp, hat, right_jacobian, rotation_of, set_rotation
-from kratos_lite.errors import SolveError
 from kratos_lite.typing import Array, Mask
 
 METHODS = ("explicit", "momentum_conserving", "implicit")
-"""Names by their numbers in the kernel."""
+KERNEL = StepKernel("rigid", METHODS, newton="implicit")
 TOLERANCE = 1e-14
 """Residual of the implicit method beside the momentum."""
 NEWTON_MAX = 50
@@ -132,11 +133,7 @@ def finish_step(
         Newton's method found no velocity, or a velocity grew without bound.  q and u are then of no use.
     """
     constant = (inertia, inverse, np.asarray(mass))
-    failed = compiled("rigid_finish", q, u, qh, load, *constant, h, METHODS.index(method), tolerance)
-    if failed is NotImplemented:
-        failed = _finish(q, u, qh, load, *constant, h, method, tolerance)
-    if failed >= 0:
-        raise _failure(method, q, failed, h)
+    KERNEL.finish(_finish, (q, u, qh, load, *constant), h, method, tolerance)
 
 
 def steps(
@@ -168,27 +165,28 @@ def steps(
     SolveError
         As `finish_step`.
     """
-    constant = (inertia, inverse, np.asarray(mass), acceleration, spatial, convected)
-    failed = compiled("rigid_steps", q, u, *constant, h, count, METHODS.index(method), tolerance, work)
-    if failed is not NotImplemented:
-        if failed[0] >= 0:
-            raise _failure(method, q, failed[0], h, failed[1])
-        return
-    gravity = np.asarray(mass)[..., None] * acceleration
-    for step in range(count):
-        qh, before = half_step(q, u, h), u.copy()
-        R, load = rotation_of(qh), np.empty(u.shape)
-        load[..., :3] = transposed(R, spatial[..., :3]) + convected[..., :3]
-        load[..., 3:] = gravity + spatial[..., 3:] + apply(R, convected[..., 3:])
-        body = _finish(q, u, qh, load, *constant[:3], h, method, tolerance)
-        if body >= 0:
-            raise _failure(method, q, body, h, step)
-        if work is not None:
-            work += h / 2 * ((before + u) * load).sum(axis=-1)
+    arrays = (q, u, inertia, inverse, np.asarray(mass), acceleration, spatial, convected)
+    KERNEL.steps(_step, arrays, h, count, method, tolerance, work)
 
 
-def _failure(method: str, q: Array, body: int, h: float, step: int | None = None) -> SolveError:
-    return failure(method, q, body, h, NO_NEWTON if method == "implicit" else TOO_FAST, step)
+def _step(
+    q: Array,
+    u: Array,
+    inertia: Array,
+    inverse: Array,
+    mass: Array,
+    acceleration: Array,
+    spatial: Array,
+    convected: Array,
+    h: float,
+    *numbers: Any,
+) -> tuple[Array, int]:
+    """Take a step under constant loads; return the load, and the first body that failed or -1."""
+    qh, load = half_step(q, u, h), np.empty(u.shape)
+    R = rotation_of(qh)
+    load[..., :3] = transposed(R, spatial[..., :3]) + convected[..., :3]
+    load[..., 3:] = mass[..., None] * acceleration + spatial[..., 3:] + apply(R, convected[..., 3:])
+    return load, _finish(q, u, qh, load, inertia, inverse, mass, h, *numbers)
 
 
 def _finish(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, naming
 from kratos_lite.io.formats.document import Document
 
 ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
@@ -30,7 +30,12 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
     `strict` refuses `.mdpa` rows that do not stand on lines of their own.
     """
-    path = Path(path)
+    with naming(str(path)):
+        return _read(Path(path), strict)
+
+
+def _read(path: Path, strict: bool) -> Document:
+    """Return what a model file says, by its ending."""
     kind = ending(path)
     if path.exists() and not path.is_file() and not path.is_dir():
         raise InputError(f"{path}: is a pipe or a device; name an ordinary file")
@@ -55,6 +60,12 @@ def read_document(path: str | Path, *, strict: bool = True) -> Document:
 
 def write_document(path: str | Path, document: Document) -> list[str]:
     """Write a document by the ending of `path`; return notes on what the format cannot hold."""
+    with naming(str(path)):
+        return _write(path, document)
+
+
+def _write(path: str | Path, document: Document) -> list[str]:
+    """Write a document by the ending of `path`."""
     kind = ending(path)
     if kind == ".mdpa":
         from kratos_lite.io.formats.mdpa.writer import write_mdpa

@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import Problems, nearest
+from kratos_lite.errors import Problems, naming, nearest
 from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
@@ -55,10 +55,12 @@ def model_from(
     u0 = values.nodal.vector("DISPLACEMENT")
     if processes:
         processes(values)
-    values.apply(model)
+    with naming(document.mesh.source):
+        values.apply(model)
     if initial_displacement:
         _activate(model, u0)
-    _constrain(model, document)
+    with naming(document.mesh.source):
+        _constrain(model, document)
     return model
 
 

@@ -92,7 +92,7 @@ def _changes(model: Model) -> bool:
 
 
 def _gravity(settings: Settings) -> Load:
-    return load_of(settings, "gravity", lambda owner, key: Gravity(owner.vector(key)))
+    return load_of(settings, "gravity", lambda owner, key: owner.placed(key, Gravity, owner.vector(key)))
 
 
 def _add_gravity(model: Model, gravity: Load) -> None:
@@ -179,7 +179,8 @@ def _fix(model: Model, section: Settings, part: str) -> None:
 
 def _load(model: Model, section: Settings, part: str, load: Callable[[str, Any], Load]) -> None:
     def of_value(owner: Settings, key: str) -> Load:
-        return load(part, owner.number(key) if load is Pressure else owner.vector(key))
+        value = owner.number(key) if load is Pressure else owner.vector(key)
+        return owner.placed(key, load, part, value)
 
     made = load_of(section, part, of_value)
     section.placed(part, model.mesh.part, part)

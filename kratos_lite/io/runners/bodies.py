@@ -12,7 +12,6 @@ from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
 from kratos_lite.bodies.deformable import Deformable
-from kratos_lite.bodies.finite_element import FiniteElementBody
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
@@ -108,7 +107,7 @@ class _Totals:
 
 def rows_of(body: Body) -> list[tuple[str, str]]:
     """Return what a body is, as rows of a table."""
-    formulation = f" {body.formulation.name}" if isinstance(body, FiniteElementBody) else ""
+    formulation = f" {word}" if (word := body.settings().get("formulation")) else ""
     many = f"{len(body.q)} × " if body.q.ndim > 1 else ""
     rows = [("body", f"{many}{body.kind}{formulation}, {body.dofs} velocities, {body.integrator}")]
     if body.mesh is not None:
@@ -116,7 +115,7 @@ def rows_of(body: Body) -> list[tuple[str, str]]:
         rows.append(("mesh", f"{body.mesh.n_nodes} nodes, {elements}"))
     if body.q.ndim == 1:
         rows.append(("mass", f"{float(body.mass):.7g} kg"))
-    if isinstance(body, Deformable) and body.damping:
+    if body.damping:
         rows.append(("damping", f"{body.damping:g} s"))
     return rows + [("warning", text) for text in body.warnings()]
 

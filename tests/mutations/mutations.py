@@ -1,0 +1,511 @@
+"""The mutations: a file, a text that occurs in it once, what it becomes, and the tests that must notice."""
+
+from typing import NamedTuple
+
+
+class Mutation(NamedTuple):
+    """A change of one formula, and the tests that fail with it, as arguments of pytest."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+ELEMENTS = "tests/testing/test_registered.py"
+STIFFNESS = "tests/assembly/test_stiffness.py"
+GAUSS = "tests/assembly/test_gauss_point_fields.py"
+STRAIN = "tests/assembly/test_finite_strain.py"
+TRANSIENT = "tests/analysis/test_transient.py"
+SIGNS = "tests/analysis/test_signs_and_orders.py"
+STEPS = "tests/analysis/test_rigid_and_pseudo_rigid_steps.py"
+LOADS = "tests/verification/test_loads.py"
+SUPPORTS = "tests/verification/test_supports.py"
+SYSTEMS = "tests/verification/test_systems.py"
+BODY_LOADS = "tests/bodies/test_loads.py"
+MECHANICS = "tests/bodies/test_simple_mechanics.py"
+MATRICES = "tests/ale/test_matrices.py"
+MULTIGRID = "tests/solvers/test_multigrid.py"
+
+MUTATIONS = [
+    # ---- shapes, rules, B, C
+    Mutation("shapes/tensor.py", "f = 1 + x * p", "f = 1 - x * p", ELEMENTS),
+    Mutation(
+        "shapes/tensor.py",
+        "(f.sum(axis=-1) - (2 * d - 1)) / c",
+        "(f.sum(axis=-1) - (2 * d + 1)) / c",
+        ELEMENTS,
+    ),
+    Mutation(
+        "elements/geometry.py",
+        "return det * self.rule.weights, D",
+        "return abs(det) + 0 * self.rule.weights, D",
+        STIFFNESS,
+    ),
+    Mutation(
+        "elements/geometry.py",
+        "inverse /= det[..., None, None]",
+        "inverse *= det[..., None, None]",
+        STIFFNESS,
+    ),
+    Mutation("elements/total_lagrangian.py", "middle = F + dF / 2", "middle = F + dF", STRAIN),
+    Mutation(
+        "elements/total_lagrangian.py",
+        "(0.5 + damping) * strain_change(F, dF)",
+        "(0.5 - damping) * strain_change(F, dF)",
+        STRAIN,
+    ),
+    Mutation(
+        "elements/total_lagrangian.py",
+        "K[..., i, :, i, :] += initial",
+        "K[..., i, :, i, :] -= initial",
+        STRAIN,
+    ),
+    Mutation(
+        "elements/total_lagrangian.py",
+        "(E * (E @ C.T / 2 + prestress))",
+        "(E * (E @ C.T + prestress))",
+        STRAIN,
+    ),
+    Mutation(
+        "materials/isotropic3d.py",
+        "2 * mu * self.nu / (1 - 2 * self.nu), mu",
+        "2 * mu * self.nu / (1 - self.nu), mu",
+        ELEMENTS,
+    ),
+    Mutation(
+        "materials/orthotropic3d.py",
+        "S[0, 1] = S[1, 0] = -self.nu_xy / self.E_x",
+        "S[0, 1] = S[1, 0] = -self.nu_xy / self.E_y",
+        "tests/testing tests/materials kratos_lite/materials",
+    ),
+    Mutation(
+        "materials/orthotropic3d.py",
+        "S[1, 2] = S[2, 1] = -self.nu_yz / self.E_y",
+        "S[1, 2] = S[2, 1] = -self.nu_xz / self.E_y",
+        "tests/testing kratos_lite/materials",
+    ),
+    # ---- surfaces and loads
+    Mutation("elements/surface.py", "return -N.T @ (area_vectors", "return N.T @ (area_vectors", LOADS),
+    Mutation(
+        "elements/surface.py",
+        "return np.cross(tangents[..., 0, :], tangents[..., 1, :])",
+        "return np.cross(tangents[..., 1, :], tangents[..., 0, :])",
+        LOADS,
+    ),
+    Mutation(
+        "elements/surface.py",
+        "return -p[..., None, None, None, None]",
+        "return p[..., None, None, None, None]",
+        "tests/elements/test_surface.py",
+    ),
+    Mutation(
+        "model/loads/surface.py",
+        "at = at * outward(mesh, block)[:, None]",
+        "at = at + 0 * outward(mesh, block)[:, None]",
+        LOADS,
+    ),
+    Mutation(
+        "model/loads/body.py",
+        "return group.material.density * self.force",
+        "return -group.material.density * self.force",
+        LOADS,
+    ),
+    Mutation("model/loads/nodal.py", "total[rows] += self.force", "total[rows] -= self.force", LOADS),
+    # ---- mass properties, time series
+    Mutation(
+        "time_series.py",
+        "return float(before + after) / 2",
+        "return float(after)",
+        SIGNS,
+    ),
+    Mutation(
+        "time_series.py",
+        "(-3 * f(time) + 4 * f(time + h) - f(time + 2 * h))",
+        "(-3 * f(time) + 4 * f(time + h) + f(time + 2 * h))",
+        "tests/analysis tests/ale/test_transients.py",
+    ),
+    Mutation(
+        "time_series.py",
+        "half * (1 + x)",
+        "half * (1 - x / 2)",
+        "tests/bodies/test_simple_mechanics.py tests/bodies/test_starts.py",
+    ),
+    # ---- assembly, solvers, report
+    Mutation(
+        "assembly/gauss_point_fields.py",
+        "return _elastic(element, group, displacements) + group.initial_stress(chunk)",
+        "return _elastic(element, group, displacements) - group.initial_stress(chunk)",
+        GAUSS,
+    ),
+    Mutation("assembly/gauss_point_fields.py", "* element.dV).sum()) / 2", "* element.dV).sum())", GAUSS),
+    Mutation(
+        "assembly/nodal_values.py",
+        "total / np.maximum(count, 1)[:, None]",
+        "total / np.maximum(count - 1, 1)[:, None]",
+        GAUSS,
+    ),
+    Mutation(
+        "assembly/nodal_values.py",
+        "(np.eye(len(rule)) - mean) + mean[:1]",
+        "(np.eye(len(rule)) - mean)",
+        SIGNS,
+    ),
+    Mutation(
+        "model/checks.py",
+        "moment = float(np.abs(M - M.T).max()",
+        "moment = 0 * float(np.abs(M - M.T).max()",
+        SIGNS,
+    ),
+    Mutation(
+        "model/checks.py",
+        "force = float(np.abs(total.sum(axis=0)).max() / size)",
+        "force = 0 * float(np.abs(total.sum(axis=0)).max() / size)",
+        "tests/robustness",
+    ),
+    # ---- transients
+    Mutation(
+        "analysis/integrators/generalized_alpha.py",
+        "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, 0.0, -self.alpha)",
+        "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 + self.alpha, 0.0, -self.alpha)",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/integrators/generalized_alpha.py",
+        "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, self.alpha, 0.0)",
+        "return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, -self.alpha, 0.0)",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/integrators/generalized_alpha.py",
+        "return NewmarkNumbers((1 - m + f) ** 2 / 4, 0.5 - m + f, m, f)",
+        "return NewmarkNumbers((1 - m + f) ** 2 / 4, 0.5 - m + f, f, m)",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/integrators/generalized_alpha.py",
+        "v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / (2 * s.beta)) * a",
+        "v_new = (1 - s.gamma / s.beta) * v + h * (1 - s.gamma / s.beta) * a",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/integrators/generalized_alpha.py",
+        "force -= e.times_damping(f * v_new + s.alpha_f * v, middle)",
+        "force -= e.times_damping(v_new, middle)",
+        SIGNS,
+    ),
+    Mutation(
+        "analysis/integrators/central_difference.py",
+        "e.times_damping(half, start)",
+        "e.times_damping(v, start)",
+        SIGNS,
+    ),
+    Mutation(
+        "analysis/integrators/central_difference.py", "v = half + h / 2 * a", "v = half + h * a", TRANSIENT
+    ),
+    Mutation(
+        "analysis/integrators/central_difference.py",
+        "np.sqrt(1 + xi * xi) - xi",
+        "np.sqrt(1 + xi * xi) + xi",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/equations_of_motion.py",
+        "total += acceleration * self.terms.euler",
+        "total -= acceleration * self.terms.euler",
+        SIGNS,
+    ),
+    Mutation(
+        "analysis/equations_of_motion.py",
+        "total += rate**2 * self.terms.centrifugal",
+        "total -= rate**2 * self.terms.centrifugal",
+        "tests/ale/test_steady.py",
+    ),
+    Mutation(
+        "analysis/equations_of_motion.py",
+        "gyroscopic = 2 * rate * self.terms.gyroscopic",
+        "gyroscopic = rate * self.terms.gyroscopic",
+        "tests/ale/test_frequencies.py tests/ale/test_steady.py",
+    ),
+    Mutation(
+        "analysis/equations_of_motion.py",
+        "out = -(rate**2) * terms.H",
+        "out = rate**2 * terms.H",
+        "tests/ale/test_steady.py",
+    ),
+    Mutation(
+        "analysis/equations_of_motion.py",
+        "out = self.rayleigh[1] * (self.K @ v)",
+        "out = self.rayleigh[0] * (self.K @ v)",
+        TRANSIENT,
+    ),
+    Mutation(
+        "analysis/transient.py",
+        "return float(v @ e.times_mass(v) + u @ e.times_stiffness(u, time)) / 2",
+        "return float(v @ e.times_mass(v) - u @ e.times_stiffness(u, time)) / 2",
+        TRANSIENT,
+    ),
+    # ---- material that moves through the mesh
+    Mutation(
+        "ale/matrices.py",
+        "return self._inertia(-self.motion.A @ self.motion.A)",
+        "return self._inertia(self.motion.A @ self.motion.A)",
+        MATRICES,
+    ),
+    Mutation(
+        "ale/matrices.py",
+        "return self._inertia(-self.motion.A)",
+        "return self._inertia(self.motion.A)",
+        MATRICES,
+    ),
+    Mutation(
+        "ale/matrices.py",
+        "return (self.G - self._transposed(self.G)) / 2",
+        "return (self.G + self._transposed(self.G)) / 2",
+        MATRICES,
+    ),
+    # ---- bodies
+    Mutation(
+        "analysis/integrators/rigid.py",
+        "W1 = W + h * apply(inverse, T - np.cross(Wh, apply(J, Wh)))",
+        "W1 = W + h * apply(inverse, T + np.cross(Wh, apply(J, Wh)))",
+        STEPS,
+    ),
+    Mutation(
+        "analysis/integrators/rigid.py",
+        "p = transposed(exp(h / 2 * W), apply(J, W))",
+        "p = transposed(exp(h * W), apply(J, W))",
+        STEPS,
+    ),
+    Mutation(
+        "analysis/integrators/pseudo_rigid.py",
+        "A = A + (eta * (h / 2) + h * h / 4) * K",
+        "A = A + (eta * (h / 2) + h * h / 2) * K",
+        STEPS,
+    ),
+    Mutation(
+        "analysis/integrators/pseudo_rigid.py",
+        "share = apply(C, E), 0.5 + eta / h",
+        "share = apply(C, E), 0.5 - eta / h",
+        STEPS,
+    ),
+    Mutation(
+        "analysis/integrators/finite_element.py",
+        "qh = body.q + h / 2 * body.u",
+        "qh = body.q + h * body.u",
+        "tests/bodies/test_finite_element_motion.py",
+    ),
+    Mutation(
+        "analysis/integrators/finite_element.py",
+        "return body.solver(qh, body.damping * h / 2 + h * h / 4)",
+        "return body.solver(qh, body.damping * h / 2 + h * h)",
+        "tests/bodies/test_finite_element_motion.py",
+    ),
+    Mutation(
+        "bodies/pseudo_rigid.py",
+        "return 2 * axial(H)",
+        "return axial(H)",
+        "tests/bodies/test_pseudo_rigid_motion.py",
+    ),
+    Mutation(
+        "bodies/pseudo_rigid.py",
+        "self.mass_properties.volume * (E * apply(self.C, E)).sum(axis=-1) / 2",
+        "self.mass_properties.volume * (E * apply(self.C, E)).sum(axis=-1)",
+        "tests/bodies/test_pseudo_rigid_motion.py",
+    ),
+    Mutation(
+        "bodies/rigid.py",
+        "np.hstack([-rotation_of(q) @ hat(X - self.center), np.eye(3)])",
+        "np.hstack([rotation_of(q) @ hat(X - self.center), np.eye(3)])",
+        "tests/testing/test_bodies.py tests/bodies/test_equilibrium.py",
+    ),
+    Mutation(
+        "bodies/affine.py",
+        "return np.asarray(-self.mass * (q[..., 9:] @ g))",
+        "return np.asarray(self.mass * (q[..., 9:] @ g))",
+        BODY_LOADS + " " + MECHANICS,
+    ),
+    Mutation(
+        "bodies/affine.py",
+        'arm = self.q[..., 9:] - vector_of(about, "a point")',
+        'arm = self.q[..., 9:] + vector_of(about, "a point")',
+        "tests/bodies/test_simple_mechanics.py tests/bodies/test_pseudo_rigid_motion.py",
+    ),
+    Mutation("bodies/rotations.py", "np.sin(safe / 2) / safe", "np.sin(safe) / safe", STEPS),
+    Mutation(
+        "bodies/rotations.py",
+        "1 - t2 / 6 * (1 - t2 / 20",
+        "1 - t2 / 3 * (1 - t2 / 20",
+        "tests/analysis/test_rigid_and_pseudo_rigid_steps.py tests/bodies/test_tops.py",
+    ),
+    Mutation(
+        "bodies/loads/forces.py",
+        "return self.stiffness * elongation + self.damping * rate",
+        "return self.stiffness * elongation - self.damping * rate",
+        BODY_LOADS,
+    ),
+    Mutation(
+        "bodies/loads/forces.py",
+        "return np.asarray(self.stiffness * stretch**2 / 2)",
+        "return np.asarray(self.stiffness * stretch**2)",
+        BODY_LOADS + " " + MECHANICS,
+    ),
+    Mutation(
+        "bodies/loads/forces.py",
+        "push = -across * np.eye(3) - (along - across) * np.outer(n, n)",
+        "push = -across * np.eye(3) + (along - across) * np.outer(n, n)",
+        "tests/bodies/test_equilibrium.py",
+    ),
+    Mutation(
+        "bodies/constraints/fixed.py",
+        "- self.length\n",
+        "+ self.length\n",
+        "tests/bodies/test_simple_mechanics.py",
+    ),
+    Mutation(
+        "bodies/constraints/prescribed.py",
+        "(self._moved(x) - self.displacement(time)) * (2 / h)",
+        "(self._moved(x) - self.displacement(time - h)) * (2 / h)",
+        "tests/bodies/test_simple_mechanics.py tests/bodies/test_starts.py",
+    ),
+    Mutation(
+        "bodies/constraints/prescribed.py",
+        "(body.velocity(self.points) @ self.direction)[:, None] + gained",
+        "(body.velocity(self.points) @ self.direction)[:, None] - gained",
+        "tests/bodies/test_simple_mechanics.py tests/bodies/test_starts.py",
+    ),
+    Mutation(
+        "bodies/formulations/corotational.py",
+        "q.reshape(-1, 3) @ R + self._Z @ R - self._Z",
+        "q.reshape(-1, 3) @ R + self._Z @ R + self._Z",
+        "tests/bodies/test_finite_element_motion.py",
+    ),
+    Mutation(
+        "bodies/formulations/corotational.py",
+        "return float(d @ self._apply(d)) / 2",
+        "return float(d @ self._apply(d))",
+        "tests/bodies/test_finite_element_motion.py tests/testing/test_bodies.py",
+    ),
+    Mutation(
+        "bodies/formulations/modal.py",
+        "scale = 1 + c * self._squares",
+        "scale = 1 - c * self._squares",
+        "tests/bodies/test_finite_element_motion.py",
+    ),
+    # ---- supports, mass
+    Mutation(
+        "solvers/constraint_map.py", "constant += weight * offset", "constant -= weight * offset", SYSTEMS
+    ),
+    Mutation(
+        "solvers/constraint_map.py",
+        "R[:, 0, 4], R[:, 2, 4] = z, -x",
+        "R[:, 0, 4], R[:, 2, 4] = z, x",
+        "tests/robustness/test_bad_models.py",
+    ),
+    Mutation(
+        "solvers/constrained_system.py",
+        "(self.K @ self.gather(u) - self.gather(forces))",
+        "(self.K @ self.gather(u) + self.gather(forces))",
+        SYSTEMS,
+    ),
+    Mutation(
+        "model/mass_properties.py",
+        "mass[..., None] * sides**2 / 12",
+        "mass[..., None] * sides**2 / 6",
+        "tests/model/test_mass_properties.py",
+    ),
+    Mutation(
+        "model/mass_properties.py",
+        "first += rho * wx.sum(axis=0)",
+        "first += wx.sum(axis=0)",
+        "tests/model/test_mass_properties.py",
+    ),
+    Mutation(
+        "elements/mass.py",
+        "return m * rho[..., None, None]",
+        "return m / rho[..., None, None]",
+        "tests/testing tests/elements",
+    ),
+    # ---- what was found by chance before
+    Mutation(
+        "analysis/prescribed_motion.py",
+        "velocity = (-3 * g + 4 * e.prescribed(short) - e.prescribed(2 * short)) / (2 * short)",
+        "velocity = (e.prescribed(short) - g) / short",
+        SIGNS,
+    ),
+    Mutation("analysis/static.py", "solution.backward_error > 1e-8", "solution.backward_error > 1e-3", SIGNS),
+    # ---- files
+    Mutation(
+        "io/kratos/properties.py",
+        "model.add_prestress(-factor * stress",
+        "model.add_prestress(factor * stress",
+        "tests/io/kratos",
+    ),
+    Mutation(
+        "io/kratos/variables.py",
+        "fields.scalar(positive) - fields.scalar(negative)",
+        "fields.scalar(positive) + fields.scalar(negative)",
+        SIGNS,
+    ),
+    Mutation("io/kratos/to_document.py", "0.0 - prestress", "0.0 + prestress", "tests/io"),
+    Mutation(
+        "materials/orthotropic3d.py",
+        '"nu_yz": "POISSON_RATIO_YZ"',
+        '"nu_yz": "POISSON_RATIO_XZ"',
+        SIGNS,
+    ),
+    Mutation(
+        "shapes/hexahedra.py",
+        "to_vtk = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)\n",
+        "to_vtk = (*range(12), 12, 13, 14, 15, 16, 17, 18, 19)\n",
+        "tests/io/formats/test_vtu.py tests/io/formats/test_meshio.py",
+    ),
+    # ---- kernels
+    Mutation(
+        "native/stiffness.hpp",
+        "m.lambda * P[3 * i + j] + m.mu * P[3 * j + i]",
+        "m.lambda * P[3 * j + i] + m.mu * P[3 * i + j]",
+        STIFFNESS,
+    ),
+    Mutation(
+        "native/stiffness.hpp",
+        "weight[q] = w.weights[q] / det;",
+        "weight[q] = w.weights[q] * det;",
+        STIFFNESS,
+    ),
+    Mutation(
+        "native/gauss_kernels.hpp", "s.elastic[c] + at.initial[c]", "s.elastic[c] - at.initial[c]", GAUSS
+    ),
+    Mutation(
+        "native/gauss_kernels.hpp", "found[0] += 0.5 * energy * s.dV;", "found[0] += energy * s.dV;", GAUSS
+    ),
+    Mutation(
+        "native/gauss_kernels.hpp",
+        "diagonal[a] += N[a] * N[a] * det;",
+        "diagonal[a] += N[a] * det;",
+        "tests/assembly tests/solvers",
+    ),
+    Mutation(
+        "native/sparse.hpp",
+        "s1 += *reinterpret_cast<const Vec*>(a + 3) * v;",
+        "s1 -= *reinterpret_cast<const Vec*>(a + 3) * v;",
+        "tests/native/test_native.py",
+    ),
+    Mutation("native/rigid.hpp", "A[i] = p[i] + h * load_[i];", "A[i] = p[i] - h * load_[i];", STEPS),
+    Mutation("native/rigid.hpp", "x[i] += h / 2 * next[3 + i];", "x[i] += h * next[3 + i];", STEPS),
+    Mutation(
+        "native/pseudo_rigid.hpp",
+        "const D factor = (eta * (h / 2) + h * h / 4) * volume;",
+        "const D factor = (eta * (h / 2) + h * h / 2) * volume;",
+        STEPS,
+    ),
+    Mutation(
+        "native/pseudo_rigid.hpp", "e[a] = E[a] + fraction * e[a];", "e[a] = E[a] - fraction * e[a];", STEPS
+    ),
+    Mutation(
+        "native/lagrange.hpp",
+        "E[3 + i] += middle[r][i] * dF[r][j] + middle[r][j] * dF[r][i];",
+        "E[3 + i] += middle[r][i] * dF[r][j] - middle[r][j] * dF[r][i];",
+        STRAIN,
+    ),
+]
