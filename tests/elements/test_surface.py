@@ -6,7 +6,6 @@ import pytest
 from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
 from kratos_lite.shapes import FACE_SHAPES
 
-
 FACES = [shape for shape in FACE_SHAPES.values() if shape.nodes.shape[1] == 2]
 
 
