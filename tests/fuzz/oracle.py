@@ -96,7 +96,7 @@ def findings(words: list[str], files: list[str]) -> list[str]:
         why = f"{type(error).__name__}: {error}"
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
-    found = [why] if why else [*_of_words(code, told.getvalue(), said.getvalue(), files)]
+    found = [why] if why else [*_of_words(code, told.getvalue(), said.getvalue(), files, words)]
     return found + _of_files(out, code)
 
 
@@ -104,7 +104,7 @@ def _stop(*_: object) -> None:
     raise TooLong
 
 
-def _of_words(code: int | None, told: str, said: str, files: list[str]) -> list[str]:
+def _of_words(code: int | None, told: str, said: str, files: list[str], words: list[str]) -> list[str]:
     """Return what is wrong with the exit code and the words of a command."""
     found = []
     if code not in (0, 2) and not (code == 3 and " failed " in told):
@@ -115,7 +115,9 @@ def _of_words(code: int | None, told: str, said: str, files: list[str]) -> list[
         found.append(f"exit code 2 with {said!r}")
     if said.startswith("usage: "):
         return found
-    if code == 2 and not any(word in said for word in (*files, *PLACES)):
+    values = tuple(f"{word.partition('=')[2]}:" for word in words)
+    is_of_option = said.removeprefix("error: ").startswith(values)
+    if code == 2 and not is_of_option and not any(word in said for word in (*files, *PLACES)):
         found.append(f"an error without a place: {said}")
     if "not enough memory" in said:
         found.append(said)

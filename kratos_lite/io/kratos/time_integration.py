@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, naming
 from kratos_lite.io.case import TimeIntegration
 from kratos_lite.io.kratos.context import times_of
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.settings import Settings
+from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.integrators import ModelIntegrator
@@ -30,6 +31,10 @@ def time_integration_of(settings: Settings, processes: ProcessesInTime) -> TimeI
     rayleigh = tuple(solver.number(key, 0.0) for key in ("rayleigh_alpha", "rayleigh_beta"))
     for key, value in zip(("rayleigh_alpha", "rayleigh_beta"), rayleigh, strict=True):
         solver.expect(value >= 0, key, f"{key} must be ≥ 0; got {value:g}")
+    with naming(settings.source):
+        for name in ("displacement", "velocity"):
+            if (value := getattr(processes, name)) is not None:
+                finite(value, f"the initial {name}")
     return TimeIntegration(
         solver.section("time_stepping").number("time_step"),
         len(times) - 1,
