@@ -5,6 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.time_series import integral_of
 
 STEEL = kl.Isotropic3D(E=2e8, nu=0.3, density=7800.0)
 
@@ -130,3 +131,8 @@ def test_bossak_has_order_2():
 def test_a_wrong_number_of_bossak_is_refused(alpha):
     with pytest.raises(kl.InputError, match="the α of Bossak"):
         kl.Bossak(alpha)
+
+
+def test_the_integral_of_a_function_of_time_is_exact_for_a_polynomial_of_degree_five():
+    found = integral_of(lambda t: 6 * t**5 - 4 * t**3 + 1, -1.0, 2.0)
+    assert found == pytest.approx((2**6 - 2**4 + 2) - (1 - 1 - 1), rel=1e-13)

@@ -129,7 +129,7 @@ MUTATIONS = [
         "time_series.py",
         "half * (1 + x)",
         "half * (1 - x / 2)",
-        "tests/bodies/test_simple_mechanics.py tests/bodies/test_starts.py",
+        "tests/analysis/test_time_dependent_loads.py",
     ),
     # ---- assembly, solvers, report
     Mutation(
