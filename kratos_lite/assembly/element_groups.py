@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
-from kratos_lite.elements.exact import AFFINE, CURVED, ROUNDING, STRAIGHT, geometries, interpolations
+from kratos_lite.elements.exact import (
+    AFFINE,
+    CURVED,
+    ROUNDING,
+    STRAIGHT,
+    Geometries,
+    geometries,
+    interpolations,
+)
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -108,17 +116,19 @@ def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = 
     return [replace(group.take(mask), rule=rule) for mask, rule in parts]
 
 
-def geometries_of(points: Array, group: ElementGroup) -> Ints:
+def geometries_of(points: Array, group: ElementGroup) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of the elements of a group, (m,); see `geometries`."""
     shape, nodes = group.element.shape, group.tables()[0]
     if interpolated := getattr(kernels("gauss"), "interpolated", None):
-        found, points = np.full(len(nodes), CURVED), floats(points)
-        for geometry in (STRAIGHT, AFFINE):
-            if spanned := interpolations(shape)[geometry]:
-                found[interpolated(points, nodes, *spanned, ROUNDING) > 0] = geometry
+        found, points = np.full(len(nodes), CURVED, dtype=np.int8), floats(points)
+        for geometry in (AFFINE, STRAIGHT):
+            spanned, rest = interpolations(shape)[geometry], found == CURVED
+            if spanned and rest.any():
+                left = nodes if rest.all() else nodes[rest]
+                found[rest] = np.where(interpolated(points, left, *spanned, ROUNDING) > 0, geometry, CURVED)
         return found
     parts = [geometries(shape, points[nodes[chunk]]) for chunk in group.chunks()]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
+    return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
 
 def add_nodal(total: Array, nodes: Rows, values: Array) -> None:

@@ -9,8 +9,10 @@ are total ones, it has 3(p - 1) or 0.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.quadrature import CELLS, Rule, rule_for
 from kratos_lite.registry import remembered
@@ -19,6 +21,8 @@ from kratos_lite.typing import Array, Ints
 
 AFFINE, STRAIGHT, CURVED = range(3)
 """Geometry of a cell: constant J; that of its corners alone; any."""
+Geometries: TypeAlias = NDArray[np.int8]
+"""The geometry of each of many cells."""
 ROUNDING = 8 * np.finfo(float).eps
 """How far, relative to the largest coordinate, rounding may move a node from where its geometry has it."""
 MOST = 11
@@ -122,11 +126,11 @@ def _spanned(
     return nodes.astype(np.int32), np.ascontiguousarray(C, dtype=float)
 
 
-def geometries(shape: type[Shape], X: Array) -> Ints:
+def geometries(shape: type[Shape], X: Array) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of cells X (..., n, 3)."""
     near = ROUNDING * np.abs(X).max(axis=(-2, -1))
     X = X - X[..., :1, :]
-    found = np.full(X.shape[:-2], CURVED)
+    found = np.full(X.shape[:-2], CURVED, dtype=np.int8)
     for geometry in (STRAIGHT, AFFINE):
         if spanned := interpolations(shape)[geometry]:
             nodes, C = spanned

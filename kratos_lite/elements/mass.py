@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.exact import AFFINE, exact_rule, geometries, has_rules
+from kratos_lite.elements.exact import AFFINE, CURVED, STRAIGHT, Geometries, exact_rule, geometries, has_rules
 from kratos_lite.elements.geometry import GEOMETRY, PlacedCell, same_methods
 from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Mask
 
 MASS = (*GEOMETRY, "_N", "_volumes", "mass_rules", "_integrate", "scalar_mass")
 """What an element class may redefine so that its mass is not that of its shape and geometry."""
@@ -26,7 +26,7 @@ class CellMass(PlacedCell):
     mass_rule: ClassVar[Rule | None] = None
 
     @classmethod
-    def mass_rules(cls, kinds: Ints, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
+    def mass_rules(cls, kinds: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
         """Return the rules for products of shape functions over cells, each with a mask of its cells.
 
         Parameters
@@ -46,9 +46,11 @@ class CellMass(PlacedCell):
         if stated is not None:
             return [(np.ones(kinds.shape, dtype=bool), stated)]
         rules: dict[Rule, Mask] = {}
-        for kind in np.unique(kinds).tolist() or [AFFINE]:
-            rule = exact_rule(cls.shape, factors, kind, flow)
-            rules[rule] = rules.get(rule, np.zeros(kinds.shape, dtype=bool)) | (kinds == kind)
+        for kind in (AFFINE, STRAIGHT, CURVED):
+            mine = np.asarray(kinds == kind)
+            if mine.any() or (kind == AFFINE and not kinds.size):
+                rule = exact_rule(cls.shape, factors, kind, flow)
+                rules[rule] = rules[rule] | mine if rule in rules else mine
         return [(mask, rule) for rule, mask in rules.items()]
 
     def _integrate(self, of: Callable[[Array, Array], Array], factors: int) -> Array:

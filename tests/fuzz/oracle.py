@@ -19,7 +19,7 @@ from tests.fuzz.seeds import Seed
 SECONDS = 20.0
 """Computing time of one command."""
 NO_NUMBER = re.compile(r"(?<![\w.\"'/-])[-+]?(nan|inf|infinity)(?![\w.])", re.IGNORECASE)
-PLACES = tuple("node element part constraint load propert Propert support step motion mode out/ --".split())
+PLACES = "node element part constraint load propert Propert support step motion mode tolerance out/ --".split()
 ENDINGS = (".mdpa", ".elem", ".vtu", ".vtk", ".msh", ".inp")
 
 

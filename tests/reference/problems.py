@@ -55,7 +55,7 @@ def random_mesh(rng):
     for box, kind in kinds.items():
         corners = [int(np.ravel_multi_index(np.add(box, upper), shape)) for upper in UPPER]
         points = fill(points, cells, corners, kind, box, kinds)
-    points = points + (rng.random() < 0.8) * rng.uniform(-0.07, 0.07, points.shape)
+    points = points + (rng.random() < 0.8) * rng.uniform(-0.05, 0.05, points.shape)
     if order != "linear":
         points, cells = with_middles(points, cells, order, rng)
     return without_lone_nodes(points @ random_frame(rng).T, cells)
@@ -136,7 +136,7 @@ def with_middles(points, cells, order, rng):
         key = frozenset(nodes)
         if key not in made:
             made[key] = len(points)
-            points.append(np.mean([points[n] for n in nodes], axis=0) + curved * rng.uniform(-0.03, 0.03, 3))
+            points.append(np.mean([points[n] for n in nodes], axis=0) + curved * rng.uniform(-0.015, 0.015, 3))
         return made[key]
 
     for kind, nodes in cells:

@@ -215,4 +215,4 @@ def _start(settings: Settings, body: Body) -> None:
     keys = {"linear": "velocity", "angular": "angular_velocity"}
     given = {name: start.vector(key) for name, key in keys.items() if key in start}
     if given:
-        body.set_velocity(**given)
+        start.placed("", body.set_velocity, **given)
