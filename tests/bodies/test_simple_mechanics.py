@@ -341,3 +341,12 @@ def test_the_work_of_a_dead_load_is_what_its_potential_loses(kind):
     end(body, 1e-3, 60)
     assert body.external_work == pytest.approx(start - float(body.potential_energy()), rel=1e-10)
     assert float(body.energy()) == pytest.approx(energy, abs=1e-11 * abs(energy) + 1e-11)
+
+
+@pytest.mark.parametrize("kind", [kl.RigidBody, kl.PseudoRigidBody, kl.FiniteElementBody])
+def test_angular_momentum_about_a_point_is_that_of_the_moving_center(kind):
+    body = kind(kl.box(), kl.Isotropic3D(1e6, 0.3, 12.0))
+    about, v = np.array([1.0, -2.0, 0.25]), (3.0, 1.0, -2.0)
+    body.set_velocity(v)
+    expected = np.cross(np.full(3, 0.5) - about, 12.0 * np.array(v))
+    np.testing.assert_allclose(body.angular_momentum(about), expected, rtol=0, atol=1e-12)
