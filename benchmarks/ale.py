@@ -49,7 +49,7 @@ def work(job: Job, kl: Any) -> Array:
     """Time the matrices in kratos_lite; return their entries."""
     from kratos_lite.ale import Rotation
     from kratos_lite.ale.matrices import exact_rule
-    from kratos_lite.assembly.inertia import inertia_matrices
+    from kratos_lite.assembly.mass_and_convection import inertia_matrices
     from kratos_lite.assembly.sparsity_pattern import Pattern
     from kratos_lite.assembly.stiffness import assemble_stiffness
 

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.ale.motion import Motion
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.solvers.constrained_system import among
 from kratos_lite.solvers.mass import Mass

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.ale.boundaries import leak
-from kratos_lite.ale.parts import check_ties, moving_nodes
+from kratos_lite.ale.moving_part import check_ties, moving_nodes
 from kratos_lite.ale.rate import Rate, vector_rates
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kratos_lite import solvers
 from kratos_lite.ale import Motion, MotionMatrices
-from kratos_lite.ale.symmetry import check_materials
+from kratos_lite.ale.rotational_symmetry import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
-from kratos_lite.elements.own_steps import stiffness_of
+from kratos_lite.elements.overridden_steps import stiffness_of
 from kratos_lite.elements.stiffness import by_dof
 from kratos_lite.model.loads import BodyForce, ScaledLoad
 from kratos_lite.model.structure import Structure

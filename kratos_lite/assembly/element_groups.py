@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS, KinematicLinear
-from kratos_lite.elements.exact import (
+from kratos_lite.elements.exact_rules import (
     AFFINE,
     CURVED,
     ROUNDING,

@@ -22,7 +22,7 @@ from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
 from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.own_steps import MECHANICS, stiffness_of
+from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 

@@ -17,7 +17,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.mass import MASS
-from kratos_lite.elements.own_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
+from kratos_lite.elements.overridden_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.typing import Array, Ints, Mask, Rows
 

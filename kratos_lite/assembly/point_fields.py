@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.own_steps import STRAIN
+from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located

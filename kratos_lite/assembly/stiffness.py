@@ -14,7 +14,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.own_steps import MECHANICS, stiffness_of
+from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.elements.tables import lame_constants
 from kratos_lite.typing import Array, Progress
 

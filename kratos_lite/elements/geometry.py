@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.own_steps import run_step
+from kratos_lite.elements.overridden_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule

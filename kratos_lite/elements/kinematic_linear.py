@@ -19,7 +19,7 @@ from kratos_lite import voigt
 from kratos_lite.elements import arguments, stiffness
 from kratos_lite.elements.geometry import GEOMETRY, same_methods
 from kratos_lite.elements.mass import CellMass
-from kratos_lite.elements.own_steps import (
+from kratos_lite.elements.overridden_steps import (
     STRAIN,
     STRESS,
     columns,

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.exact import AFFINE, CURVED, STRAIGHT, Geometries, exact_rule, geometries, has_rules
+from kratos_lite.elements.exact_rules import (
+    AFFINE,
+    CURVED,
+    STRAIGHT,
+    Geometries,
+    exact_rule,
+    geometries,
+    has_rules,
+)
 from kratos_lite.elements.geometry import GEOMETRY, PlacedCell, same_methods
 from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.own_steps import MECHANICS
+from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial

@@ -14,7 +14,7 @@ import numpy as np
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
-from kratos_lite.model.connected import FEW, Bodies, bodies
+from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.supports import Supports
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes

@@ -14,7 +14,7 @@ from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, Where, WhereElements
-from kratos_lite.model import checks, connected
+from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.supports import AXES, Supports
@@ -408,7 +408,7 @@ class Structure:
             warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
         part: NDArray[np.int64] = np.where(used, 0, -1)
         if not free:
-            bodies = connected.bodies(mesh, faces)
+            bodies = connected_bodies.bodies(mesh, faces)
             part = rigid_body_mode_check.check_supports(mesh, self.supports, bodies)
         self.supports.check_used(used)
         return groups, part, warnings

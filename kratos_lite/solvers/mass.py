@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite.assembly import inertia
+from kratos_lite.assembly import mass_and_convection
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.solvers import direct
 from kratos_lite.typing import Array
@@ -57,7 +57,7 @@ class Mass:
     def nodal(self) -> Array:
         """Row sums (n,) in kg."""
         if self.lumped:
-            return inertia.lumped_mass(self._points, self._groups)
+            return mass_and_convection.lumped_mass(self._points, self._groups)
         return np.asarray(self.scalar @ np.ones(len(self._points)))
 
     def times(self, v: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.own_steps import internal_load_of, strain_of
+from kratos_lite.elements.overridden_steps import internal_load_of, strain_of
 from kratos_lite.quadrature import Rule
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraint_map import rigid_modes

@@ -6,7 +6,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.own_steps import STRAIN
+from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Block, Mesh

@@ -19,7 +19,7 @@ from kratos_lite.typing import Array
 from kratos_lite.verification.fields import Field
 from kratos_lite.verification.meshes import is_quadratic, kind_of, on_boundary, split, straight, warped
 from kratos_lite.verification.problem import Problem, StaticProblem, cell_is
-from kratos_lite.verification.uniform import ROUND_OFF, STEEL, under, uniform
+from kratos_lite.verification.single_element import ROUND_OFF, STEEL, under, uniform
 
 STRESS = np.array([[2000.0, 400, 400], [400, 2000, 400], [400, 400, 2000]])
 """Of MacNeal & Harder's field u = 1e-3 (2 x + y + z, x + 2 y + z, x + y + 2 z) / 2, in Pa."""

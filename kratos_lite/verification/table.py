@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.verification import (
+    bodies_in_motion,
     concentrations,
     macneal_harder,
     moving_material,
@@ -15,16 +16,15 @@ from kratos_lite.verification import (
     patch,
     pressure,
     shells,
+    single_element,
     stepping,
-    tops,
-    uniform,
     vibration,
 )
 from kratos_lite.verification.meshes import element, kind_of
 from kratos_lite.verification.problem import ELEMENTS, Problem, Row, solved
 
 FAMILIES = (
-    uniform,
+    single_element,
     patch,
     macneal_harder,
     shells,
@@ -34,7 +34,7 @@ FAMILIES = (
     orders,
     vibration,
     stepping,
-    tops,
+    bodies_in_motion,
     moving_material,
 )
 """Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""

@@ -11,7 +11,7 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
 from kratos_lite.assembly import element_groups
-from kratos_lite.assembly.inertia import inertia_matrices
+from kratos_lite.assembly.mass_and_convection import inertia_matrices
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.native import kernels

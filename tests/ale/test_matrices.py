@@ -7,7 +7,7 @@ from meshes import elsewhere
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.bodies.rotations import exp
-from kratos_lite.elements.exact import AFFINE, exact_rule
+from kratos_lite.elements.exact_rules import AFFINE, exact_rule
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.quadrature import rule_for
 

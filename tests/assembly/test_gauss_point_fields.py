@@ -10,7 +10,7 @@ import pytest
 from meshes import changed_at, with_block
 
 import kratos_lite as kl
-from kratos_lite.assembly import element_groups, inertia, nodal_values
+from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import ELEMENTS, KinematicLinear3D4N, KinematicLinear3D8N, KinematicLinear3D20N
@@ -81,7 +81,7 @@ def everything(mesh):
         found[f"{label} force"] = kl.BodyForce(force).forces(mesh, groups)
         found[f"{label} force of some"] = kl.BodyForce(force, some).forces(mesh, groups)
     found["weight"] = kl.Gravity((0, 0, -9.81)).forces(mesh, groups)
-    found["lumped mass"] = inertia.lumped_mass(P, groups)
+    found["lumped mass"] = mass_and_convection.lumped_mass(P, groups)
     return found
 
 
@@ -246,7 +246,9 @@ def test_an_element_with_its_own_loads_and_masses_takes_them():
             rtol=1e-12,
         )
     np.testing.assert_allclose(
-        inertia.lumped_mass(points, [group]), 7 * inertia.lumped_mass(points, [usual]), rtol=1e-12
+        mass_and_convection.lumped_mass(points, [group]),
+        7 * mass_and_convection.lumped_mass(points, [usual]),
+        rtol=1e-12,
     )
     once = fields.internal_load(points, [usual], 1e-3 * points**2)
     np.testing.assert_allclose(
@@ -287,7 +289,7 @@ def test_volume_weight_and_mass_of_a_box(name):
     groups = kl.Model(mesh, SOIL).element_groups()
     total = sum(fields.volumes(mesh.points, group).sum() for group in groups)
     assert total == pytest.approx(12.0, rel=1e-14)
-    assert inertia.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
+    assert mass_and_convection.lumped_mass(mesh.points, groups).sum() == pytest.approx(12 * 7620.0, rel=1e-13)
     weight = kl.Gravity((0.0, 0.0, -9.81)).forces(mesh, groups)
     np.testing.assert_allclose(weight.sum(axis=0), [0, 0, -12 * 7620.0 * 9.81], rtol=1e-13, atol=1e-9)
 

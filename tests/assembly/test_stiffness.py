@@ -17,7 +17,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import CONSTANT_JACOBIANS, assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.own_steps import MECHANICS
+from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.native import kernels
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)

@@ -8,7 +8,7 @@ from kratos_lite.assembly import finite_strain
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.own_steps import stiffness_of
+from kratos_lite.elements.overridden_steps import stiffness_of
 
 TRACE = np.array([1.0, 1, 1, 0, 0, 0])
 PLAIN = kl.KinematicLinear3D8N

@@ -15,7 +15,7 @@ import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements.exact import exact_rule
+from kratos_lite.elements.exact_rules import exact_rule
 from kratos_lite.elements.tables import lame_constants
 from kratos_lite.solvers.mass import Mass
 

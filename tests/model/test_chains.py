@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.model import connected
+from kratos_lite.model import connected_bodies
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
 CUBE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
@@ -121,7 +121,7 @@ def test_bodies_that_share_three_nodes_are_one_body():
     fine = kl.box((1, 1, 100), (1, 1, 100), "KinematicLinear3D20N")
     nodes = fine.blocks[0].nodes
     blocks = [block_of(nodes[::2], "KinematicLinear3D20N"), block_of(nodes[1::2, :8])]
-    assert connected.bodies(kl.Mesh(fine.points, blocks)).body.max() == 0
+    assert connected_bodies.bodies(kl.Mesh(fine.points, blocks)).body.max() == 0
 
 
 def test_the_cost_grows_with_the_number_of_cells(monkeypatch):

@@ -9,7 +9,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.exact import exact_rule
+from kratos_lite.elements.exact_rules import exact_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.quadrature import rule_for

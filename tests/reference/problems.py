@@ -136,7 +136,9 @@ def with_middles(points, cells, order, rng):
         key = frozenset(nodes)
         if key not in made:
             made[key] = len(points)
-            points.append(np.mean([points[n] for n in nodes], axis=0) + curved * rng.uniform(-0.015, 0.015, 3))
+            points.append(
+                np.mean([points[n] for n in nodes], axis=0) + curved * rng.uniform(-0.015, 0.015, 3)
+            )
         return made[key]
 
     for kind, nodes in cells:

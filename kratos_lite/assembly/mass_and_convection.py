@@ -18,7 +18,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass_rule, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.exact import geometries
+from kratos_lite.elements.exact_rules import geometries
 from kratos_lite.elements.mass import MASS
 from kratos_lite.elements.tables import lumped
 from kratos_lite.typing import Array
