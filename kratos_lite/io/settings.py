@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from os.path import isdir
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -199,12 +200,12 @@ def find_file(
     folder, so the last word of the path is looked for beside the run file too.
     """
     name = settings.text(key) + ending
+    if isdir(name) or isdir(folder / name):  # where the methods of Path refuse names that are too long
+        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
     try:
         path = inside(folder, name, outside)
     except ValueError as error:
         raise settings.error(key, f"{settings.name(key)}: {error}") from None
-    if Path(name).is_dir() or (folder / name).is_dir():
-        raise settings.error(key, f"{settings.name(key)}: {name} is a folder; name a file in it")
     beside = folder / path.name
     if path.is_file():
         settings.files.append(path)

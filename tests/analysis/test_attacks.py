@@ -220,7 +220,7 @@ def test_arguments_of_solutions_are_checked_with_a_motion_too():
 
 
 def test_nonsense_is_told():
-    assert kl.ale.Rotation((1e200, 0, 0)).direction.tolist() == [1, 0, 0]
+    assert kl.ale.Rotation((1e49, 0, 0)).direction.tolist() == [1, 0, 0]
     for value in (lambda t: None, lambda t: "fast", lambda t: [1.0, 2.0], lambda t: np.nan):
         with pytest.raises(kl.InputError, match="a rate at t = 0 s must be"):
             wheel(kl.ale.Rotation("z", rate=value)).solve()

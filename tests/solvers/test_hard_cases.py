@@ -83,7 +83,8 @@ def test_a_plate_of_linear_elements(element):
 
 @pytest.mark.parametrize("element", CELLS)
 def test_stiff_and_soft_layers(element):
-    check(body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1))
+    soft = body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1)
+    check(soft, rtol=1e-7)  # rounding times the contrast of 2e8
 
 
 @pytest.mark.parametrize("element", CELLS)

@@ -293,12 +293,12 @@ def test_an_element_of_a_user_with_seven_nodes(path):
         assert_solved(clamped(seven))
 
 
-def test_an_element_class_that_redefines_its_stiffness(path):
+def test_an_element_class_that_redefines_its_stress(path):
     with ELEMENTS.temporary():
 
         class KinematicLinear3D8NDoubled(ELEMENTS["KinematicLinear3D8N"]):
-            def stiffness_by_axis(self, C):
-                return 2 * super().stiffness_by_axis(C)
+            def stress(self, C, u):
+                return 2 * super().stress(C, u)
 
         mesh = box()
         cells = mesh.blocks[0].nodes

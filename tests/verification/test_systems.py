@@ -190,7 +190,7 @@ def test_wrong_cases_are_refused():
     model = block()
     with pytest.raises(kl.InputError, match="load cases must map names to lists of loads; got list"):
         model.solve_cases([WIND])
-    with pytest.raises(kl.InputError, match="a load such as Gravity or Traction is needed; got str"):
+    with pytest.raises(kl.InputError, match="a load, or a list of them, is needed; got str"):
         model.solve_cases({"wind": "x+"})
     with pytest.raises(kl.InputError, match="a load such as Gravity or Traction is needed; got float"):
         model.static().solve([1.0])

@@ -352,7 +352,7 @@ def test_a_script_defines_a_scene(script, tmp_path):
     path = script(SCRIPT)
     assert is_script(path)
     found = read_case(path)
-    assert float(found.body.mass) == 7.0
+    assert float(found.body.mass) == pytest.approx(7.0, rel=1e-14)
     assert found.outputs.results == [str(tmp_path / "out.csv")]
     assert last(prepare(found)[1]).q[9] == pytest.approx(1.5)
 
