@@ -426,7 +426,7 @@ MUTATIONS = [
         "elements/mass.py",
         "return m * rho[..., None, None]",
         "return m / rho[..., None, None]",
-        MASS,
+        MASS + " -k own_density",
     ),
     # ---- what was found by chance before
     Mutation(
@@ -485,7 +485,7 @@ MUTATIONS = [
         "native/gauss_kernels.hpp",
         "diagonal[a] += N[a] * N[a] * det;",
         "diagonal[a] += N[a] * det;",
-        MASS,
+        MASS + " -k scaled_diagonal",
     ),
     Mutation(
         "native/sparse.hpp",
