@@ -28,7 +28,7 @@ def run(options: Namespace) -> int:
         raise InputError(f"{target}: the table is written as .md or .json")
     if options.list:
         for problem in chosen(names):
-            print(f"{problem.name:<49} {problem.quantity} [{problem.source}]")
+            print(f"{problem.name:<51} {problem.quantity} [{problem.source}]")
         return 0
     with ExitStack() as stack:  # elements of a file are forgotten afterwards
         for registry in REGISTRIES:
@@ -52,7 +52,8 @@ def _elements_of(path: Path) -> list[str]:
 
 
 def _printed(names: list[str], elements: list[str]) -> list[Row]:
-    rows = []
+    rows: list[Row] = []
+    print(page.HEADER)
     with TerminalProgress() as progress:
         for row in verify(names, elements, progress):
             progress.close()

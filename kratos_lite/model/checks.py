@@ -22,6 +22,7 @@ from kratos_lite.model.loads import Gravity, Load
 from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
+from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Mask
 
 SLOWEST, QUICKEST = 1.0, 2e4
@@ -167,8 +168,10 @@ def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
-    """Warn of different nodes at the same place (1e-8 of the mean spacing apart or less)."""
+def check_coincident(
+    mesh: Mesh, used: NDArray[np.bool_], constraints: Sequence[MultiPointConstraint] = ()
+) -> list[str]:
+    """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
     rows = np.flatnonzero(used)
     if len(rows) < 2:
         return []
@@ -186,6 +189,8 @@ def check_coincident(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
             break
         near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1)]
         pairs += [(int(rows[i]), int(rows[i + step])) for i in near]
+    tied = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
+    pairs = [pair for pair in pairs if frozenset(pair) not in tied]
     if not pairs:
         return []
     ids = mesh.node_ids

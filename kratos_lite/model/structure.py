@@ -400,7 +400,7 @@ class Structure:
         used, faces = mesh.used_nodes(), mesh.all_faces
         warnings += checks.check_rules(mesh, groups)
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
-        warnings += checks.check_coincident(mesh, used)
+        warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
         if not used.all():
             lost = mesh.node_ids[~used]

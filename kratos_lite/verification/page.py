@@ -66,11 +66,15 @@ def by_family(rows: Iterable[Row]) -> dict[str, list[Row]]:
 # ---- terminal ----------------------------------------------------------------------------------------
 
 
+HEADER = f"{'problem':<51} {'element':<9}{'value':>12}{'reference':>12}{'error':>11}  grade"
+"""The line above the rows in a terminal."""
+
+
 def line(row: Row) -> str:
     """Return a row for a terminal."""
     error = "" if row.note else f"{row.error:9.1e}"
     text = (
-        f"{row.problem.name:<49} {row.kind:<9}{found(row, row.value):>12}{number(row.problem.reference):>12}"
+        f"{row.problem.name:<51} {row.kind:<9}{found(row, row.value):>12}{number(row.problem.reference):>12}"
     )
     return f"{text}{error:>11}  {row.grade:<5}{row.note.splitlines()[0] if row.note else ''}".rstrip()
 
@@ -105,7 +109,9 @@ PEERS = (
     "Other programs solve the same discrete problems, with the same nodes, supports and nodal forces: {}. "
     "Their columns hold the same quantity, from their nodal displacements, which CalculiX prints to seven "
     "digits; they are empty where a program has no such element or analysis. Kratos' wedge of 15 nodes is "
-    "left out: it has other shape functions, so that the nodal forces are not consistent for it."
+    "left out: it has other shape functions, so that the nodal forces are not consistent for it. Its "
+    "pyramid of 13 nodes has other functions, too, and fails the patch tests; that of 5 nodes has another "
+    "rule."
 )
 
 

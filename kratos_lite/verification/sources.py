@@ -2,7 +2,7 @@
 
 SOURCES = {
     "Hooke": (
-        "R. Hooke's law for an isotropic body in a uniform state of stress: S. P. Timoshenko and "
+        "Hooke's law for an isotropic body in a uniform state of stress: S. P. Timoshenko and "
         "J. N. Goodier, Theory of Elasticity, 3rd ed., McGraw-Hill 1970, chapter 1"
     ),
     "Timoshenko": "S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd ed., McGraw-Hill 1970",
@@ -22,8 +22,8 @@ SOURCES = {
         "Element Method for Elliptic Problems, North-Holland 1978"
     ),
     "Lame": (
-        "G. Lamé, Leçons sur la théorie mathématique de l'élasticité, Paris 1852; in Timoshenko "
-        "and Goodier, Theory of Elasticity, 3rd ed., sections 28 (cylinder) and 142 (sphere)"
+        "G. Lamé, Leçons sur la théorie mathématique de l'élasticité, Paris 1852; also in S. P. Timoshenko "
+        "and J. N. Goodier, Theory of Elasticity (cylinder and sphere under uniform pressure)"
     ),
     "Kirsch": (
         "E. G. Kirsch, Die Theorie der Elastizität und die Bedürfnisse der Festigkeitslehre, "

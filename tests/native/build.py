@@ -7,8 +7,6 @@ import sysconfig
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import pybind11
-
 FLAGS = ["-std=c++17", "-fPIC", "-shared", "-fvisibility=hidden", "-fwrapv", "-pthread", "-fno-math-errno"]
 
 
@@ -25,7 +23,9 @@ def users_of(source: Path) -> list[Path]:
 
 
 def build(sources: list[Path], folder: Path, *flags: str) -> None:
-    """Compile kernels, two at a time, into a folder."""
+    """Compile kernels, two at a time, into a folder; pybind11 must be installed."""
+    import pybind11
+
     includes = [f"-I{pybind11.get_include()}", f"-I{sysconfig.get_paths()['include']}"]
 
     def compile_one(source: Path) -> None:
