@@ -11,6 +11,7 @@ from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
 from kratos_lite.solvers import Solution
+from kratos_lite.time_series import slope_of
 
 SOIL = kl.Isotropic3D(E=1e7, nu=0.3, density=2000.0)
 
@@ -93,6 +94,16 @@ def test_the_slope_of_a_table_at_a_kink_is_the_mean_of_both_sides():
     assert table.slope(0.5) == pytest.approx(-10.0)
     assert table.slope(0.6) == pytest.approx(-10.0)
     assert table.slope(0.0) == pytest.approx(10.0)
+
+
+def test_the_slope_of_a_function_at_the_start_looks_forward_and_is_exact_for_a_parabola():
+    assert slope_of(lambda t: 3 + 2 * t + 5 * t * t, "a rate")(0.0) == pytest.approx(2.0, abs=1e-8)
+
+
+def test_a_single_force_is_out_of_balance():
+    X = np.array([(0.0, 0, 0), (2.0, 0, 0)])
+    both = np.array([(0.0, 3.0, 0), (0.0, 3.0, 0)])
+    assert equilibrium(X, both, np.zeros_like(both), both) == (1.0, 0.0)
 
 
 def test_a_pair_of_forces_is_out_of_balance():

@@ -64,6 +64,25 @@ def test_mass_body_force_and_volume_are_those_of_a_rule_of_much_higher_degree(ki
     assert_close(element.lumped_mass(2.0).sum(), 2 * dV.sum())
 
 
+def test_the_mass_of_each_element_has_its_own_density():
+    X = np.stack([cell("KinematicLinear3D8N", geometry) for geometry in ("affine", "curved")])
+    element = kl.ELEMENTS["KinematicLinear3D8N"](X)
+    N, _, dV = fine(element.shape, X[1])
+    assert_close(element.scalar_mass([3.0, 7.0])[1], 7 * (N.T * dV) @ N)
+
+
+def test_lumped_mass_of_a_quadratic_cell_is_the_scaled_diagonal():
+    """The row sums of its corners are negative."""
+    kind, soil = "KinematicLinear3D20N", kl.Isotropic3D(1e7, 0.3, 7.0)
+    mesh = kl.box(element=kind)
+    mesh = mesh.replace(points=mesh.points @ SHEAR)
+    (nodes,) = mesh.blocks[0].nodes
+    N, _, dV = fine(kl.ELEMENTS[kind].shape, mesh.points[nodes])
+    diagonal = (N**2 * dV[:, None]).sum(axis=0)
+    expected = 7.0 * dV.sum() * diagonal / diagonal.sum()
+    assert_close(lumped_mass(mesh.points, kl.Model(mesh, soil).element_groups())[nodes], expected)
+
+
 @pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_convective_matrix_is_exact_and_the_second_is_exact_on_affine_cells(kind, geometry):

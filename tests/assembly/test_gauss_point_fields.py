@@ -294,6 +294,17 @@ def test_volume_weight_and_mass_of_a_box(name):
     np.testing.assert_allclose(weight.sum(axis=0), [0, 0, -12 * 7620.0 * 9.81], rtol=1e-13, atol=1e-9)
 
 
+def test_nodal_values_of_a_uniform_strain_are_that_strain_however_many_elements_share_a_node():
+    mesh = kl.box(cells=(2, 2, 1))
+    strain = 1e-3 * np.array([1.0, -2.0, 3.0, 0.0, 0.0, 0.0])
+    groups = kl.Model(mesh, WOOD).element_groups()
+    means, nodal = nodal_values.averages(
+        mesh.points, groups, mesh.points * strain[:3], mesh.n_elements, stress=False
+    )
+    for found in (means, nodal):
+        np.testing.assert_allclose(found, np.tile(strain, (len(found), 1)), rtol=0, atol=1e-16)
+
+
 @compiled
 def test_far_from_the_origin_no_digits_of_the_shape_are_lost():
     mesh = kl.box(cells=(4, 4, 4))

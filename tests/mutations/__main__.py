@@ -1,7 +1,8 @@
 """Apply each mutation to a copy of the package and run the tests that must notice it.
 
 ``python -m tests.mutations [numbers]`` takes all mutations, or those of these numbers; it ends with how many
-survive.  Kernels are built again, which needs GCC.
+were killed, survive, and were not run because their tests fail without them.  Kernels that a mutation of
+C++ touches are built again, which needs GCC.
 """
 
 import os
@@ -10,6 +11,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
+from collections import Counter
 from pathlib import Path
 
 from tests.mutations.mutations import MUTATIONS, Mutation
@@ -68,27 +71,38 @@ def survives(folder: Path, mutation: Mutation) -> bool:
             library.write_bytes(data)
 
 
+def copy_sources(folder: Path) -> None:
+    """Copy what the tests need into a folder."""
+    for part in ("kratos_lite", "tests", "examples", "docs", "elements", "materials", "benchmarks"):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / part, folder / part, symlinks=True, ignore=ignored)
+    shutil.copy(ROOT / "pyproject.toml", folder)
+
+
 def main(numbers: list[int]) -> int:
-    """Try mutations, tell the outcome of each, and return how many survive."""
-    survivors = 0
+    """Try mutations, tell the outcome of each, and return how many were not killed."""
+    outcomes: Counter[str] = Counter()
+    begin = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for part in ("kratos_lite", "tests", "examples", "docs", "elements", "materials", "benchmarks"):
-            ignored = shutil.ignore_patterns("__pycache__")
-            shutil.copytree(ROOT / part, folder / part, symlinks=True, ignore=ignored)
-        shutil.copy(ROOT / "pyproject.toml", folder)
+        copy_sources(folder)
         sound: dict[str, bool] = {}
         for number in numbers or range(len(MUTATIONS)):
-            mutation = MUTATIONS[number]
-            alive = survives(folder, mutation)
-            if not alive and mutation.tests not in sound:  # tests that always fail notice nothing
+            mutation, start = MUTATIONS[number], time.monotonic()
+            outcome = "SURVIVES" if survives(folder, mutation) else "killed"
+            if outcome == "killed" and mutation.tests not in sound:
                 sound[mutation.tests] = passed(folder, mutation.tests)
-            alive = alive or not sound[mutation.tests]
-            survivors += alive
-            outcome = "SURVIVES" if alive else "killed"
-            sys.stdout.write(f"{number:3} {outcome:8}  {mutation.file}: {mutation.new.strip()}\n")
+            if not sound.get(mutation.tests, True):  # tests that always fail notice nothing
+                outcome = "NOT RUN"
+            outcomes[outcome] += 1
+            seconds = time.monotonic() - start
+            sys.stdout.write(
+                f"{number:3} {outcome:8} {seconds:4.0f} s  {mutation.file}: {mutation.new.strip()}\n"
+            )
             sys.stdout.flush()
-    return survivors
+    counts = ", ".join(f"{outcomes[word]} {word.lower()}" for word in ("killed", "SURVIVES", "NOT RUN"))
+    sys.stdout.write(f"{counts}, {time.monotonic() - begin:.0f} s\n")
+    return outcomes.total() - outcomes["killed"]
 
 
 if __name__ == "__main__":
