@@ -76,6 +76,19 @@ def test_one_step_of_central_differences_damps_the_velocity_at_its_middle():
     assert np.abs(C @ (half - old)).max() > 1e-4 * np.abs(M @ a1).max()
 
 
+@pytest.mark.parametrize("rayleigh", [(300.0, 0.0), (0.0, 1e-3), (100.0, 5e-4)])
+def test_damping_shortens_the_critical_step_of_central_differences(rayleigh):
+    """With x = ω h / 2 the limit of stability is x² + 2 ξ x = 1, ξ = α / 2ω + β ω / 2."""
+    free, damped = (
+        model().transient(integrator=kl.CentralDifference(), rayleigh=r).critical_step()
+        for r in ((0.0, 0.0), rayleigh)
+    )
+    omega, (alpha, beta) = 2 / free, rayleigh
+    xi, x = alpha / (2 * omega) + beta * omega / 2, omega * damped / 2
+    assert xi > 0.02
+    assert x * x + 2 * xi * x == pytest.approx(1.0, rel=1e-12)
+
+
 def test_moving_supports_start_with_the_velocity_of_their_function():
     """Differences of order 2 are exact for a parabola, whose slope those of order 1 miss."""
     subject = kl.Model(kl.box(), SOIL)

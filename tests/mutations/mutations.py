@@ -209,7 +209,7 @@ MUTATIONS = [
         "analysis/integrators/central_difference.py",
         "np.sqrt(1 + xi * xi) - xi",
         "np.sqrt(1 + xi * xi) + xi",
-        TRANSIENT,
+        SIGNS,
     ),
     Mutation(
         "analysis/equations_of_motion.py",
