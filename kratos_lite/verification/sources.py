@@ -88,6 +88,11 @@ SOURCES = {
         "closed form by Bessel functions of the equations of linear elasticity in a frame fixed in space; "
         "functions in M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, 1964, chapter 9"
     ),
+    "Coriolis": (
+        "linear elasticity in axes that turn with the body, with Coriolis and centrifugal forces: L. D. "
+        "Landau and E. M. Lifshitz, Mechanics, 3rd ed., Pergamon 1976, section 39; computed with the row, "
+        "wave by wave around the axis, by Galerkin's method with ten polynomials of the radius"
+    ),
     "Dalembert": ("J. d'Alembert's solution of the wave equation, 1747: u = (f(x - c t) + f(x + c t)) / 2"),
     "Polynomials": "exact integrals of polynomials over the unit cube and the unit simplex",
 }

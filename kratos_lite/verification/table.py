@@ -10,11 +10,13 @@ from kratos_lite.verification import (
     bodies_in_motion,
     concentrations,
     macneal_harder,
+    moving_frames,
     moving_material,
     nafems,
     orders,
     patch,
     pressure,
+    rotors,
     shells,
     single_element,
     stepping,
@@ -36,6 +38,8 @@ FAMILIES = (
     stepping,
     bodies_in_motion,
     moving_material,
+    rotors,
+    moving_frames,
 )
 """Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""
 PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for problem in family.PROBLEMS}
