@@ -11,6 +11,7 @@ from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
 from kratos_lite.solvers import Solution
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.time_series import slope_of
 
 SOIL = kl.Isotropic3D(E=1e7, nu=0.3, density=2000.0)
@@ -111,6 +112,14 @@ def test_the_slope_of_a_table_at_a_kink_is_the_mean_of_both_sides():
 
 def test_the_slope_of_a_function_at_the_start_looks_forward_and_is_exact_for_a_parabola():
     assert slope_of(lambda t: 3 + 2 * t + 5 * t * t, "a rate")(0.0) == pytest.approx(2.0, abs=1e-8)
+
+
+def test_rigid_body_modes_are_translations_and_turns_about_the_center():
+    X, center = np.random.default_rng(5).uniform(-1, 1, (4, 3)), np.array([0.3, -0.2, 0.7])
+    modes = rigid_modes(X, center).reshape(4, 3, 6)
+    for axis, e in enumerate(np.eye(3)):
+        np.testing.assert_allclose(modes[:, :, axis], np.tile(e, (4, 1)), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(modes[:, :, 3 + axis], np.cross(e, X - center), rtol=0, atol=1e-15)
 
 
 def test_a_single_force_is_out_of_balance():

@@ -402,7 +402,7 @@ MUTATIONS = [
         "solvers/constraint_map.py",
         "R[:, 0, 4], R[:, 2, 4] = z, -x",
         "R[:, 0, 4], R[:, 2, 4] = z, x",
-        "tests/robustness/test_bad_models.py",
+        SIGNS,
     ),
     Mutation(
         "solvers/constrained_system.py",
