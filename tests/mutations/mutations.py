@@ -344,7 +344,7 @@ MUTATIONS = [
         "bodies/loads/forces.py",
         "return self.stiffness * elongation + self.damping * rate",
         "return self.stiffness * elongation - self.damping * rate",
-        BODY_LOADS,
+        MECHANICS + " -k spring",
     ),
     Mutation(
         "bodies/loads/forces.py",
@@ -356,7 +356,7 @@ MUTATIONS = [
         "bodies/loads/forces.py",
         "push = -across * np.eye(3) - (along - across) * np.outer(n, n)",
         "push = -across * np.eye(3) + (along - across) * np.outer(n, n)",
-        "tests/bodies/test_equilibrium.py",
+        "tests/bodies/test_tangents_of_loads.py",
     ),
     Mutation(
         "bodies/constraints/fixed.py",
