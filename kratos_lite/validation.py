@@ -143,7 +143,7 @@ def read_only(array: AnyArray) -> AnyArray:
     >>> read_only(np.zeros(3)).flags.writeable
     False
     """
-    if array.flags.writeable or array.base is not None:
+    if array.flags.writeable or not array.flags.owndata:
         array = array.copy()
         array.flags.writeable = False
     return array

@@ -116,8 +116,11 @@ class Result:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""
         if not isinstance(at, Located):
             return self.mesh.locate(at, required=True)
-        if at.mesh.points.shape != self.mesh.points.shape or at.rows.max(initial=-1) >= self.mesh.n_elements:
-            raise InputError("the points are located in another mesh; take that of the result")
+        if at.mesh is not self.mesh:
+            raise InputError(
+                "these points were located in another mesh; locate them in that of the result, as in "
+                "result.stress(at=result.mesh.locate(points))"
+            )
         return at.require()
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:

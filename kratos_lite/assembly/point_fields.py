@@ -8,8 +8,9 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import STRAIN
+from kratos_lite.elements.overridden_steps import STRAIN, strain_of
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located
@@ -60,5 +61,19 @@ def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
             f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "
             "ask for at='gauss'"
         )
+    if not element.inherits("B_at_gauss_points", "strain"):
+        _check_B(element(X[0], group.rule), group.material.C)
     placed = zip(X, xi, u, strict=True)
     return np.array([element(x, group.rule).B(t) @ v.ravel() for x, t, v in placed])
+
+
+def _check_B(cell: KinematicLinear, C: Array) -> None:
+    """Raise InputError if B of an element is not that of its strain at the Gauss points."""
+    u = np.random.default_rng(3).uniform(-1, 1, cell.X.shape)
+    strain = strain_of(cell, u, C)
+    miss = np.abs(np.array([cell.B(xi) @ u.ravel() for xi in cell.rule.points]) - strain).max()
+    if not miss <= 1e-8 * np.abs(strain).max():
+        raise InputError(
+            f"B(xi) of {type(cell).__name__} is not that of its strain at the Gauss points; "
+            "make both alike, or ask for at='gauss'"
+        )

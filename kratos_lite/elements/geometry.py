@@ -32,6 +32,7 @@ class PlacedCell:
     shape: ClassVar[type[Shape]]
     nodes: ClassVar[Array]
     rule: Rule
+    batched: ClassVar[bool] = True
 
     def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
         name = type(self).__name__

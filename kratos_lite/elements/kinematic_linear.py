@@ -69,7 +69,8 @@ class KinematicLinear(CellMass):
     Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
 
     The steps of an element are ``N, dN → J → dNdX → B → B_at_gauss_points → strain → stress → internal_load →
-    stiffness``; a class that overrides one has all later ones follow from it, in every analysis.  Short ways
+    stiffness``; a class that overrides one has all later ones follow from it, in every analysis.  Its methods
+    take one element at a time, X (n, 3), unless it states ``batched = True``.  Short ways
     (gradients, constant Jacobians, compiled kernels) are taken only where a class inherits every step that
     they stand for.
 
@@ -83,6 +84,7 @@ class KinematicLinear(CellMass):
     """
 
     aliases: ClassVar[tuple[str, ...]] = ()
+    batched: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -32,6 +32,7 @@ class CellMass(PlacedCell):
     """Volume, body forces and mass of a cell, by rules that are exact for its shape and geometry."""
 
     mass_rule: ClassVar[Rule | None] = None
+    batched: ClassVar[bool] = True
 
     @classmethod
     def mass_rules(cls, kinds: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:

@@ -1,4 +1,4 @@
-"""Own steps: methods that an element class overrides, run for many elements even if written for one.
+"""Overridden steps: methods that an element class overrides, run for many elements even if written for one.
 
 Whoever computes with many elements takes strain, stress, internal load and stiffness from here.
 """
@@ -6,6 +6,8 @@ Whoever computes with many elements takes strain, stress, internal load and stif
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ STRESS = (*STRAIN, "stress")
 MECHANICS = (*STRESS, "internal_load", "stiffness", "stiffness_by_axis")
 """Steps to the stiffness, but for the geometry."""
 
+METHODS = (FunctionType, classmethod, staticmethod, property, cached_property)
 SAME = 1e-10
 """Relative difference up to which a value is the same, computed for many elements or for one."""
 LINEAR = 1e-8
@@ -28,42 +31,48 @@ SYMMETRIC = 1e-8
 """Relative difference up to which a stiffness is symmetric."""
 
 
+def takes_many(cls: type[Any]) -> bool:
+    """Return whether every class that brings methods states ``batched = True``: they take X (..., n, 3)."""
+    return all(
+        vars(base).get("batched", False)
+        for base in cls.__mro__
+        if any(
+            isinstance(value, METHODS) for name, value in vars(base).items() if name != "__annotate_func__"
+        )
+    )
+
+
 def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Array:
     """Return a step that a class overrides, (..., *tail) for elements (..., n, 3).
 
-    All elements at once where that gives what the first and the last give alone; otherwise one by one, so
-    that a class may be written for one element, X (n, 3).
+    One by one, so that a class may be written for one element, X (n, 3), unless the class is `batched`.
     """
-    X = element.X
+    cls, X = type(element), element.X
     lead, cells = X.shape[:-2], X.reshape(-1, *X.shape[-2:])
     if not lead:
-        return _checked(getattr(element, name)(*given), type(element), name, tail)
+        return _checked(getattr(element, name)(*given), cls, name, tail)
     if not len(cells):
         return np.zeros((*lead, *tail))
     cut = [_by_element(value, lead) for value in given]
-    placed, at_once = element.__dict__.setdefault("_one_by_one", ({}, {}))
+    placed, compared = element.__dict__.setdefault("_one_by_one", ({}, set()))
 
     def alone(e: int) -> Array:
         if e not in placed:
-            placed[e] = type(element)(cells[e], element.rule)
-        return _checked(getattr(placed[e], name)(*[value(e) for value in cut]), type(element), name, tail)
+            placed[e] = cls(cells[e], element.rule)
+        return _checked(getattr(placed[e], name)(*[value(e) for value in cut]), cls, name, tail)
 
-    if name not in at_once:
-        many = _at_once(element, name, len(cells), tail, given)
-        at_once[name] = all(_same(many[e], alone(e)) for e in (0, len(cells) - 1))
-    elif at_once[name]:
-        many = _at_once(element, name, len(cells), tail, given)
-    if not at_once[name]:
-        many = np.stack([alone(e) for e in range(len(cells))])
-    return many.reshape(*lead, *tail)
-
-
-def _at_once(element: Any, name: str, count: int, tail: tuple[int, ...], given: tuple[Any, ...]) -> Array:
-    """Return a step of all elements (count, *tail); not numbers, if the class cannot give it."""
-    try:
-        return np.asarray(getattr(element, name)(*given), dtype=float).reshape(count, *tail)
-    except Exception:  # of any kind, as the class may be written for one element
-        return np.full((count, *tail), np.nan)
+    if not takes_many(cls):
+        return np.stack([alone(e) for e in range(len(cells))]).reshape(*lead, *tail)
+    many = _checked(getattr(element, name)(*given), cls, name, (*lead, *tail))
+    if name not in compared:
+        compared.add(name)
+        rows = many.reshape(-1, *tail)
+        if not all(_same(rows[e], alone(e)) for e in (0, len(cells) - 1)):
+            raise InputError(
+                f"{cls.__name__}.{name} gives other values for many elements than for one; write it for "
+                "X (..., n, 3), or leave out batched = True"
+            )
+    return many
 
 
 def _by_element(value: Any, lead: tuple[int, ...]) -> Callable[[int], Any]:
@@ -78,14 +87,15 @@ def _checked(value: Any, cls: type[Any], name: str, tail: tuple[int, ...]) -> Ar
     array = np.asarray(value, dtype=float)
     if array.shape != tail:
         raise InputError(
-            f"{cls.__name__}.{name} must return shape {tail} for one element; got {array.shape}; "
+            f"{cls.__name__}.{name} must return shape {tail} here; got {array.shape}; "
             "see docs/add-an-element.md"
         )
     return array
 
 
 def _same(many: Array, one: Array) -> bool:
-    return bool((np.abs(many - one) <= SAME * np.abs(one).max(initial=0.0)).all())
+    """Whether two values agree; what is no number is found elsewhere."""
+    return bool((~(np.abs(many - one) > SAME * np.abs(one).max(initial=0.0))).all())
 
 
 def columns(element: Any, name: str, values: Callable[[Array], Array]) -> Array:

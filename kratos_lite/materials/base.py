@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from functools import cached_property
+from itertools import product
 from sys import float_info
 from typing import Any, ClassVar
 
@@ -22,9 +23,12 @@ MATERIALS: Registry[type[LinearMaterial]] = Registry("material")
 
 SAME_STRESS = 1e-8
 """Relative difference up to which a stress is C strain."""
-_DIRECTIONS = np.vstack([np.eye(6), -np.eye(6), [[1.0, -0.7, 0.4, 0.9, -0.3, 0.6]]])
-SAMPLES: Array = np.vstack([size * _DIRECTIONS for size in (1e-6, 1e-3, 1e-1)])
-"""Strains (k, 6), small and large, of both signs, at which the stress of a material is tried."""
+
+
+def _samples() -> Array:
+    """Return strains (k, 6) of three sizes and of all signs, alike and unlike in size."""
+    signs = np.array(list(product((0.0, 1.0, -1.0), repeat=6)))[1:]
+    return np.vstack([size * signs * (1.0, 0.7, 0.4, 0.9, 0.3, 0.6) for size in (1e-6, 1e-3, 1e-1)])
 
 
 class LinearMaterial:
@@ -169,18 +173,19 @@ class LinearMaterial:
     @cached_property
     def _stress_is_checked(self) -> bool:
         name = type(self).__name__
+        strains = _samples()
         try:
-            found = np.asarray(self.stress(SAMPLES), dtype=float)
-            if found.shape != SAMPLES.shape:
+            found = np.asarray(self.stress(strains), dtype=float)
+            if found.shape != strains.shape:
                 raise ValueError(f"it returned shape {found.shape}")
         except (ValueError, TypeError, IndexError) as error:
-            text = f"{name}.stress(strain) must take strains (..., 6); of {SAMPLES.shape}: {error}"
+            text = f"{name}.stress(strain) must take strains (..., 6); of {strains.shape}: {error}"
             raise MaterialError(text) from None
-        expected = SAMPLES @ self.C.T
+        expected = strains @ self.C.T
         miss = np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)
         k = int(np.argmax(np.where(np.isnan(miss), np.inf, miss)))
         if not miss[k] <= SAME_STRESS:
-            values = (", ".join(f"{x:.6g}" for x in row) for row in (SAMPLES[k], found[k], expected[k]))
+            values = (", ".join(f"{x:.6g}" for x in row) for row in (strains[k], found[k], expected[k]))
             strain, stress, linear = values
             raise MaterialError(
                 f"{name}.stress is not C strain: at the strain ({strain}) it gives ({stress}) Pa, C gives "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -64,6 +64,8 @@ class Block:
         if shape is None and name in ELEMENTS:
             shape = ELEMENTS[name].shape
         width = "k" if shape is None else len(shape.nodes)
+        if isinstance(nodes, list) and not nodes and shape is not None:
+            nodes = np.zeros((0, len(shape.nodes)), dtype=np.int32)
         vars(self).update(name=name, shape=shape, nodes=_column(name, "nodes", nodes, ("m", width), np.int32))
         if self.nodes.min(initial=0) < 0:
             raise MeshError(f"block {name}: nodes are rows of points, from 0; got {self.nodes.min()}")
@@ -78,6 +80,9 @@ class Block:
 
     def __len__(self) -> int:
         return len(self.nodes)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies are read-only as well
+        return Block, tuple(getattr(self, column.name) for column in fields(self))
 
     def take(self, chosen: Ints | Mask) -> Block:
         """Return the block of some of the cells.
@@ -154,6 +159,9 @@ class Part:
         for name in ("nodes", "elements", "conditions", "geometries", "constraints"):
             what = f"{name} of a part"
             vars(self)[name] = read_only(whole_numbers(getattr(self, name), what, ("k",), error=MeshError))
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies are read-only as well
+        return Part, tuple(getattr(self, column.name) for column in fields(self))
 
     def __str__(self) -> str:
         sizes = {"nodes": self.nodes, "elements": self.elements, "conditions": self.conditions}

@@ -92,6 +92,13 @@ class Mesh:
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise MeshError(f"a mesh does not change; make another one, as in mesh = mesh.replace({name}=...)")
 
+    def __delattr__(self, name: str) -> NoReturn:
+        self.__setattr__(name, None)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
+        state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
+        return _remade, state
+
     def _check(self) -> None:
         """Raise MeshError for ids that occur twice, and for rows of cells and parts that do not exist."""
         if not self._is_counting:
@@ -422,3 +429,8 @@ class Mesh:
         inside[self.nodes(where)] = True
         chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
+
+
+def _remade(points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str) -> Mesh:
+    """Return a mesh from what it was made of."""
+    return Mesh(points, blocks, node_ids=node_ids, conditions=conditions, parts=parts, source=source)

@@ -205,6 +205,10 @@ def test_a_point_outside_the_mesh_is_an_error_that_says_how_far():
             method(at=[[0.5, 0.5, 0.5], [2.0, 0.5, 0.5]])
     with pytest.raises(kl.InputError, match="located in another mesh"):
         result.stress(at=kl.box(cells=(2, 1, 1)).locate([0.5, 0.5, 0.5]))
+    larger = result.mesh.replace(points=result.mesh.points * 10)  # of the same size, but with other gradients
+    for method in (result.stress, result.strain, result.von_mises, result.displacement):
+        with pytest.raises(kl.InputError, match="these points were located in another mesh"):
+            method(at=larger.locate([0.5, 0.5, 0.5]))
     with pytest.raises(kl.InputError, match="not both"):
         result.displacement("x-", at=[0.5, 0.5, 0.5])
 

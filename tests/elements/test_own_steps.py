@@ -329,12 +329,49 @@ def test_a_stiffness_that_is_not_that_of_the_stresses_is_refused():
         cantilever("Soft8N").solve()
 
 
+def test_steps_for_one_element_see_their_own_element():
+    class Hole8N(PLAIN):
+        def B(self, xi):
+            soft = 0.4 < self.X[:, 0].mean() < 0.6
+            return super().B(xi) * (0.1 if soft else 1.0)
+
+    model = kl.Model(kl.box(cells=(5, 1, 1), element="Hole8N"), kl.Isotropic3D(E=1e6, nu=0.0))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e3, 0, 0)))
+    tip = model.solve().u[:, 0].max()
+    assert abs(tip - 1e-3 * (0.8 + 0.2 * 100)) < 1e-12  # K of the middle one is a hundredth
+
+
+def test_a_batched_step_that_is_not_one_is_refused():
+    class First8N(PLAIN):
+        batched = True
+
+        def B(self, xi):
+            return super().B(xi) * (1 + self.X.reshape(-1, 3)[0, 0] + self.X.reshape(-1, 3)[-1, 0])
+
+    with pytest.raises(kl.InputError, match="gives other values for many elements than for one"):
+        cantilever("First8N").solve()
+
+
+def test_an_own_b_that_is_not_that_of_the_gauss_points_gives_no_stress_at_points():
+    class Two8N(PLAIN):
+        def B(self, xi):
+            return super().B(xi)
+
+        def B_at_gauss_points(self, C=None):
+            return 2 * super().B_at_gauss_points(C)
+
+    result = cantilever("Two8N").solve()
+    with pytest.raises(kl.InputError, match="is not that of its strain at the Gauss points"):
+        result.stress(at=[result.mesh.points.mean(axis=0)])
+
+
 def test_a_step_of_the_wrong_shape_is_refused():
     class Flat8N(PLAIN):
         def B(self, xi):
             return super().B(xi)[..., :5, :]
 
-    with pytest.raises(kl.InputError, match=r"Flat8N.B must return shape \(6, 24\) for one element"):
+    with pytest.raises(kl.InputError, match=r"Flat8N.B must return shape \(6, 24\) here"):
         cantilever("Flat8N").solve()
 
 

@@ -130,3 +130,16 @@ def test_the_equilibrium_of_a_report_is_that_of_the_stresses_of_the_result():
     size = np.abs(result.loads).sum() + np.abs(result.reactions).sum()
     assert miss / size < 1e-12
     assert result.report.force_error < 1e-12
+
+
+def test_a_stress_that_differs_where_two_strains_are_positive_alone_is_refused():
+    with MATERIALS.temporary():
+
+        class Bilinear(kl.Isotropic3D):
+            def stress(self, strain):
+                both = (strain[..., 0] > 0) & (strain[..., 1] > 0)
+                return np.where(both[..., None], 0.5, 1.0) * super().stress(strain)
+
+    model = kl.Model(kl.box(), Bilinear(E=1e6, nu=0.0, density=1.0))
+    with pytest.raises(kl.MaterialError, match=r"Bilinear\.stress is not C strain"):
+        model.modes(1)

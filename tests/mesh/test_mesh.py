@@ -1,5 +1,8 @@
 """Mesh: choosing nodes and elements, faces, orientation."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -97,3 +100,59 @@ def test_parts_are_given_by_places_and_written_by_their_names(tmp_path):
             mesh.add_part(name, where)
     with pytest.raises(kl.MeshError, match="a part is known by its name"):
         mesh.part(3)
+
+
+DUPLICATES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    **{f"pickle {k}": lambda x, k=k: pickle.loads(pickle.dumps(x, k)) for k in (2, pickle.HIGHEST_PROTOCOL)},
+}
+
+
+@pytest.mark.parametrize("duplicate", DUPLICATES.values(), ids=DUPLICATES)
+def test_copies_of_meshes_are_read_only_with_parts_of_their_own(duplicate):
+    mesh = kl.Mesh(
+        kl.box(cells=(2, 1, 1)).points,
+        [kl.Block("KinematicLinear3D8N", kl.box(cells=(2, 1, 1)).blocks[0].nodes, [7, 4], [1, 2])],
+        node_ids=np.arange(12)[::-1] + 3,
+        parts={"rim": kl.Part(nodes=[1, 2], data={"TIME": 2.0})},
+        source="rim.mdpa",
+    )
+    mesh.boundary  # what is computed once does not come along writable  # noqa: B018
+    other = duplicate(mesh)
+    block, part = other.blocks[0], other.parts["rim"]
+    assert (other.points == mesh.points).all()
+    assert (other.node_ids == mesh.node_ids).all()
+    assert (block.nodes == mesh.blocks[0].nodes).all()
+    assert (block.ids.tolist(), block.properties.tolist()) == ([7, 4], [1, 2])
+    assert (part.nodes.tolist(), part.data, other.source) == ([1, 2], {"TIME": 2.0}, "rim.mdpa")
+    single = [array for x in (block, part) for array in vars(duplicate(x)).values()]
+    for array in (other.points, other.node_ids, *vars(block).values(), *vars(part).values(), *single):
+        assert not isinstance(array, np.ndarray) or not array.flags.writeable
+    other.add_part("top", "z+")
+    assert "top" not in mesh.parts
+
+
+def test_nothing_of_a_mesh_is_deleted():
+    mesh = kl.box()
+    with pytest.raises(kl.MeshError, match=r"a mesh does not change.*replace\(points="):
+        del mesh.points
+    assert mesh.n_nodes == 8
+
+
+def test_a_read_only_view_of_memory_that_changes_is_copied():
+    memory = np.array([[0, 1, 2, 3]], dtype=np.int32)
+    ids = np.array([5, 6, 7, 8])
+    views = memory[:], ids[:]
+    for view in views:
+        view.flags.writeable = False
+    mesh = kl.Mesh(np.eye(4, 3), {"KinematicLinear3D4N": views[0]}, node_ids=views[1])
+    memory[:], ids[:] = 3, 9
+    assert mesh.blocks[0].nodes.tolist() == [[0, 1, 2, 3]]
+    assert mesh.node_ids.tolist() == [5, 6, 7, 8]
+
+
+def test_a_block_without_cells_is_an_empty_list_too():
+    for nodes in ([], np.zeros((0, 8), dtype=int)):
+        mesh = kl.Mesh([[0, 0, 0]], {"KinematicLinear3D8N": nodes})
+        assert (mesh.n_elements, mesh.blocks[0].nodes.shape) == (0, (0, 8))
