@@ -9,12 +9,18 @@ from typing import Any, TypeVar, overload
 import numpy as np
 
 from kratos_lite.bodies.body import BODIES, Body
+from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.rotations import polar
 from kratos_lite.bodies.validation import mass_properties_of
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.typing import Array
+from kratos_lite.validation import instance
 
 _log = logging.getLogger("kratos_lite")
 ROUND_OFF = 1e-12
 """Share of the angular momentum that is not worth a correction."""
+SAME_SHAPE = 1e-9
+"""Share of the size of a body by which nodes of the same shape may differ."""
 
 Kind = TypeVar("Kind", bound=Body)
 
@@ -47,8 +53,8 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     Raises
     ------
     InputError, ModelError
-        The kind is unknown, the body has no mesh, or its mass properties were given and are not those of the
-        mesh that a finite-element body takes them from.
+        What is given is no body, the kind is unknown, the body has no mesh, or its mass properties were given
+        and are not those of the mesh that a finite-element body takes them from.
 
     Examples
     --------
@@ -59,6 +65,7 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     >>> print(f"{rigid.kinetic_energy():.3f} J, {soft.kinetic_energy():.3f} J")
     1160.047 J, 1160.047 J
     """
+    instance(body, "what is converted", Body, "kl.RigidBody(mesh, material)")
     if isinstance(kind, str):
         kind = BODIES[kind]
     if not (isinstance(kind, type) and issubclass(kind, Body) and kind.convertible):
@@ -75,6 +82,8 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     _turn(other, body.angular_momentum())
     other.time, other.step = body.time, body.step
     other.external_work = np.array(body.external_work)
+    if isinstance(other, Deformable):  # that a rigid body has no deformation goes without saying
+        _warn_of_lost_shape(body, other, F, center)
     for what, held in (("loads", body.loads), ("constraints", body.constraints)):
         if held:
             _log.warning("%d %s of the %s body do not go along; add them anew", len(held), what, body.kind)
@@ -104,6 +113,25 @@ def _made(body: Body, kind: type[Body], options: dict[str, Any]) -> Body:
                 "a %s body has no integrator %s: it takes %s", kind.kind, integrator, other.integrator
             )
     return other
+
+
+def _warn_of_lost_shape(body: Body, other: Body, F: Array, center: Array) -> None:
+    """Log which share of the displacement that deforms a body does not go along."""
+    assert body.mesh is not None
+    X = body.mesh.points
+    x = body.position(X)
+    lost = np.linalg.norm(x - other.position(X), axis=1)
+    if lost.max() <= SAME_SHAPE * float(np.ptp(X, axis=0).max()):
+        return
+    rigid = center + (X - body.center) @ polar(F).T
+    _log.warning(
+        "%.2g %% of the displacement that deforms the %s body, up to %.3g m, does not go along: "
+        "a %s body takes the affine part alone",
+        100 * np.linalg.norm(lost) / np.linalg.norm(x - rigid),
+        body.kind,
+        lost.max(),
+        other.kind,
+    )
 
 
 def _check_mass(body: Body, kind: type[Body]) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
+from kratos_lite.bodies.finite_element import FiniteElementBody
+from kratos_lite.bodies.formulations.modal import Modal
 from kratos_lite.bodies.linear_algebra import Entries, sum_of
 from kratos_lite.errors import InputError, ModelError, SolveError
 from kratos_lite.typing import Array, Progress
@@ -29,8 +31,9 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Parameters
     ----------
-    body : pseudo-rigid or finite-element, held by constraints or springs.  A `Callback` that depends on the
-        configuration counts as a load without a derivative, and must be weak beside the other stiffness.
+    body : pseudo-rigid or finite-element, not modal, held by constraints or springs.  A `Callback` that
+        depends on the configuration counts as a load without a derivative, and must be weak beside the other
+        stiffness.
     progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
 
     Returns
@@ -40,7 +43,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     Raises
     ------
     ModelError
-        A rigid body, or a constraint on velocities.
+        A rigid or a modal body, or a constraint on velocities.
     SolveError
         There is no equilibrium near by: the body is not held, or it buckles.
 
@@ -59,6 +62,11 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     """
     if not isinstance(body, Deformable) or body.q.ndim > 1:
         raise ModelError(f"find_equilibrium is for a single deformable body; got {body!r}")
+    if isinstance(body, FiniteElementBody) and isinstance(body.formulation, Modal):
+        raise ModelError(
+            "find_equilibrium is not for modal bodies, which have no statics here; "
+            "take formulation='total_lagrangian' or 'corotational'"
+        )
     for constraint in body.constraints:
         if not constraint.positional:
             raise ModelError(

@@ -9,7 +9,7 @@ from math import inf, isfinite
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
-from kratos_lite.errors import KratosLiteError
+from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.verification.meshes import kind_of
 from kratos_lite.verification.sources import SOURCES
 
@@ -78,11 +78,24 @@ class Problem:
         return ("",) if self.takes is None else tuple(filter(self.takes, wanted))
 
     def row(self, element: str) -> Row:
-        """Find the value for an element; an error of the library becomes a row that fails."""
+        """Find the value for an element; an error of the library becomes a row that fails.
+
+        Raises
+        ------
+        InputError
+            An element that is not of the library raises any other error.
+        """
         try:
             value, note = float(self.of(element)), ""
         except KratosLiteError as error:
             value, note = float("nan"), str(error)
+        except Exception as error:
+            if element in ("", *ELEMENTS):
+                raise
+            raise InputError(
+                f"{element} raises {type(error).__name__}: {error}, in {self.name}; "
+                "'kratos-lite check' of its file says where"
+            ) from error
         return Row(self, element, value, note=note)
 
 

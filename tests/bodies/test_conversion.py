@@ -174,3 +174,32 @@ def test_a_body_without_a_mesh_stays_what_it_is():
     top = kl.RigidBody(mass_properties=kl.MassProperties(mass=1.0, inertia=np.eye(3)))
     with pytest.raises(kl.ModelError, match="only a single body with a mesh and a material"):
         kl.convert(top, kl.PseudoRigidBody)
+
+
+@pytest.mark.parametrize("given", [None, "rigid", kl.box(), kl.RigidBody])
+def test_what_is_no_body_is_not_converted(given):
+    with pytest.raises(kl.InputError, match="what is converted must be a Body, such as"):
+        kl.convert(given, "rigid")
+
+
+@pytest.mark.parametrize("options", [{}, {"formulation": "modal"}])
+def test_the_share_of_the_deformation_that_stays_behind_is_reported(options, caplog):
+    """z = 0 … 4 m bends by a z² off the axis, beside a rotation; the affine part is the nearest one."""
+    mesh = kl.box((1, 1, 4), cells=(1, 1, 4), origin=(3, 0, 1))
+    body = kl.FiniteElementBody(mesh, kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0))
+    X = mesh.points
+    bent = X + np.outer(0.05 * X[:, 2] ** 2, [1, 0, 0])
+    body.set_configuration(bent - X)
+    kl.convert(body, kl.FiniteElementBody, **options)
+    body.set_configuration(bent @ exp([0.4, 1.0, -0.6]).T - X)
+    other = kl.convert(body, kl.FiniteElementBody, **options)
+    straight, record = caplog.records
+    assert record.args[0] == pytest.approx(straight.args[0], rel=1e-6)  # a rotation is no deformation
+    percent, largest = record.args[0], record.args[2]
+    lost = np.linalg.norm(other.position(X) - body.position(X), axis=1)
+    assert largest == pytest.approx(lost.max(), rel=1e-12)
+    assert 1 < percent < 100
+    assert "of the displacement that deforms the finite-element body, up to" in record.getMessage()
+    caplog.clear()
+    kl.convert(other, kl.PseudoRigidBody)
+    assert not caplog.records

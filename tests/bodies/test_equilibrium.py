@@ -240,6 +240,10 @@ def test_equilibrium_takes_a_following_pressure():
     [
         (lambda: cube(kind=kl.RigidBody), "single deformable body"),
         (lambda: kl.Obstacle(kl.box()), "single deformable body"),
+        (
+            lambda: cube(formulation="modal"),
+            "modal bodies.*take formulation='total_lagrangian' or 'corotational'",
+        ),
     ],
 )
 def test_bodies_without_equilibrium(body, words):

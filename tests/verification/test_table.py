@@ -207,6 +207,14 @@ def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
     assert "| uniaxial | Stiff8N |" in Path("own.md").read_text()
 
 
+def test_an_error_of_ones_own_element_is_named_with_exit_code_2(folder, capsys):
+    Path("own.py").write_text(OWN.format(name="Zero8N", more="    def B(self, xi):\n        return 1 / 0"))
+    assert main(["verify", "own.py", "element/uniaxial"]) == 2
+    err = capsys.readouterr().err
+    assert "error: Zero8N raises ZeroDivisionError: division by zero, in element/uniaxial" in err
+    assert "internal error" not in err
+
+
 def test_the_command_lists_and_refuses(folder, capsys):
     assert main(["verify", "--list", "shells"]) == 0
     out = capsys.readouterr().out
