@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
+from kratos_lite.analysis.error_estimate import ErrorEstimate
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
+from kratos_lite.assembly.energy_error import squared_differences
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.assembly.nodal_values import averages
 from kratos_lite.assembly.point_fields import at_located
@@ -300,6 +302,29 @@ class Result:
         In J.
         """
         return self._totals[0]
+
+    # ---- error ---------------------------------------------------------------------------------
+
+    def error(self) -> ErrorEstimate:
+        """Return an estimate of the error in the energy norm.
+
+        The recovered nodal stresses take the place of the exact ones.  Source: Zienkiewicz & Zhu,
+        Int. J. Numer. Meth. Eng. 24 (1987) 337-357.
+
+        Returns
+        -------
+        ErrorEstimate
+            In total, relative and of each element, with what speaks against trusting it.
+        """
+        return self._error
+
+    @cached_property
+    def _error(self) -> ErrorEstimate:
+        points, u = self.mesh.points, self._strained
+        squares = squared_differences(points, self.groups, u, self._nodal_stress, self.mesh.n_elements)
+        total = float(squares.sum())
+        size = 2 * self.energy() + total
+        return ErrorEstimate(total**0.5, (total / size) ** 0.5 if size else 0.0, np.sqrt(squares))
 
     # ---- out -----------------------------------------------------------------------------------
 
