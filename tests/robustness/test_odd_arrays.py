@@ -104,11 +104,11 @@ CASES: Case = {
     ("annulus", "cells"): (lambda v: kl.annulus(1, 2, 1, v).points, (1, 4, 1)),
     ("Structure.fix", "where"): (lambda v: changed("fix", v), NODES),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
-    ("Structure.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
-    ("Structure.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
-    ("Structure.add_prestress", "stress"): (lambda v: changed("add_prestress", v), STRESS),
-    ("Structure.add_prestress", "where"): (lambda v: changed("add_prestress", STRESS, v), [0]),
-    ("Structure.stress_free_at", "displacement"): (
+    ("Solid.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
+    ("Solid.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
+    ("Solid.add_prestress", "stress"): (lambda v: changed("add_prestress", v), STRESS),
+    ("Solid.add_prestress", "where"): (lambda v: changed("add_prestress", STRESS, v), [0]),
+    ("Solid.stress_free_at", "displacement"): (
         lambda v: changed("stress_free_at", v),
         1e-3 * CUBE.points[:, ::-1],
     ),
