@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part, blocks_of, ids_of, rows_of_ids, select
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.selection import (
     Where,
@@ -42,6 +43,7 @@ class Mesh:
     conditions : condition blocks.
     parts : named parts; a child of part ``A`` is named ``A.b``.
     source : name of the file it came from, used in messages.
+    hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
 
     Raises
     ------
@@ -62,6 +64,7 @@ class Mesh:
     blocks: tuple[Block, ...]
     conditions: tuple[Block, ...]
     source: str
+    hanging: HangingNodes | None
     _parts: dict[str, Part]
 
     def __init__(
@@ -73,6 +76,7 @@ class Mesh:
         conditions: Mapping[str, ArrayLike] | Sequence[Block] = (),
         parts: Mapping[str, Part] | None = None,
         source: str = "",
+        hanging: HangingNodes | None = None,
     ) -> None:
         X = finite(points, "points", ("n", 3), error=MeshError)
         n = len(X)
@@ -86,6 +90,7 @@ class Mesh:
                 instance(parts or {}, "parts", Mapping, "{'top': kl.Part(nodes=[4, 5])}", error=MeshError)
             ),
             source=source,
+            hanging=hanging,
         )
         self._check()
 
@@ -97,7 +102,7 @@ class Mesh:
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
         state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
-        return _remade, state
+        return _remade, (*state, self.hanging)
 
     def _check(self) -> None:
         """Raise MeshError for ids that occur twice, and for rows of cells and parts that do not exist."""
@@ -159,6 +164,7 @@ class Mesh:
             conditions=self.conditions if conditions is None else conditions,
             parts=self._parts if parts is None else parts,
             source=self.source,
+            hanging=self.hanging,
         )
 
     # ---- sizes and ids ---------------------------------------------------------------------
@@ -385,7 +391,7 @@ class Mesh:
     @cached_property
     def all_faces(self) -> Faces:
         """All faces of the elements, and which coincide."""
-        return Faces(self.blocks)
+        return Faces(self.blocks, self.hanging)
 
     @property
     def boundary(self) -> list[Block]:
@@ -431,6 +437,16 @@ class Mesh:
         return [block for block in chosen if len(block)]
 
 
-def _remade(points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str) -> Mesh:
+def _remade(
+    points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str, hanging: Any
+) -> Mesh:
     """Return a mesh from what it was made of."""
-    return Mesh(points, blocks, node_ids=node_ids, conditions=conditions, parts=parts, source=source)
+    return Mesh(
+        points,
+        blocks,
+        node_ids=node_ids,
+        conditions=conditions,
+        parts=parts,
+        source=source,
+        hanging=hanging,
+    )
