@@ -2,6 +2,8 @@
 
 from kratos_lite import ale as ale
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
+from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
+from kratos_lite.analysis.error_estimate import QuantityError as QuantityError
 from kratos_lite.analysis.integrators import HHT as HHT
 from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
@@ -14,7 +16,11 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
-from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
+from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
+from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
+from kratos_lite.analysis.quantities import Quantity as Quantity
+from kratos_lite.analysis.quantities import ReactionOf as ReactionOf
+from kratos_lite.analysis.quantities import StressAt as StressAt
 from kratos_lite.analysis.result import Result as Result
 from kratos_lite.analysis.state import State as State
 from kratos_lite.analysis.stepping import integrate as integrate
@@ -40,6 +46,13 @@ from kratos_lite.bodies import Torque as Torque
 from kratos_lite.bodies import convert as convert
 from kratos_lite.bodies import find_equilibrium as find_equilibrium
 from kratos_lite.elements import ELEMENTS as ELEMENTS
+from kratos_lite.elements import BBar3D8N as BBar3D8N
+from kratos_lite.elements import BBar3D10N as BBar3D10N
+from kratos_lite.elements import BBar3D13N as BBar3D13N
+from kratos_lite.elements import BBar3D15N as BBar3D15N
+from kratos_lite.elements import BBar3D20N as BBar3D20N
+from kratos_lite.elements import BBar3D27N as BBar3D27N
+from kratos_lite.elements import EnhancedStrain3D8N as EnhancedStrain3D8N
 from kratos_lite.elements import KinematicLinear as KinematicLinear
 from kratos_lite.elements import KinematicLinear3D4N as KinematicLinear3D4N
 from kratos_lite.elements import KinematicLinear3D5N as KinematicLinear3D5N
@@ -50,6 +63,7 @@ from kratos_lite.elements import KinematicLinear3D13N as KinematicLinear3D13N
 from kratos_lite.elements import KinematicLinear3D15N as KinematicLinear3D15N
 from kratos_lite.elements import KinematicLinear3D20N as KinematicLinear3D20N
 from kratos_lite.elements import KinematicLinear3D27N as KinematicLinear3D27N
+from kratos_lite.elements import Reduced3D20N as Reduced3D20N
 from kratos_lite.errors import InputError as InputError
 from kratos_lite.errors import KratosLiteError as KratosLiteError
 from kratos_lite.errors import MaterialError as MaterialError
