@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import ErrorEstimate
+from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
@@ -21,7 +21,11 @@ from kratos_lite.assembly.point_fields import at_located
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Located, Mesh, Where
 from kratos_lite.typing import Array
-from kratos_lite.validation import choice
+from kratos_lite.validation import choice, instance
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.adjoint import Adjoint
+    from kratos_lite.analysis.quantities import Quantity
 
 At: TypeAlias = "str | ArrayLike | Located"
 """Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
@@ -41,6 +45,7 @@ class Result:
     reactions, loads : (n, 3) nodal forces in N.
     report : what was solved, how, and how well.
     u0 : (n, 3) displacements in m without stress; none if not given.
+    adjoint : solves with the same matrix again, for the errors of quantities.
     """
 
     def __init__(
@@ -52,6 +57,7 @@ class Result:
         loads: Array,
         report: Report,
         u0: Array | None = None,
+        adjoint: Adjoint | None = None,
     ) -> None:
         self.mesh = mesh
         self.groups = list(groups)
@@ -62,6 +68,7 @@ class Result:
             array.setflags(write=False)  # strains and stresses are made of them later
         self.report = report
         self._strained = u if u0 is None else u - u0
+        self._adjoint = adjoint
 
     # ---- nodal values --------------------------------------------------------------------------
 
@@ -305,18 +312,56 @@ class Result:
 
     # ---- error ---------------------------------------------------------------------------------
 
-    def error(self) -> ErrorEstimate:
-        """Return an estimate of the error in the energy norm.
+    @overload
+    def error(self, of: None = None) -> ErrorEstimate: ...
 
-        The recovered nodal stresses take the place of the exact ones.  Source: Zienkiewicz & Zhu,
-        Int. J. Numer. Meth. Eng. 24 (1987) 337-357.
+    @overload
+    def error(self, of: Quantity) -> QuantityError: ...
+
+    def error(self, of: Quantity | None = None) -> ErrorEstimate | QuantityError:
+        """Return an estimate of the error in the energy norm, or of the error of a quantity.
+
+        The recovered nodal stresses take the place of the exact ones.  The error of a quantity takes another
+        solution, of the adjoint; an analysis that is kept has its matrix ready: ``model.static()``.
+        Sources: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24 (1987) 337-357; Becker & Rannacher, Acta
+        Numerica 10 (2001) 1-102.
+
+        Parameters
+        ----------
+        of : a quantity such as `DisplacementAt`, `ReactionOf` or `StressAt`; the energy norm if not given.
 
         Returns
         -------
-        ErrorEstimate
+        ErrorEstimate or QuantityError
             In total, relative and of each element, with what speaks against trusting it.
+
+        Raises
+        ------
+        InputError
+            `of` is no quantity, or the result is not that of a static analysis.
+        MeshError, ModelError
+            The quantity does not fit, or the model has changed since.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> mesh = kl.box((4, 1, 1), (8, 2, 2), "KinematicLinear3D20N")
+        >>> bar = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+        >>> bar.fix("x-")
+        >>> bar.add(kl.Traction("x+", (0, 0, 1.0)))
+        >>> error = bar.solve().error(of=kl.MeanDisplacement("x+", "z"))
+        >>> 0 < error.relative < 0.01
+        True
         """
-        return self._error
+        if of is None:
+            return self._error
+        from kratos_lite.analysis.adjoint import error_of  # a quick start for results
+        from kratos_lite.analysis.quantities import Quantity
+
+        quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
+        if self._adjoint is None:
+            raise InputError("the error of a quantity needs the matrix of a static analysis: model.solve()")
+        return error_of(self, self._adjoint, quantity, self._strained, self._nodal_stress)
 
     @cached_property
     def _error(self) -> ErrorEstimate:

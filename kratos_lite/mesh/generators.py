@@ -10,6 +10,7 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import SIDES, Mesh, Part
+from kratos_lite.mesh.order import raise_order
 from kratos_lite.shapes import Hexahedron8, Shape
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, fits_memory
@@ -51,44 +52,6 @@ def _grid(cells: tuple[int, int, int], with_centers: bool) -> tuple[Array, Ints]
         points = np.vstack([points, points[bricks].mean(axis=1)])
         bricks = np.column_stack([bricks, centers])
     return points, bricks
-
-
-def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
-    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
-
-    Parameters
-    ----------
-    points : (n, 3) float.
-    corners : (m, c) int, corner nodes of each cell in Kratos order.
-    shape : the shape wanted.
-
-    Returns
-    -------
-    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
-    """
-    parents = _parents(shape)
-    if not parents:
-        return points, corners
-    nodes = [corners]
-    for size in sorted({len(p) for p in parents}):
-        group = [p for p in parents if len(p) == size]
-        keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)
-        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
-        nodes.append(len(points) + inverse.reshape(len(corners), len(group)))
-        points = np.vstack([points, points[unique].mean(axis=1)])
-    return points, np.hstack(nodes)
-
-
-def _parents(shape: type[Shape]) -> list[tuple[int, ...]]:
-    """Return the corners whose middle each further node is: edges, then faces, then the cell."""
-    corner = shape.nodes[: shape.corners]
-    groups = [*shape.edges, *(f[: 4 if len(f) > 6 else 3] for f in shape.faces), tuple(range(shape.corners))]
-    middles = [corner[list(g)].mean(axis=0) for g in groups]
-    found = []
-    for node in shape.nodes[shape.corners :]:
-        distance = [np.abs(node - middle).max() for middle in middles]
-        found.append(tuple(groups[int(np.argmin(distance))]))
-    return found
 
 
 def _cells(cells: Sequence[int]) -> tuple[int, int, int]:

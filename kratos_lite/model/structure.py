@@ -18,11 +18,11 @@ from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.solid import Solid
-from kratos_lite.model.supports import AXES, Supports
+from kratos_lite.model.supports import AXES, Fixing, Supports
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, function_or_none
 
 
 class Attachment(ABC):
@@ -99,6 +99,7 @@ class Structure(Solid):
         axes: str = "xyz",
         value: ArrayLike | Callable[[float], float] = 0.0,
         *,
+        field: Callable[[Array], ArrayLike] | None = None,
         override: bool = False,
     ) -> None:
         """Prescribe the displacement of nodes.
@@ -109,6 +110,8 @@ class Structure(Solid):
         axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
         value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
             which statics take at the time 0.
+        field : in place of a value, a function of places (k, 3) in m that returns one row per node or one
+            number per axis in m.  A mesh that is made finer takes its values, others are interpolated.
         override : let this value win over an earlier one for the same degree of freedom.
 
         Raises
@@ -124,10 +127,9 @@ class Structure(Solid):
         if not len(rows):
             what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
             raise ModelError(f"cannot fix {axes}: {what}")
-        if callable(value):
-            self.supports.prescribe_motion(rows, axes, value, override)
-        else:
-            self.supports.fix(rows, axes, value, override)
+        function_or_none(field, "field must be a function of places (k, 3)")
+        known = where if isinstance(where, str) or callable(where) else None
+        self.supports.apply(Fixing(known, rows, axes, value, field, override))
 
     def constrain(
         self,
