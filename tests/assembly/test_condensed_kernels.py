@@ -1,4 +1,4 @@
-"""Kernels of elements that do not lock: thin cells, other rules, materials at the limit, classes of a user."""
+"""Kernels of elements that do not lock: thin cells, other rules, materials at the limit, own classes."""
 
 import numpy as np
 import pytest
