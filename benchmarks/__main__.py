@@ -213,7 +213,7 @@ def references(sizes: Sequence[int]) -> int:
     for name in scenes.ENERGIES:
         found = []
         for n in sizes:
-            scene = scenes.make(name, "27N", sets.scaled(n, name))
+            scene = scenes.make(name, "27N", n)
             u = scene.model.solve(tolerance=1e-11).displacement()
             found.append(float((scene.forces() * u).sum()) / 2)
         a, b, c = found[-3:]

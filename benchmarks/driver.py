@@ -97,6 +97,7 @@ class Driver:
     save: Callable[[list[dict[str, Any]]], None] = list
     absent: dict[str, str] = field(default_factory=dict)
     stems: dict[tuple[str, str, int], Path] = field(default_factory=dict)
+    made: dict[tuple[str, str, int], scenes.Scene] = field(default_factory=dict)
     reference: dict[tuple[str, str, int], tuple[np.ndarray, dict[str, float]]] = field(default_factory=dict)
 
     def measure(self, runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -124,12 +125,13 @@ class Driver:
             return "failed" in row and "variant" not in row
         series = tuple(row[word] for word in ("group", "program", "scene", "kind"))
         larger = [run.n for run in runs if run.series == series and run.n > row["n"]]
-        expected = row["work"] * (min(larger, default=row["n"]) / row["n"]) ** 3
+        expected = row["warm"] * (min(larger, default=row["n"]) / row["n"]) ** 3
         return row["errors"].get("displacement", 1.0) < ENOUGH or expected > self.point
 
     def _forget(self, place: tuple[str, str, int]) -> None:
         """Remove the files and the solution of a scene."""
         self.reference.pop(place, None)
+        self.made.pop(place, None)
         if (stem := self.stems.pop(place, None)) is not None:
             for old in stem.parent.glob(f"{stem.name}.*"):
                 old.unlink()
@@ -183,7 +185,8 @@ class Driver:
             if run.task == "ale":
                 self.stems[run.place] = ale.write(self.folder, run.kind, run.n)
             elif run.n < LARGE:
-                self.stems[run.place] = scenes.write(scenes.make(*run.place), self.folder)
+                self.made[run.place] = scenes.make(*run.place)
+                self.stems[run.place] = scenes.write(self.made[run.place], self.folder)
             else:
                 words = [*map(str, run.place), str(self.folder)]
                 command = [sys.executable, "-m", "benchmarks.scenes", *words]
@@ -255,7 +258,8 @@ class Driver:
         if not dict(run.options).get("errors"):
             return {"difference": difference}
         if not exact or difference > 0.01 * exact["displacement"]:  # else its error is the same within 1 %
-            exact = exact | errors.errors(scenes.make(run.scene, run.kind.split()[0], run.n), u)
+            plain = run.scene, run.kind.split()[0], run.n
+            exact = exact | errors.errors(self.made.get(plain) or scenes.make(*plain), u)
             self.reference[run.place] = (known, self.reference[run.place][1] or exact)
         return {"difference": difference} | exact
 

@@ -13,22 +13,37 @@ from benchmarks.programs import PROGRAMS
 from benchmarks.scenes import KINDS
 from benchmarks.tables import ADAPTIVE
 
-ERROR_SCENES = (
-    "manufactured", "sphere", "bending", "l_domain", "cavity", "hole_incompressible", "cantilever", "cook",
-    "block",
-)  # fmt: skip
 CURVED = ("sphere", "cavity", "hole_incompressible")
 """Scenes where quadratic elements have curved edges."""
-LINEAR, QUADRATIC = (4, 8, 16, 24, 32, 48, 64), (1, 2, 4, 6, 9, 13, 19, 28)
-SIZES = {kind: LINEAR if kind[:2] in ("4N", "8N") else QUADRATIC for kind in KINDS}
-"""Cells along an edge of the error scenes, by element kind."""
+LINEAR = {
+    "manufactured": (4, 8, 16, 32, 48),
+    "sphere": (3, 6, 10, 20, 28),
+    "bending": (3, 6, 12, 24),
+    "l_domain": (8, 16, 32, 64, 96),
+    "cavity": (3, 6, 10, 16, 32),
+    "hole_incompressible": (4, 8, 16, 32, 48),
+    "cantilever": (2, 4, 8, 16),
+    "cook": (8, 16, 32, 64, 96),
+    "block": (4, 8, 16, 32, 48),
+}
+"""Cells along an edge of the error scenes, for linear elements."""
+QUADRATIC = {
+    "manufactured": (2, 4, 6, 8, 12, 16, 24),
+    "sphere": (1, 2, 3, 5, 8, 11),
+    "bending": (1, 2, 4),
+    "l_domain": (2, 4, 8, 16, 32, 48),
+    "cavity": (1, 2, 4, 7, 12, 18),
+    "hole_incompressible": (1, 2, 4, 6, 9, 14, 24, 32),
+    "cantilever": (1, 2, 3, 5, 8, 13),
+    "cook": (2, 4, 8, 16, 32),
+    "block": (1, 2, 4, 6, 12, 20, 28),
+}
+"""The same for quadratic ones: pairs of them lie around errors of 1 %, 0.1 % and 0.01 %."""
+ERROR_SCENES = tuple(QUADRATIC)
 GOALS_OF_ERROR = (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)
 """Relative errors in the energy norm that the adaptive solution is asked for."""
 START = ("20N", 2)
 """Element and size of the mesh that it starts from."""
-SHARE = {"sphere": 0.75, "bending": 0.625, "cavity": 0.75, "cantilever": 0.5, "l_domain": 2.0, "cook": 2.0}
-SHARE["hole_incompressible"] = 1.5
-"""Of these sizes that a scene takes: some have more cells for the same n, plane ones fewer."""
 GOALS = (
     *(("block", "8N", n) for n in (20, 32, 50)),
     *(("block", "27N", n) for n in (10, 20)),
@@ -98,7 +113,7 @@ def error_runs(
     runs = []
     for scene in scenes:
         for kind in KINDS:
-            for n in dict.fromkeys(scaled(n, scene) for n in (sizes or SIZES).get(kind, ())):
+            for n in (sizes or {kind: sizes_of(scene, kind)}).get(kind, ()):
                 runs += [
                     Run("error", program, scene, kind, n, options=words + solver_of(program, scene))
                     for program in programs
@@ -110,18 +125,18 @@ def error_runs(
     return runs
 
 
+def sizes_of(scene: str, kind: str) -> tuple[int, ...]:
+    """Return the cells along an edge that a curve consists of.
+
+    >>> sizes_of("bending", "8N enhanced"), sizes_of("bending", "20N")
+    ((3, 6, 12, 24), (1, 2, 4))
+    """
+    return (LINEAR if kind.split(maxsplit=1)[0] in ("4N", "8N") else QUADRATIC)[scene]
+
+
 def solver_of(program: str, scene: str) -> tuple[tuple[str, Any], ...]:
     """Return the words for the solver of Kratos that is best on a scene, by measurement."""
     return (("kratos_solver", KRATOS_SOLVERS.get(scene, "AMGCL")),) if program == "Kratos" else ()
-
-
-def scaled(n: int, scene: str) -> int:
-    """Return the size of a scene that costs about as much as n cells along the edge of a cube.
-
-    >>> scaled(16, "cantilever"), scaled(16, "block")
-    (8, 16)
-    """
-    return max(1, round(n * SHARE.get(scene, 1.0)))
 
 
 def growth_runs(

@@ -332,7 +332,7 @@ def test_a_curve_ends_where_it_is_exact_or_would_take_too_long(tmp_path):
     row = {"group": "error", "program": "kratos_lite", "scene": "block", "kind": "8N", "n": 2}
     made = driver.Driver(tmp_path, point=10.0)
     for work, error, last in ((1.0, 0.1, False), (2.0, 0.1, True), (1.0, 1e-6, True)):
-        assert made._is_last(row | {"work": work, "errors": {"displacement": error}}, runs) is last
+        assert made._is_last(row | {"warm": work, "errors": {"displacement": error}}, runs) is last
     assert made._is_last(row | {"failed": "stopped"}, runs)
 
 
