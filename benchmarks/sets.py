@@ -72,7 +72,7 @@ SKIPS: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...] = (
     ("block", "written as .json", (("write", ".json"),)),
 )
 """Scene, what it is, and options: each row is compared with the plain one of the same size."""
-KRATOS_SOLVERS = {"cantilever": "LU"}
+KRATOS_SOLVERS = {"cantilever": "LU", "hole_incompressible": "LU"}
 """Of scenes on which its multigrid does not converge, or takes longer."""
 FROM_FILES = ("kratos_lite", "kratos_lite NumPy", "Kratos")
 """Programs that read `.mdpa` files with everything they say."""
