@@ -25,6 +25,10 @@ from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
 
 
+ADJOINT_TOLERANCE = 1e-5
+"""Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
+
+
 class Phases:
     """Seconds spent in each named phase."""
 
@@ -277,7 +281,7 @@ class StaticAnalysis:
             return np.zeros_like(load)
         system = self._system_of(moving)
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
-        return system.solve(load, displaced - at_rest)[0]
+        return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
     def _initial_noise(self) -> float:
         """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
