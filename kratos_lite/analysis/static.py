@@ -246,8 +246,8 @@ class StaticAnalysis:
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        adjoint = _Adjoint(self, model.version)
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, adjoint)
+        origin = _Origin(self, case.loads, model.version)
+        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin)
 
     def release(self) -> None:
         """Let go of the matrix and what is made of it; another solution makes them anew."""
@@ -345,19 +345,20 @@ class StaticAnalysis:
 
 
 @dataclass(frozen=True, eq=False)
-class _Adjoint:
-    """An analysis with the version of its model that a result is of."""
+class _Origin:
+    """An analysis with its loads, and the version of its model, when it was solved."""
 
     analysis: StaticAnalysis
+    loads: list[Load]
     version: tuple[int, int]
 
     @property
-    def held(self) -> Mask:
-        return self.analysis.model.supports.fixed
-
-    def solve(self, load: Array, motion: Array) -> Array:
+    def model(self) -> Structure:
         if self.version != self.analysis.model.version:
             raise ModelError("the model has changed since this solution; solve it again")
+        return self.analysis.model
+
+    def adjoint(self, load: Array, motion: Array) -> Array:
         return self.analysis.adjoint(load, motion)
 
 
