@@ -41,7 +41,7 @@ def error_bound(origin: Origin, groups: Sequence[ElementGroup], u: Array, energy
     for group in groups:
         if not group.element.inherits(*GEOMETRY, *STRESS):
             raise ModelError(
-                f"the bound of the error is for elements whose strain is that of their displacements; "
+                "the bound of the error is for elements whose strain is that of their displacements; "
                 f"{group.element.__name__} has its own: ask for method='recovery'"
             )
     sides = Sides(mesh)
@@ -97,6 +97,6 @@ def _spread(
             sides.add(faces, block, factor * forces)
     else:
         raise ModelError(
-            f"the bound of the error takes loads per area and volume: Traction, Pressure, BodyForce, Gravity; "
-            f"got {type(load).__name__}: ask for method='recovery'"
+            "the bound of the error takes loads per area and volume, Traction, Pressure, BodyForce and "
+            f"Gravity; got {type(load).__name__}: ask for method='recovery'"
         )

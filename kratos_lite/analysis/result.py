@@ -327,7 +327,7 @@ class Result:
 
         Stresses in equilibrium with the loads give an upper bound, up to what prescribed displacements and
         curved faces differ from those of the mesh.  They are sought in polynomials three degrees above
-        those of the elements, which is enough in practice, but no proof.  This takes as long as some solutions.
+        those of the elements, which is enough in practice, but no proof.  It takes longer than a solution.
 
         Sources: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24 (1987) 337-357; Becker & Rannacher, Acta
         Numerica 10 (2001) 1-102; Ladevèze & Pelle, Mastering Calculations in Linear and Nonlinear Mechanics

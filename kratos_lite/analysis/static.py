@@ -24,7 +24,6 @@ from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
 
-
 ADJOINT_TOLERANCE = 1e-5
 """Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
 
@@ -355,12 +354,16 @@ class _Origin:
 
     @property
     def model(self) -> Structure:
-        if self.version != self.analysis.model.version:
-            raise ModelError("the model has changed since this solution; solve it again")
-        return self.analysis.model
+        return self._unchanged().model
 
     def adjoint(self, load: Array, motion: Array) -> Array:
-        return self.analysis.adjoint(load, motion)
+        return self._unchanged().adjoint(load, motion)
+
+    def _unchanged(self) -> StaticAnalysis:
+        """Return the analysis of the model as it was."""
+        if self.version != self.analysis.model.version:
+            raise ModelError("the model has changed since this solution; solve it again")
+        return self.analysis
 
 
 def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:

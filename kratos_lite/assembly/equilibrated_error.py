@@ -1,14 +1,14 @@
 """Energy of the difference between stresses in equilibrium and those of the elements, element by element.
 
-In each element under its loads and equilibrated tractions, the displacement e whose stresses are lacking solves
+In each element under its loads and equilibrated tractions, the displacement e whose stress is lacking solves
 
     a(e, v) = ∫ t v dA + ∫ f v dV - ∫ σ : ∇v dV        for all v.
 
 σ + C ∇e is in equilibrium, so that the sum of the energies of e is an upper bound of the error.  Complete
 polynomials of the reference coordinates take the place of all v.
 
-Sources: Prager & Synge, Quart. Appl. Math. 5 (1947) 241-269; Ladevèze & Pelle, Mastering Calculations in Linear
-and Nonlinear Mechanics (2005), chapter 2.
+Sources: Prager & Synge, Quart. Appl. Math. 5 (1947) 241-269; Ladevèze & Pelle, Mastering Calculations in
+Linear and Nonlinear Mechanics (2005), chapter 2.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.surface import area_vectors, surface_mass
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import rule_for
 from kratos_lite.shapes import FACE_SHAPES
@@ -113,7 +112,7 @@ def _energies(
     load = basis.values(rule.points).T @ ((N @ body) * dV[..., None])
     load -= (gradients @ (voigt.tensor(stress) * dV[..., None, None])).sum(axis=1)
     for face, forces in sides:
-        load += _side_load(shape.nodes[list(face)], X[:, list(face)], forces, basis, degree)
+        load += _side_load(shape.nodes[list(face)], forces, basis, degree)
     m, g, q, _ = gradients.shape
     G = (gradients * np.sqrt(dV)[..., None, None]).transpose(0, 3, 2, 1).reshape(m, 3 * q, g)
     H = (G @ np.swapaxes(G, 1, 2)).reshape(m, 3, q, 3, q)
@@ -124,11 +123,13 @@ def _energies(
     return np.asarray((r * np.linalg.solve(K, r)).sum(axis=(1, 2)))
 
 
-def _side_load(xi: Array, X: Array, forces: Array, basis: Polynomials, degree: int) -> Array:
-    """Return ∫ t v dA (m, q, 3) of tractions with the moments `forces` (m, k, 3) on faces X (m, k, 3)."""
+def _side_load(xi: Array, forces: Array, basis: Polynomials, degree: int) -> Array:
+    """Return ∫ t v dA (m, q, 3) of t dA = Σ N c dξ dη with the moments `forces` (m, k, 3), on the face at xi.
+
+    On a bilinear face that is not plane n dA is such a polynomial: tractions of constant stresses are exact.
+    """
     shape = FACE_SHAPES[len(xi)]
     rule = rule_for(shape.cell, 2 * degree)
     N, _ = tabulate(shape, rule)
-    tractions = N @ np.linalg.solve(surface_mass(shape, X), forces)
-    area = np.linalg.norm(area_vectors(shape, X, rule), axis=-1)
-    return basis.values(N @ xi).T @ (tractions * area[..., None])
+    weighted = N * rule.weights[:, None]
+    return (basis.values(N @ xi).T @ weighted @ np.linalg.inv(N.T @ weighted)) @ forces

@@ -1,7 +1,7 @@
 """Equilibrated tractions: forces between elements that balance the loads of each element.
 
-The stresses of displacement elements balance the loads of the whole mesh, not of each element.  For each node i
-of an element K, forces b on the sides of K around i are sought with
+The stresses of displacement elements balance the loads of the whole mesh, not of each element.  For each
+node i of an element K, forces b on the sides of K around i are sought with
 
     Σ b(i) = ∫_K σ ∇N_i - f N_i dV,
 
@@ -31,7 +31,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.topology import corners, equal_sets, faces_of
 from kratos_lite.shapes import FACE_SHAPES
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 BALANCED = 1e-6
 """Relative force that may be left over around a node, from the solution of the equations."""
@@ -95,7 +95,7 @@ class Sides:
         counts = [np.full(len(b), len(f)) for b in self.mesh.blocks for f in faces_of(b)]
         return np.cumsum(np.concatenate([np.zeros(1, dtype=np.int64), *counts]))
 
-    def paired(self, one: Ints, other: Ints, nodes: Ints, start: Ints) -> tuple[Ints, Ints]:
+    def paired(self, one: Ints, other: Ints, nodes: Ints | Rows, start: Ints) -> tuple[Ints, Ints]:
         """Return the rows of the nodes of sides, and of those of other faces with the same nodes."""
         found = [np.zeros((2, 0), dtype=np.int64)]
         sizes = np.diff(self._start)[one]
@@ -131,7 +131,7 @@ class Sides:
 
 
 def needed_forces(sides: Sides, groups: Sequence[ElementGroup], u: Array, body: Sequence[Array]) -> Array:
-    """Return ∫ σ ∇N - f N dV (e, 3) in N on the nodes of each element; `body` is f (m, k, 3) of each group."""
+    """Return ∫ σ ∇N - f N dV (e, 3) in N on the nodes of each element; `body` is f (m, k, 3) of groups."""
     points, blocks = sides.mesh.points, sides.mesh.blocks
     first = np.cumsum([0, *(block.nodes.size for block in blocks)])
     needed = np.zeros((first[-1], 3))
@@ -196,7 +196,7 @@ def equilibrated(sides: Sides, needed: Array, guess: Array, area: Array, free: M
         give = np.where(is_first & (sides.inner | free[:, axis]), area, 0.0)
         left = needed[:, axis] - A @ forces[:, axis]
         forces[:, axis] += give * (A.T @ _multipliers(sides, A, give, left, scale))
-    return sign[:, None] * forces[sides.first]
+    return np.asarray(sign[:, None] * forces[sides.first])
 
 
 def _multipliers(sides: Sides, A: Any, give: Array, left: Array, scale: float) -> Array:
@@ -209,7 +209,7 @@ def _multipliers(sides: Sides, A: Any, give: Array, left: Array, scale: float) -
     count, label = connected_components(L, directed=False)
 
     def summed(values: Array) -> Array:
-        return np.bincount(label, weights=values, minlength=count)
+        return np.asarray(np.bincount(label, weights=values, minlength=count), dtype=float)
 
     floating = summed(np.asarray(L.sum(axis=1)).ravel()) <= 1e-9 * summed(L.diagonal())
     lost = floating & (np.abs(summed(left)) > BALANCED * scale)
