@@ -47,6 +47,10 @@ class Traction(Load):
         Parameters
         ----------
         mesh : points (n, 3), elements, conditions and named parts.
+
+        Yields
+        ------
+        The block, and the forces on the nodes of its faces.
         """
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
@@ -101,6 +105,10 @@ class Pressure(Load):
         Parameters
         ----------
         mesh : points (n, 3), elements, conditions and named parts.
+
+        Yields
+        ------
+        The block, and the forces on the nodes of its faces.
         """
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
