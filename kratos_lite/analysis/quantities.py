@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -18,7 +17,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Located, Mesh, Where
 from kratos_lite.model.loads import Traction
 from kratos_lite.model.supports import AXES
-from kratos_lite.typing import Array, Mask
+from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite
 
 COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
@@ -67,7 +66,7 @@ class Quantity(ABC):
     def load(self, result: Solved) -> Array:
         """Return the load of the adjoint solution; 0 if the class has none.
 
-        It is ∂Q/∂u; for a value at a point, whose adjoint is singular, that of the mean around the point.
+        It is ∂Q/∂u; for a stress at a point, whose adjoint is too singular, that of the mean around the point.
 
         Parameters
         ----------
@@ -143,9 +142,11 @@ class DisplacementAt(Quantity):
         return float(_located(result, self.point).interpolate(result.u)[AXES.index(self.axis)])
 
     def load(self, result: Solved) -> Array:
-        """Return ∫ N dV / V (n, 3) along the axis, of the elements around the point."""
-        around = _around(result, _located(result, self.point))
-        return _mean_load(result, around, self.axis)
+        """Return N (n, 3) of the element that contains the point, along the axis."""
+        load = np.zeros_like(result.u)
+        nodes, weights = _located(result, self.point).nodes_and_weights()
+        load[nodes, AXES.index(self.axis)] = weights
+        return load
 
     def __repr__(self) -> str:
         return f"DisplacementAt({self.point.tolist()}, {self.axis!r})"
@@ -198,13 +199,17 @@ class MeanDisplacement(Quantity):
             return load / load.sum()
         inside = np.zeros(mesh.n_nodes, dtype=bool)
         inside[mesh.nodes(self.part)] = True
-        chosen = [np.asarray(inside[group.nodes].all(axis=1)) for group in result.groups]
-        if not any(one.any() for one in chosen):
+        load = np.zeros_like(result.u)
+        for group in result.groups:
+            chosen = np.asarray(inside[group.nodes].all(axis=1))
+            if chosen.any():
+                load += body_force(mesh.points, group.take(chosen), _unit(self.axis))
+        if not load.any():
             raise ModelError(
                 f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
                 "DisplacementAt takes a point"
             )
-        return _mean_load(result, chosen, self.axis)
+        return load / load.sum()
 
     def __repr__(self) -> str:
         return f"MeanDisplacement({_name(self.part)}, {self.axis!r})"
@@ -310,10 +315,11 @@ class StressAt(Quantity):
         return out
 
     def _around(self, result: Solved) -> ElementGroup:
-        """Return the elements around the point of the material there."""
-        located = _located(result, self.point)
-        chosen = zip(result.groups, _around(result, located), strict=True)
-        return next(group.take(mine) for group, mine in chosen if (group.rows == located.rows).any())
+        """Return the elements that share a corner with that of the point, of the same group."""
+        row = _located(result, self.point).rows
+        group = next(group for group in result.groups if (group.rows == row).any())
+        corners = group.nodes[:, : group.element.shape.corners]
+        return group.take(np.isin(corners, corners[group.rows == row]).any(axis=1))
 
     def __repr__(self) -> str:
         return f"StressAt({self.point.tolist()}, {self.component!r})"
@@ -322,24 +328,6 @@ class StressAt(Quantity):
 def _located(result: Solved, point: Array) -> Located:
     """Return where a point lies in the mesh of a result."""
     return result.mesh.locate(point, required=True)
-
-
-def _around(result: Solved, located: Located) -> list[Mask]:
-    """Return which elements of each group share a corner with the element of a point."""
-    corner = np.zeros(result.mesh.n_nodes, dtype=bool)
-    for group in result.groups:
-        mine = group.nodes[group.rows == located.rows]
-        corner[mine[:, : group.element.shape.corners]] = True
-    return [np.asarray(corner[group.nodes].any(axis=1)) for group in result.groups]
-
-
-def _mean_load(result: Solved, chosen: Sequence[Mask], axis: str) -> Array:
-    """Return ∫ N dV / V (n, 3) along an axis, of some elements of each group."""
-    load = np.zeros_like(result.u)
-    for group, mine in zip(result.groups, chosen, strict=True):
-        if mine.any():
-            load += body_force(result.mesh.points, group.take(mine), _unit(axis))
-    return load / load.sum()
 
 
 def _unit(axis: str) -> Array:
