@@ -40,6 +40,13 @@ from kratos_lite.bodies import Torque as Torque
 from kratos_lite.bodies import convert as convert
 from kratos_lite.bodies import find_equilibrium as find_equilibrium
 from kratos_lite.elements import ELEMENTS as ELEMENTS
+from kratos_lite.elements import BBar3D8N as BBar3D8N
+from kratos_lite.elements import BBar3D10N as BBar3D10N
+from kratos_lite.elements import BBar3D13N as BBar3D13N
+from kratos_lite.elements import BBar3D15N as BBar3D15N
+from kratos_lite.elements import BBar3D20N as BBar3D20N
+from kratos_lite.elements import BBar3D27N as BBar3D27N
+from kratos_lite.elements import EnhancedStrain3D8N as EnhancedStrain3D8N
 from kratos_lite.elements import KinematicLinear as KinematicLinear
 from kratos_lite.elements import KinematicLinear3D4N as KinematicLinear3D4N
 from kratos_lite.elements import KinematicLinear3D5N as KinematicLinear3D5N
@@ -50,6 +57,7 @@ from kratos_lite.elements import KinematicLinear3D13N as KinematicLinear3D13N
 from kratos_lite.elements import KinematicLinear3D15N as KinematicLinear3D15N
 from kratos_lite.elements import KinematicLinear3D20N as KinematicLinear3D20N
 from kratos_lite.elements import KinematicLinear3D27N as KinematicLinear3D27N
+from kratos_lite.elements import Reduced3D20N as Reduced3D20N
 from kratos_lite.errors import InputError as InputError
 from kratos_lite.errors import KratosLiteError as KratosLiteError
 from kratos_lite.errors import MaterialError as MaterialError

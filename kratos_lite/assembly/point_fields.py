@@ -56,6 +56,9 @@ def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
         J = np.swapaxes(X, -1, -2) @ dN
         D = dN @ (cofactors(J) / determinant(J)[..., None, None])
         return voigt.symmetric_gradient(np.swapaxes(u, -1, -2) @ D)
+    if not element.inherits("strain_at"):
+        C = group.material.C
+        return np.array([element(x, group.rule).strain_at(t, v, C) for x, t, v in zip(X, xi, u, strict=True)])
     if element.inherits("B") and not element.inherits(*STRAIN):
         raise InputError(
             f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "

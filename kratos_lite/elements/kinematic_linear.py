@@ -66,6 +66,8 @@ class KinematicLinear(CellMass):
     -----
     A subclass states `shape` and `rule`.  Mass and body forces take rules that are exact for the shape and
     the geometry of each cell; a subclass that states a `mass_rule` takes that one for the mass of all cells.
+    It may state its `formulation`, a word, and how many `spurious_modes` one element alone has: modes without
+    energy beside the rigid ones.
     Voigt rows are xx yy zz xy yz zx with engineering shear; dof = 3·node + axis.
 
     The steps of an element are ``N, dN → J → dNdX → B → B_at_gauss_points → strain → stress → internal_load →
@@ -84,6 +86,8 @@ class KinematicLinear(CellMass):
     """
 
     aliases: ClassVar[tuple[str, ...]] = ()
+    formulation: ClassVar[str] = "standard"
+    spurious_modes: ClassVar[int] = 0
     batched: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -184,6 +188,30 @@ class KinematicLinear(CellMass):
             gradient = self._gauss[1] @ u[..., None, :, :]
             return voigt.symmetric_gradient(np.swapaxes(gradient, -1, -2))
         return (self._operator(C) @ u.reshape(*u.shape[:-2], 1, -1, 1))[..., 0]
+
+    def strain_at(self, xi: ArrayLike, u: ArrayLike, C: ArrayLike | None = None) -> Array:
+        """Return the strain at points.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+        u : (..., n, 3) float, nodal displacements in m.
+        C : (6, 6) or (..., 6, 6) float, Pa; for elements whose strain depends on the material.
+
+        Returns
+        -------
+        (..., 6) float
+            Axes of the elements, axes of the points, 6.
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points or `u` is not made of nodal displacements.
+        """
+        xi, u = arguments.points(xi), arguments.nodal(u, self.X)
+        axes = (1,) * (xi.ndim - 1)
+        B = self.B(xi)
+        return (B @ u.reshape(*u.shape[:-2], *axes, -1, 1))[..., 0]
 
     # ---- stress, internal load, stiffness --------------------------------------------------------
 

@@ -1,0 +1,116 @@
+"""BBar: elements whose dilatation is projected, so that they take ν → ½."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.elements import arguments
+from kratos_lite.elements.kinematic_linear import KinematicLinear
+from kratos_lite.elements.stiffness import strain_rows
+from kratos_lite.elements.tables import cofactors, determinant
+from kratos_lite.typing import Array
+
+
+class BBar(KinematicLinear):
+    """A small-strain element with a projected dilatation.
+
+    Notes
+    -----
+    The dilatation mᵀ B u is replaced by its projection Π on polynomials in x, y, z of each element, by the
+    element's own rule:
+
+        B̄ = B + ⅓ m (Π(mᵀB) - mᵀB),   m = (1, 1, 1, 0, 0, 0).
+
+    A subclass states `shape`, `rule` and the `dilatation`, the degree of the polynomials: 0 for the mean over
+    the element, 1 for a linear one.  Neighbors have dilatations of their own.  Where displacements of other
+    dilatations alone would have no energy, `kept` is the share of mᵀB - Π(mᵀB) that stays.
+
+    Source: Hughes, IJNME 15 (1980) 1413; for linear ones Boffi & Gastaldi, M3AS 12 (2002) 1577:
+    polynomials in x, y, z, not in ξ, keep the order on distorted cells.
+    """
+
+    formulation = "b_bar"
+    batched: ClassVar[bool] = True
+    dilatation: ClassVar[int] = 0
+
+    def B_at_gauss_points(self, C: ArrayLike | None = None) -> Array:
+        """Return B̄ at the Gauss points.
+
+        Parameters
+        ----------
+        C : (6, 6) or (..., 6, 6) float, Pa; for `kept`.
+
+        Returns
+        -------
+        (..., g, 6, 3n) float, 1/m
+        """
+        B = strain_rows(self._gauss[1])
+        change = (1 - self.kept(C))[..., None, None] * (self._projected(self.rule.points) - _trace(B))
+        B[..., :3, :] += change[..., None, :] / 3
+        return B
+
+    def kept(self, C: ArrayLike | None) -> Array:
+        """Return the share of the dilatation beyond its projection that stays in the strain: none.
+
+        Parameters
+        ----------
+        C : (6, 6) or (..., 6, 6) float, Pa.
+
+        Returns
+        -------
+        () or (...) float, 0 … 1
+        """
+        return np.zeros(())
+
+    def strain_at(self, xi: ArrayLike, u: ArrayLike, C: ArrayLike | None = None) -> Array:
+        """Return the strain with projected dilatation at points; see `KinematicLinear.strain_at`.
+
+        Parameters
+        ----------
+        xi : (3,) or (..., 3) float, points in reference coordinates.
+        u : (..., n, 3) float, nodal displacements in m.
+        C : (6, 6) or (..., 6, 6) float, Pa; for `kept`.
+
+        Returns
+        -------
+        (..., 6) float
+
+        Raises
+        ------
+        InputError
+            If `xi` are not points or `u` is not made of nodal displacements.
+        """
+        xi, u = arguments.points(xi), arguments.nodal(u, self.X)
+        strain = super().strain_at(xi, u)
+        projected = self._projected(xi.reshape(-1, 3)) @ u.reshape(*u.shape[:-2], -1, 1)
+        dilatation = strain[..., :3].sum(axis=-1)
+        share = 1 - self.kept(C)
+        share = share.reshape(*share.shape, *[1] * (dilatation.ndim - share.ndim))
+        strain[..., :3] += (share * (projected.reshape(dilatation.shape) - dilatation) / 3)[..., None]
+        return strain
+
+    def _projected(self, xi: Array) -> Array:
+        """Return Π(mᵀB) (..., g, 3n) at points (g, 3)."""
+        P = self._polynomials(self.rule.points)
+        weighted = np.swapaxes(P * self.dV[..., None], -1, -2)
+        dilatation = _trace(strain_rows(self._gauss[1]))
+        return self._polynomials(xi) @ np.linalg.solve(weighted @ P, weighted @ dilatation)
+
+    def _polynomials(self, xi: Array) -> Array:
+        """Return 1, or 1 and coordinates that are linear in x, y, z, (..., g, 1 or 4) at points (g, 3)."""
+        one = np.ones((*self.X.shape[:-2], len(xi), 1))
+        if not self.dilatation:
+            return one
+        center = self.shape.nodes[: self.shape.corners].mean(axis=0)[None]
+        J0 = self._jacobian(self.dN(center))
+        base = (cofactors(J0) / determinant(J0)[..., None, None])[..., 0, :, :]
+        away = self.N(xi) @ self.X - self.N(center) @ self.X
+        return np.concatenate([one, away @ np.swapaxes(base, -1, -2)], axis=-1)
+
+
+def _trace(B: Array) -> Array:
+    """Return the rows mᵀB (..., 3n) of B (..., 6, 3n)."""
+    return B[..., :3, :].sum(axis=-2)
