@@ -14,13 +14,15 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from benchmarks import cases, curves, report, scenes, sets
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
+from benchmarks.tables import ADAPTIVE, Row
 
 RESULTS = Path(__file__).with_name("results")
-PAGE, PICTURE = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "benchmark.png"
+PAGE, PICTURES = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "benchmarks"
 QUICK_SIZES = {"4N": (4, 8), "8N": (4, 8), "10N": (2, 4), "20N": (2, 4), "27N": (2, 4)}
 QUICK_PROGRAMS = ("kratos_lite", "kratos_lite NumPy", "Kratos", "scikit-fem")
 
@@ -48,7 +50,11 @@ def kratos(options: argparse.Namespace, folder: Path) -> list[Run]:
 def error(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return run time against error."""
     sizes = {kind: tuple(options.cells) for kind in scenes.KINDS} if options.cells else None
-    return sets.error_runs(options.programs, options.scenes or sets.ERROR_SCENES, sizes)
+    runs = sets.error_runs(options.programs, options.scenes or sets.ERROR_SCENES, sizes)
+    if not options.decisive:
+        return runs
+    wanted = curves.decisive(report.of(kept(options.out).get("rows", []), "error"))
+    return [run for run in runs if (run.program, *run.place) in wanted or run.program == ADAPTIVE]
 
 
 def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
@@ -82,7 +88,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "motion": lambda options, folder: sets.motion_runs(options.programs),
     "ale": lambda options, folder: sets.ale_runs(options.programs),
 }
-REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1}
+REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1, "error": 1}
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -94,15 +100,30 @@ def main(words: Sequence[str] | None = None) -> int:
         return references(options.cells or (4, 8, 16))
     with scratch() as name:
         repeats = options.repeats or REPEATS.get(options.command, 5)
-        driver = Driver(Path(name), repeats, options.pythons, options.limit, options.memory * 1e9)
+        limits = options.limit, options.memory * 1e9, options.point, options.budget
+        driver = Driver(Path(name), repeats, options.pythons, *limits)
         runs = COMMANDS[options.command](options, Path(name))
+        if options.out is not None:
+            driver.save = saver(driver, options)
         rows = driver.measure([r for r in runs if not options.elements or r.kind in (*options.elements, "")])
     print("\n" + report.text(rows))
-    if options.out is not None:
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(as_json(results(driver, options.command, rows)))
-        print(f"wrote {options.out}")
     return 0 if any("failed" not in row for row in rows) else 1
+
+
+def saver(driver: Driver, options: argparse.Namespace) -> Callable[[list[Row]], None]:
+    """Return what writes the rows so far beside those kept in the file before."""
+    old = kept(options.out)
+
+    def save(rows: list[Row]) -> None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(as_json(results(driver, options.command, rows, old)))
+
+    return save
+
+
+def kept(path: Path | None) -> dict[str, Any]:
+    """Return the results kept in a file, or nothing."""
+    return dict(json.loads(path.read_text())) if path is not None and path.exists() else {}
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
@@ -135,12 +156,21 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     add("--cases", type=Path, default=ROOT.parent / "shared" / "cases", metavar="FOLDER",
         help="real scenes, each a folder with case.json")  # fmt: skip
     add("--limit", type=float, default=1800.0, metavar="SECONDS", help="after which one run is stopped")
+    add(
+        "--point",
+        type=float,
+        default=10.0,
+        metavar="SECONDS",
+        help="for error: that a run may take, as expected",
+    )
+    add("--budget", type=float, default=float("inf"), metavar="SECONDS", help="after which no scene is begun")
+    add("--decisive", action="store_true", help="for error: only points of --out that its summary rests on")
     add("--memory", type=float, default=20.0, metavar="GB", help="that one run may take")
     add(
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the results as JSON, e.g. benchmarks/results/kratos.json",
+        help="JSON file of the results; rows in it stay unless they are measured again",
     )
     options = parser.parse_args(words)
     options.pythons = pythons([*os.environ.get("KRATOS_LITE_BENCH_PYTHON", "").split(","), *options.python])
@@ -166,12 +196,14 @@ def pythons(words: Sequence[str]) -> dict[str, str]:
 
 def write_report() -> int:
     """Make the page and its picture from the results kept."""
-    kept = [json.loads(path.read_text()) for path in sorted(RESULTS.glob("*.json"))]
-    if not kept:
+    files = [kept(path) for path in sorted(RESULTS.glob("*.json"))]
+    if not files:
         print(f"there are no results in {RESULTS}; make some with --out", file=sys.stderr)
         return 1
-    PAGE.write_text(report.page(kept))
-    curves.picture(report.of([row for found in kept for row in found["rows"]], "error"), PICTURE)
+    PAGE.write_text(report.page(files))
+    rows = report.of([row for found in files for row in found["rows"]], "error")
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        curves.picture(rows, scene, PICTURES / f"{scene}.png")
     print(f"wrote {PAGE}")
     return 0
 

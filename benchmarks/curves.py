@@ -1,29 +1,55 @@
-"""Run time against error: curves, time to an error, the cheapest element, and the picture."""
+"""Run time against error: curves, time to an error, the summary, the cheapest element, and the pictures."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.tables import OURS, Row, seconds, table
+from benchmarks.programs import PEERS, PROGRAMS
+from benchmarks.tables import ADAPTIVE, OURS, Row, ratio, seconds, table
 
 LEVELS = (1e-2, 1e-3, 1e-4)
+CLOCKS = {"warm": "warm", "cold": "process"}
+"""Second time in one process, from reading to the solution; and the whole process."""
+CLOSE = 1.3
+"""Times within this factor of the best may change places in the next run."""
 
 
-def curves(rows: Iterable[Row]) -> dict[tuple[str, str, str], tuple[np.ndarray, np.ndarray]]:
-    """Return seconds and errors, by rising size, of each scene, program and element kind."""
+class Curve(NamedTuple):
+    """Points of one program and element on a scene, from coarse to fine."""
+
+    sizes: np.ndarray
+    times: np.ndarray
+    errors: np.ndarray
+
+
+class Reached(NamedTuple):
+    """An error reached: seconds, whether the first point reaches it already, element, and sizes used."""
+
+    seconds: float
+    bound: bool
+    kind: str
+    sizes: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"{'≤ ' * self.bound}{seconds(self.seconds)} {self.kind}"
+
+
+def curves(rows: Iterable[Row], clock: str = "warm") -> dict[tuple[str, str, str], Curve]:
+    """Return the curve of each scene, program and element kind."""
     points: dict[tuple[str, str, str], list[tuple[int, float, float]]] = defaultdict(list)
     for row in rows:
-        error = row.get("errors", {}).get("displacement")
-        if error is not None:
-            points[row["scene"], row["program"], row["kind"]].append((row["n"], row["work"], error))
+        error, time = row.get("errors", {}).get("displacement"), row.get(CLOCKS[clock])
+        if error is not None and time is not None:
+            points[row["scene"], row["program"], row["kind"]].append((row["n"], -error, time))
     made = {}
     for key, found in points.items():
-        ordered = np.array(sorted(found))
-        made[key] = ordered[:, 1], np.maximum(ordered[:, 2], 1e-16)
+        sizes, error, times = np.array(sorted(found)).T
+        made[key] = Curve(sizes.astype(int), times, np.maximum(-error, 1e-16))
     return made
 
 
@@ -48,44 +74,75 @@ def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, 
     return float(np.exp(t[0] + share * (t[1] - t[0]))), False
 
 
-def time_to_error(rows: Iterable[Row]) -> str:
-    """Return the table of seconds to each error per scene, program and element."""
-    body = []
-    for (scene, program, kind), (times, found) in curves(rows).items():
-        cells = []
+def reached(level: float, kind: str, curve: Curve) -> Reached | None:
+    """Return how a curve reaches an error, or None."""
+    time = time_to(level, curve.times, curve.errors)
+    if time is None:
+        return None
+    i = int(np.flatnonzero(curve.errors <= level)[0])
+    return Reached(*time, kind, tuple(curve.sizes[max(i - 1, 0) : i + 1].tolist()))
+
+
+def by_level(rows: Iterable[Row], clock: str) -> dict[tuple[str, float], dict[str, list[Reached]]]:
+    """Return for each scene and error by program the elements that reach it, the fastest first."""
+    found: dict[tuple[str, float], dict[str, list[Reached]]] = defaultdict(lambda: defaultdict(list))
+    for (scene, program, kind), curve in curves(rows, clock).items():
         for level in LEVELS:
-            reached = time_to(level, times, found)
-            cells.append("—" if reached is None else ("≤ " if reached[1] else "") + seconds(reached[0]))
-        body.append([scene, program, kind, *cells, f"{found.min():.1e}"])
-    return table(["scene", "program", "element", "1 %", "0.1 %", "0.01 %", "least error"], body)
+            if how := reached(level, kind, curve):
+                found[scene, level][program].append(how)
+    for programs in found.values():
+        for ways in programs.values():
+            ways.sort()
+    return found
 
 
-def starts(rows: Iterable[Row]) -> str:
-    """Return what each program needs before its work: interpreter and imports, the median over its rows."""
-    found: dict[str, list[float]] = defaultdict(list)
-    for row in rows:
-        found[row["program"]].append(row["start"])
-    return table(["program", "start, s"], [[name, seconds(float(np.median(t)))] for name, t in found.items()])
+def decisive(rows: Sequence[Row]) -> set[tuple[str, str, str, int]]:
+    """Return program, scene, kind and n of the points that the summary rests on, or may in the next run."""
+    wanted = set()
+    for clock in CLOCKS:
+        for (scene, _), programs in by_level(rows, clock).items():
+            for program, ways in programs.items():
+                close = [way for way in ways if way.seconds <= CLOSE * ways[0].seconds]
+                wanted |= {(program, scene, way.kind, n) for way in close for n in way.sizes}
+    return wanted
+
+
+def summary(rows: Sequence[Row], clock: str) -> str:
+    """Return the seconds to each error with each program's best element, and ours over the best peer's."""
+    programs = [name for name in PROGRAMS if any(row["program"] == name for row in rows)]
+    found = by_level(rows, clock)
+    body = []
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        for level in LEVELS:
+            ways = {name: how[0] for name, how in found.get((scene, level), {}).items()}
+            ours, theirs = (min((ways[p] for p in names if p in ways), default=None) for names in SIDES)
+            both = ratio(ours.seconds, theirs.seconds) if ours and theirs else ""
+            cells = [str(ways.get(name, "—")) for name in programs]
+            body.append([scene, f"{100 * level:g} %", *cells, both])
+    return table(["scene", "error", *programs, "ours / best library"], body)
+
+
+SIDES = ((OURS, ADAPTIVE), PEERS)
 
 
 def cheapest(rows: Iterable[Row], program: str = OURS) -> list[str]:
     """Return one sentence per scene: which element costs least for an error that most of them reach."""
-    by_scene: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = defaultdict(dict)
+    by_scene: dict[str, dict[str, Curve]] = defaultdict(dict)
     for (scene, name, kind), curve in curves(rows).items():
         if name == program:
             by_scene[scene][kind] = curve
     return [_sentence(scene, kinds) for scene, kinds in by_scene.items()]
 
 
-def _sentence(scene: str, kinds: dict[str, tuple[np.ndarray, np.ndarray]]) -> str:
+def _sentence(scene: str, kinds: Mapping[str, Curve]) -> str:
     for level in reversed(LEVELS):
-        reached = {kind: time_to(level, *curve) for kind, curve in kinds.items()}
-        times = {kind: found[0] for kind, found in reached.items() if found is not None}
+        found = {kind: time_to(level, curve.times, curve.errors) for kind, curve in kinds.items()}
+        times = {kind: time[0] for kind, time in found.items() if time is not None}
         if len(times) >= 2 or (times and level == LEVELS[0]):
             break
     else:
-        best = min(kinds, key=lambda kind: kinds[kind][1].min())
-        error = kinds[best][1].min()
+        best = min(kinds, key=lambda kind: kinds[kind].errors.min())
+        error = kinds[best].errors.min()
         return f"{scene}: no element reaches 1 % at these sizes; {best} comes closest ({error:.1e})."
     order = sorted(times, key=lambda kind: times[kind])
     rest = ", ".join(f"{kind} takes {times[kind] / times[order[0]]:.1f} times as long" for kind in order[1:])
@@ -95,45 +152,82 @@ def _sentence(scene: str, kinds: dict[str, tuple[np.ndarray, np.ndarray]]) -> st
     return text + (f"; {', '.join(missing)} do not reach it." if missing else ".")
 
 
-def picture(rows: Sequence[Row], path: Path) -> None:
-    """Draw log error over log seconds: one field per scene, one curve per program and element."""
+# ---- pictures --------------------------------------------------------------------------------------
+
+
+def best_kind(kinds: Mapping[str, Curve]) -> str:
+    """Return the element that reaches the smallest error that any reaches, in the least time."""
+    for level in (*reversed(LEVELS), 1e-1):
+        found = [(time[0], kind) for kind, c in kinds.items() if (time := time_to(level, c.times, c.errors))]
+        if found:
+            return min(found)[1]
+    return min(kinds, key=lambda kind: kinds[kind].errors.min())
+
+
+def shown(rows: Sequence[Row], scene: str) -> list[tuple[str, str]]:
+    """Return program and element of the lines of a picture: the best of each, and our best plain one."""
+    lines = []
+    for program in PROGRAMS:
+        kinds = {kind: curve for (s, p, kind), curve in curves(rows).items() if (s, p) == (scene, program)}
+        plain = {kind: curve for kind, curve in kinds.items() if " " not in kind}
+        chosen = [best_kind(some) for some in (kinds, plain if program == OURS else {}) if some]
+        lines += [(program, kind) for kind in dict.fromkeys(chosen)]
+    return lines
+
+
+def picture(rows: Sequence[Row], scene: str, path: Path) -> None:
+    """Draw log error over log seconds of one scene, warm and cold: a line for each program's best element."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    found = curves(rows)
-    scenes = list(dict.fromkeys(scene for scene, _, _ in found))
-    programs = list(dict.fromkeys(program for _, program, _ in found))
-    kinds = list(dict.fromkeys(kind for _, _, kind in found))
-    if not scenes:
-        return
-    columns = min(3, len(scenes))
-    lines = -(-len(scenes) // columns)
-    figure, axes = plt.subplots(lines, columns, figsize=(5 * columns, 4 * lines), squeeze=False)
-    for ax in axes.ravel()[len(scenes) :]:
-        ax.axis("off")
-    for (scene, program, kind), (times, error) in found.items():
-        ax = axes.ravel()[scenes.index(scene)]
-        ax.loglog(
-            times,
-            error,
-            color=f"C{programs.index(program)}",
-            marker="ov^sD"[kinds.index(kind) % 5],
-            linewidth=2.0 if program == OURS else 0.8,
-            markersize=4,
-        )
-    for scene, ax in zip(scenes, axes.ravel(), strict=False):
-        ax.set(title=scene, xlabel="seconds (read … solve)", ylabel="relative error of displacement")
-        ax.grid(True, which="both", alpha=0.2)
-    handles = [plt.Line2D([], [], color=f"C{i}", label=name) for i, name in enumerate(programs)]
-    handles += [
-        plt.Line2D([], [], color="k", linestyle="", marker="ov^sD"[i % 5], label=kind)
-        for i, kind in enumerate(kinds)
-    ]
-    across = 3 * columns
-    figure.legend(handles=handles, loc="lower center", ncols=across, fontsize="small")
-    figure.tight_layout(rect=(0, (0.2 + 0.25 * -(-len(handles) // across)) / (4 * lines), 1, 1))
+    lines = shown(rows, scene)
+    figure, axes = plt.subplots(1, 2, figsize=(12, 4.6), sharey=True, layout="constrained")
+    for ax, (clock, what) in zip(axes, LABELS.items(), strict=True):
+        found = curves(rows, clock)
+        for program, kind in lines:
+            if (curve := found.get((scene, program, kind))) is not None:
+                ax.loglog(curve.times, np.maximum(curve.errors, FLOOR), label=f"{program}, {kind}",
+                          **style(program, kind))  # fmt: skip
+        for level in LEVELS:
+            ax.axhline(level, color="k", linewidth=0.6, linestyle=":")
+        ax.set(xlabel=what)
+        ax.grid(True, which="major", alpha=0.25)
+    axes[0].set(ylabel="relative error of displacement")
+    figure.suptitle(scene.replace("_", " "))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=90)
     plt.close(figure)
+
+
+LABELS = {"warm": "seconds, read … solve, second time", "cold": "seconds, whole process"}
+FLOOR = 1e-6
+"""Errors below it are drawn there: what is exact would press the rest together."""
+
+
+def style(program: str, kind: str) -> dict[str, Any]:
+    """Return the look of a line: ours thick and red, each other program in a color of its own."""
+    if program.startswith(OURS):
+        look = {OURS: ("o", "-"), ADAPTIVE: ("*", "-")}.get(program, ("x", "--"))
+        look = ("s", "--") if program == OURS and " " not in kind else look
+        return {"color": "#d0021b", "linewidth": 2.2, "marker": look[0], "linestyle": look[1], "zorder": 5}
+    others = [name for name in PROGRAMS if not name.startswith(OURS)]
+    i = others.index(program)
+    color = COLORS[i % len(COLORS)]
+    return {"color": color, "linewidth": 1.2, "marker": ".dv^<>PXhp"[i % 10], "markersize": 5}
+
+
+COLORS = (
+    "#1f3b73",
+    "#1b9e77",
+    "#7570b3",
+    "#66a61e",
+    "#a6761d",
+    "#e6ab02",
+    "#17becf",
+    "#e377c2",
+    "#666666",
+    "#8c564b",
+)

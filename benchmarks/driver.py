@@ -14,18 +14,20 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from benchmarks import ale, scenes
 from benchmarks.programs import HELPERS, PROGRAMS, Program
+from benchmarks.programs.common import OVERHEAD
 from kratos_lite.verification import errors
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCHER = Path(__file__).with_name("launch.py")
-OVERHEAD = ("import", "write", "answer")
-"""Phases outside the work that is compared with the error."""
+ENOUGH = 5e-5
+"""Error at which a curve has gone far enough."""
 LARGE = 40
 """Cells along an edge from which a scene is made in a process of its own."""
 MACHINERY = {"PYTHONDONTWRITEBYTECODE": ""}
@@ -78,7 +80,10 @@ class Driver:
     repeats : runs of each measurement, of which the median counts.
     pythons : interpreter by program name; ``""`` stands for all but kratos_lite.
     limit, memory : seconds and bytes after which a run is stopped.
+    point : seconds that one run against error may be expected to take.
+    budget : seconds after which no further scene is begun.
     tell : called with each line of progress.
+    save : called with all rows so far after each scene.
     """
 
     folder: Path
@@ -86,7 +91,10 @@ class Driver:
     pythons: dict[str, str] = field(default_factory=dict)
     limit: float = 1800.0
     memory: float = 20e9
+    point: float = 10.0
+    budget: float = float("inf")
     tell: Callable[[str], None] = print
+    save: Callable[[list[dict[str, Any]]], None] = list
     absent: dict[str, str] = field(default_factory=dict)
     stems: dict[tuple[str, str, int], Path] = field(default_factory=dict)
     reference: dict[tuple[str, str, int], tuple[np.ndarray, dict[str, float]]] = field(default_factory=dict)
@@ -94,16 +102,30 @@ class Driver:
     def measure(self, runs: Sequence[Run]) -> list[dict[str, Any]]:
         """Make all runs and return one row each; programs on the same scene take turns."""
         rows: list[dict[str, Any]] = []
-        beyond: set[tuple[str, str, str, str]] = set()  # what failed is not asked for a larger size
+        beyond: set[tuple[str, str, str, str]] = set()  # what is not asked for a larger size
+        end = perf_counter() + self.budget
         for turns in dict.fromkeys(run.turns for run in runs):
+            if perf_counter() > end:
+                self.tell("the time is used up; the rest is left out")
+                break
             here = [run for run in runs if run.turns == turns and run.series not in beyond]
             made = self._interleaved(here)
-            failed = {row["program"] for row in made if "failed" in row}
-            beyond |= {run.series for run in here if run.program in failed}
+            finished = {row["program"] for row in made if self._is_last(row, runs)}
+            beyond |= {run.series for run in here if run.program in finished}
             rows += made
             for place in {run.place for run in here}:
                 self._forget(place)
+            self.save(rows)
         return rows
+
+    def _is_last(self, row: dict[str, Any], runs: Sequence[Run]) -> bool:
+        """Return whether a curve ends here: it failed, is exact enough, or would take too long."""
+        if "failed" in row or row["group"] != "error" or "variant" in row:
+            return "failed" in row and "variant" not in row
+        series = tuple(row[word] for word in ("group", "program", "scene", "kind"))
+        larger = [run.n for run in runs if run.series == series and run.n > row["n"]]
+        expected = row["work"] * (min(larger, default=row["n"]) / row["n"]) ** 3
+        return row["errors"].get("displacement", 1.0) < ENOUGH or expected > self.point
 
     def _forget(self, place: tuple[str, str, int]) -> None:
         """Remove the files and the solution of a scene."""
@@ -166,7 +188,7 @@ class Driver:
                 words = [*map(str, run.place), str(self.folder)]
                 command = [sys.executable, "-m", "benchmarks.scenes", *words]
                 subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=True)
-                self.stems[run.place] = self.folder / f"{run.scene}_{run.kind}_{run.n}"
+                self.stems[run.place] = self.folder / scenes.stem(*run.place)
         return self.stems[run.place]
 
     def _once(self, run: Run) -> dict[str, Any]:
@@ -191,7 +213,7 @@ class Driver:
             return found
         found |= {"peak": launched["peak"], "cpu": launched["cpu"]}
         found["process"] = launched["seconds"] - found["phases"].get("answer", 0.0)
-        if displacement.exists():
+        if displacement.exists() and "errors" not in found:
             found["errors"] = self._errors(run, np.load(displacement))
         return found
 
@@ -233,7 +255,7 @@ class Driver:
         if not dict(run.options).get("errors"):
             return {"difference": difference}
         if not exact or difference > 0.01 * exact["displacement"]:  # else its error is the same within 1 %
-            exact = exact | errors.errors(scenes.make(*run.place), u)
+            exact = exact | errors.errors(scenes.make(run.scene, run.kind.split()[0], run.n), u)
             self.reference[run.place] = (known, self.reference[run.place][1] or exact)
         return {"difference": difference} | exact
 
@@ -254,6 +276,8 @@ class Driver:
         row["work"] = round(sum(s for name, s in median.items() if name not in OVERHEAD), 6)
         inside = sum(s for name, s in median.items() if name not in ("import", "answer"))
         row["start"] = round(row["process"] - inside, 6)
+        if "warm" in answers[0]:
+            row["warm"] = round(statistics.median(a["warm"] for a in answers), 6)
         row["peak"] = int(statistics.median(a["peak"] for a in answers))
         row["runs"] = len(answers)
         for word in ("unknowns", "iterations", "residual", "solver", "version", "errors", "drift"):
@@ -279,28 +303,35 @@ def machine() -> dict[str, Any]:
     return {"processor": model, "cores": cores, "memory": memory, "system": platform.system()}
 
 
-def results(driver: Driver, command: str, rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Return what is kept as JSON: rows with machine, versions and date."""
-    rows = list(rows)
+def results(
+    driver: Driver, command: str, rows: Iterable[dict[str, Any]], old: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return what is kept as JSON: rows with machine, versions and date; old ones unless measured again."""
+    rows, old = list(rows), old or {}
     versions = {row["program"]: row["version"] for row in rows if "version" in row}
+    new = {identity(row): kept(row) for row in rows}
     return {
         "command": command,
         "date": date.today().isoformat(),
         "machine": machine(),
         "python": platform.python_version(),
-        "versions": versions,
-        "absent": driver.absent,
+        "versions": old.get("versions", {}) | versions,
+        "absent": {name: why for name, why in driver.absent.items() if name not in old.get("versions", {})},
         "repeats": driver.repeats,
-        "rows": [kept(row) for row in rows],
+        "rows": list(({identity(row): row for row in old.get("rows", [])} | new).values()),
     }
+
+
+def identity(row: dict[str, Any]) -> tuple[Any, ...]:
+    """Return what two rows have in common if they measure the same."""
+    return tuple(row.get(word, "") for word in ("group", "program", "scene", "kind", "n", "variant"))
 
 
 def kept(row: dict[str, Any]) -> dict[str, Any]:
     """Return what is kept of a row: all of it, but of run time against error only what the page shows."""
     dropped = {"version"}
     if row["group"] == "error":
-        dropped |= {"task", "phases", "process", "spread", "peak", "runs", "unknowns", "iterations"}
-        dropped |= {"residual", "solver"}
+        dropped |= {"task", "phases", "work", "start", "spread", "peak", "runs", "iterations", "residual"}
         errors = {k: v for k, v in row.get("errors", {}).items() if k in ("difference", "displacement")}
         row = row | {"errors": {name: float(f"{value:.6g}") for name, value in errors.items()}}
     return {key: value for key, value in row.items() if key not in dropped}

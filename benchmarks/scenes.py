@@ -14,20 +14,31 @@ import numpy as np
 
 import kratos_lite as kl
 from benchmarks.cases import write_for_kratos
+from benchmarks.programs import ALL, FORMULATIONS
+from kratos_lite.verification import concentrations
 from kratos_lite.verification import scenes as shared
 from kratos_lite.verification.meshes import element, joined, on_plane
 from kratos_lite.verification.scenes import Scene, bending, cavity, cube, l_domain, manufactured, sphere
 
-KINDS = ("4N", "8N", "10N", "20N", "27N")
+KINDS = (*ALL, *FORMULATIONS)
+
+
+def stem(name: str, kind: str, n: int) -> str:
+    """Return the name of the files of a scene.
+
+    >>> stem("cook", "8N enhanced", 4)
+    'cook_8N_enhanced_4'
+    """
+    return f"{name}_{kind}_{n}".replace(" ", "_")
 
 
 def write(scene: Scene, folder: Path) -> Path:
     """Write a problem as `.mdpa` and as `.npz`; return the path without ending."""
-    stem = folder / f"{scene.name}_{scene.kind}_{scene.n}"
+    path = folder / stem(scene.name, scene.kind, scene.n)
     (block,) = scene.model.mesh.blocks
     supports, material = scene.model.supports, scene.model.element_groups()[0].material
     np.savez(
-        f"{stem}.npz",
+        f"{path}.npz",
         points=scene.model.mesh.points,
         nodes=block.nodes,
         vtk_order=np.array(block.shape.to_vtk),
@@ -36,8 +47,8 @@ def write(scene: Scene, folder: Path) -> Path:
         forces=scene.forces(),
         elasticity=np.array([material.E, material.nu]),
     )
-    write_for_kratos(Path(f"{stem}.mdpa"), scene.model)
-    return stem
+    write_for_kratos(Path(f"{path}.mdpa"), scene.model)
+    return path
 
 
 def cook(kind: str, n: int) -> Scene:
@@ -48,6 +59,11 @@ def cook(kind: str, n: int) -> Scene:
 def cantilever(kind: str, n: int) -> Scene:
     """Return the cantilever of MacNeal & Harder, with its energy."""
     return replace(shared.cantilever(kind, n), energy=ENERGIES["cantilever"])
+
+
+def hole_incompressible(kind: str, n: int) -> Scene:
+    """Return the plate with a hole, nearly incompressible."""
+    return replace(concentrations.hole(kind, n, nu=0.4999), name="hole_incompressible")
 
 
 def block(kind: str, n: int) -> Scene:
@@ -122,7 +138,7 @@ ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "b
 SCENES: dict[str, Callable[[str, int], Scene]] = {
     made.__name__: made
     for made in (
-        manufactured, sphere, bending, cook, l_domain, cavity, cantilever, block, cube,
+        manufactured, sphere, bending, cook, l_domain, cavity, hole_incompressible, cantilever, block, cube,
         two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
 }  # fmt: skip
@@ -131,7 +147,7 @@ SCENES: dict[str, Callable[[str, int], Scene]] = {
 
 def make(name: str, kind: str, n: int) -> Scene:
     """Return a scene by name, element kind and size."""
-    return SCENES[name](kind, n)
+    return replace(SCENES[name](FORMULATIONS.get(kind, kind), n), kind=kind)
 
 
 if __name__ == "__main__":  # a process of its own, so that large scenes leave no memory behind

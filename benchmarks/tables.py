@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 Row = dict[str, Any]
-OURS, THEIRS = "kratos_lite", "Kratos"
+OURS, ADAPTIVE, THEIRS = "kratos_lite", "kratos_lite adaptive", "Kratos"
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:

@@ -3,6 +3,7 @@
 from kratos_lite import ale as ale
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
+from kratos_lite.analysis.error_estimate import QuantityError as QuantityError
 from kratos_lite.analysis.integrators import HHT as HHT
 from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
@@ -15,6 +16,11 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
+from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
+from kratos_lite.analysis.quantities import Quantity as Quantity
+from kratos_lite.analysis.quantities import ReactionOf as ReactionOf
+from kratos_lite.analysis.quantities import StressAt as StressAt
 from kratos_lite.analysis.result import Result as Result
 from kratos_lite.analysis.state import State as State
 from kratos_lite.analysis.stepping import integrate as integrate

@@ -5,6 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 ALL = ("4N", "8N", "10N", "20N", "27N")
+FORMULATIONS = {
+    "8N enhanced": "EnhancedStrain3D8N",
+    "20N reduced": "Reduced3D20N",
+    "20N B-bar": "BBar3D20N",
+    "27N B-bar": "BBar3D27N",
+}
+"""Elements that do not lock, by the kind shown."""
 MORE = ("5N", "6N", "13N")
 """Those that `benchmarks.verification` asks for, too.
 
@@ -37,19 +44,26 @@ class Program:
 
 ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 QUADRATIC = ("10N", "20N", "27N")
+CALCULIX = ("4N", "6N", "8N", "10N", "15N", "20N", "20N reduced")
+OWN = ALL + tuple(FORMULATIONS)
 PROGRAMS = {
-    "kratos_lite": Program("lite", curved=QUADRATIC),
-    "kratos_lite NumPy": Program("lite", curved=QUADRATIC, environment={"KRATOS_LITE_KERNELS": "numpy"}),
+    "kratos_lite": Program("lite", OWN, OWN),
+    "kratos_lite adaptive": Program("lite", OWN, OWN),
+    "kratos_lite NumPy": Program("lite", OWN, OWN, {"KRATOS_LITE_KERNELS": "numpy"}),
     "Kratos": Program("kratos", kinds=(*ALL, *MORE), curved=(*ALL, *MORE)),
     "scikit-fem": Program("scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),
     "FElupe": Program("felupe_", curved=QUADRATIC, environment=ONE_BLAS_THREAD),
     "fedoo": Program("fedoo_", ("4N", "8N", "10N", "20N"), ("20N",), ONE_BLAS_THREAD),
     "SfePy": Program("sfepy_", ("4N", "8N", "10N", "27N"), environment=ONE_BLAS_THREAD),
     "NGSolve": Program("ngsolve_", ("4N", "8N"), environment=ONE_BLAS_THREAD),
-    "CalculiX": Program("calculix", ("4N", "6N", "8N", "10N", "15N", "20N"), ("10N", "15N", "20N"), digits=6),
+    "CalculiX": Program("calculix", CALCULIX, CALCULIX, digits=6),
     "GetFEM": Program("getfem_"),
+    "torch-fem": Program("torch_fem_", ("4N", "8N", "10N", "20N reduced"), ("10N", "20N reduced"), digits=8),
+    "JAX-FEM": Program("jax_fem_", ("4N", "8N", "10N", "27N"), ("10N", "27N"), ONE_BLAS_THREAD),
 }
 """Every program that solves, by the name shown."""
+PEERS = ("scikit-fem", "FElupe", "fedoo", "SfePy", "NGSolve", "GetFEM", "torch-fem", "JAX-FEM")
+"""Those of them that are Python libraries."""
 HELPERS = {
     "pyamg": Program("pyamg_"),
     "meshio": Program("meshio_"),

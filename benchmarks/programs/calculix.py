@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks.programs.common import Array, Job, run
 
 ELEMENTS = {"4N": "C3D4", "6N": "C3D6", "8N": "C3D8", "10N": "C3D10", "15N": "C3D15", "20N": "C3D20"}
+ELEMENTS["20N reduced"] = "C3D20R"
 DIRECT_LIMIT = 30_000
 """Unknowns up to which SPOOLES is faster than its conjugate gradients with incomplete Cholesky."""
 

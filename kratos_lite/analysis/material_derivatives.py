@@ -87,16 +87,6 @@ def material_acceleration(model: Structure, displacement: ArrayLike, time: float
     ------
     InputError
         The model has no motion, or the displacement another shape.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> wheel = kl.Model(kl.annulus(0.2, 1.0, 0.1), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
-    >>> wheel.fix("inner")
-    >>> wheel.add(kl.ale.Rotation("z", rate=10.0))
-    >>> a = material_acceleration(wheel, wheel.solve().u)
-    >>> print(f"{abs(a).max():.1f} m/s²")
-    100.0 m/s²
     """
     e, u = _equations_and_displacement(model, displacement)
     rest = np.zeros_like(u)

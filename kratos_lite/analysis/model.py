@@ -72,7 +72,10 @@ class Model(Structure):
             from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 
             return solve_steady(self, solver, tolerance, progress)
-        return StaticAnalysis(self, solver, tolerance, progress).solve()
+        analysis = StaticAnalysis(self, solver, tolerance, progress)
+        result = analysis.solve()
+        analysis.release()  # the result keeps the analysis, which would keep the matrix
+        return result
 
     def static(
         self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
@@ -131,7 +134,10 @@ class Model(Structure):
         MeshError, ModelError, InputError, SolveError
             As for `solve`.
         """
-        return StaticAnalysis(self, solver, tolerance, progress).solve_cases(cases)
+        analysis = StaticAnalysis(self, solver, tolerance, progress)
+        results = analysis.solve_cases(cases)
+        analysis.release()
+        return results
 
     def transient(self, **options: Any) -> TransientAnalysis:
         """Return the transient analysis of the model.

@@ -242,7 +242,42 @@ class StaticAnalysis:
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0)
+        adjoint = _Adjoint(self, model.version)
+        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, adjoint)
+
+    def release(self) -> None:
+        """Let go of the matrix and what is made of it; another solution makes them anew."""
+        self.system, self._solved = None, np.zeros(0, dtype=bool)
+
+    def adjoint(self, load: Array, motion: Array) -> Array:
+        """Return the displacement (n, 3) in m under a load alone, with supports displaced by a motion alone.
+
+        Parameters
+        ----------
+        load : (n, 3) N.
+        motion : (n, 3) m, read where a displacement is prescribed.
+
+        Returns
+        -------
+        (n, 3) in m, without the loads, prescribed displacements and initial stress of the model.
+
+        Raises
+        ------
+        ModelError
+            A motion is given, and nothing is prescribed there.
+        """
+        self._follow()
+        supports = self.model.supports
+        moved = np.where(supports.fixed, motion, 0.0)
+        if motion.any() and not moved.any():
+            raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
+        moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
+        moving[self.part[(_any_axis(load != 0) | _any_axis(moved != 0)) & self._used]] = True
+        if not moving.any():
+            return np.zeros_like(load)
+        system = self._system_of(moving)
+        displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
+        return system.solve(load, displaced - at_rest)[0]
 
     def _initial_noise(self) -> float:
         """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
@@ -303,6 +338,23 @@ class StaticAnalysis:
         if moving.any() and self.system:
             skipped += self.system.skipped
         return skipped
+
+
+@dataclass(frozen=True, eq=False)
+class _Adjoint:
+    """An analysis with the version of its model that a result is of."""
+
+    analysis: StaticAnalysis
+    version: tuple[int, int]
+
+    @property
+    def held(self) -> Mask:
+        return self.analysis.model.supports.fixed
+
+    def solve(self, load: Array, motion: Array) -> Array:
+        if self.version != self.analysis.model.version:
+            raise ModelError("the model has changed since this solution; solve it again")
+        return self.analysis.adjoint(load, motion)
 
 
 def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:

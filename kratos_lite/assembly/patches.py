@@ -15,13 +15,10 @@ import numpy as np
 from kratos_lite.assembly.polynomial_fit import Lists, lists
 from kratos_lite.mesh import Block
 from kratos_lite.mesh.topology import Faces
-from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 FAR = 0.5
 """Weight of the elements of a patch that do not contain its node."""
-CANCELED = 0.1
-"""Share of the area vectors of faces around a node that may be left at a node inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,31 +37,22 @@ class Patches:
     of: Lists
 
 
-@dataclass(frozen=True, eq=False)
-class Hanging:
-    """Nodes whose displacements other nodes interpolate.
+def patches(n: int, blocks: Sequence[Block], hanging: Ints, masters: Lists) -> Patches:
+    """Return the patches of blocks of elements.
 
-    Attributes
+    Parameters
     ----------
-    nodes : their rows.
-    masters : the nodes that interpolate each.
-    weights : their shares.
+    n : how many nodes there are.
+    blocks : the elements, numbered through the blocks.
+    hanging : nodes that others interpolate.
+    masters : those of each.
     """
-
-    nodes: Ints
-    masters: Lists
-    weights: Array
-
-
-def patches(points: Array, blocks: Sequence[Block], hanging: Hanging | None = None) -> Patches:
-    """Return the patches of blocks of elements, numbered through the blocks."""
-    n, corners = len(points), _corners(blocks)
+    corners = _corners(blocks)
     is_corner = np.zeros(n, dtype=bool)
     is_corner[corners[corners >= 0]] = True
-    if hanging is not None:
-        is_corner[hanging.nodes] = False
+    is_corner[hanging] = False
     around = _around(blocks, corners, is_corner)
-    outer = _outer(points, blocks, hanging) & is_corner
+    outer = _outer(n, blocks) & is_corner
     number = np.cumsum(is_corner) - 1
     nodes = np.flatnonzero(is_corner)
     owner, element = around.owner, around.entries
@@ -76,11 +64,8 @@ def patches(points: Array, blocks: Sequence[Block], hanging: Hanging | None = No
     order = np.argsort(rows, kind="stable")
     found = lists(number[rows], np.concatenate([element[inside], far]), len(nodes))
     weights = np.concatenate([near, far_weights])[order]
-    return Patches(found, weights, _patches_of_nodes(n, blocks, is_corner, number, hanging))
-
-
-def _cells(blocks: Sequence[Block]) -> list[tuple[Rows, type[Shape] | None]]:
-    return [(block.nodes, block.shape) for block in blocks]
+    of = _patches_of_nodes(blocks, is_corner, number, hanging, masters)
+    return Patches(found, weights, of)
 
 
 def _corners(blocks: Sequence[Block]) -> Rows:
@@ -110,31 +95,12 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
     return lists(node[known], element[known], len(is_corner))
 
 
-def _outer(points: Array, blocks: Sequence[Block], hanging: Hanging | None) -> Mask:
+def _outer(n: int, blocks: Sequence[Block]) -> Mask:
     """Return a mask of the corner nodes on the surface of the elements."""
-    outer = np.zeros(len(points), dtype=bool)
-    faces = [face for face in Faces(blocks).boundary if face.shape is not None]
-    for face in faces:
-        outer[face.nodes[:, : face.shape.corners]] = True
-    if hanging is None or not len(hanging.nodes):
-        return outer
-    # Where a large face meets small ones, their area vectors cancel at the nodes that carry them.
-    area, size = np.zeros_like(points), np.zeros(len(points))
-    for face in faces:
-        corners = face.nodes[:, : face.shape.corners]
-        X = points[corners]
-        ahead, back = (np.roll(X, shift, axis=1) - X for shift in (-1, 1))
-        normal = np.cross(ahead, back) / 4
-        for axis in range(3):
-            area[:, axis] += np.bincount(corners.ravel(), normal[..., axis].ravel(), len(points))
-        size += np.bincount(corners.ravel(), np.linalg.norm(normal, axis=-1).ravel(), len(points))
-    slave = hanging.nodes[hanging.masters.owner]
-    for axis in range(3):
-        area[:, axis] += np.bincount(
-            hanging.masters.entries, hanging.weights * area[slave, axis], len(points)
-        )
-    size += np.bincount(hanging.masters.entries, np.abs(hanging.weights) * size[slave], len(points))
-    return outer & (np.linalg.norm(area, axis=1) > CANCELED * size)
+    outer = np.zeros(n, dtype=bool)
+    for face in Faces(blocks).boundary:
+        outer[face.nodes[:, : face.shape.corners if face.shape else None]] = True
+    return outer
 
 
 def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
@@ -182,17 +148,15 @@ def _weights(owner: Ints, element: Ints, corners: Rows) -> Array:
 
 
 def _patches_of_nodes(
-    n: int, blocks: Sequence[Block], is_corner: Mask, number: Ints, hanging: Hanging | None
+    blocks: Sequence[Block], is_corner: Mask, number: Ints, hanging: Ints, masters: Lists
 ) -> Lists:
     """Return the patches of each node: its own; else those of its masters, or of its edge, face or cell."""
     owner, entries = [np.flatnonzero(is_corner)], [number[is_corner]]
     done = is_corner.copy()
-    if hanging is not None:
-        masters = hanging.masters
-        known = is_corner[masters.entries]
-        owner.append(hanging.nodes[masters.owner[known]])
-        entries.append(number[masters.entries[known]])
-        done[hanging.nodes] = True
+    known = is_corner[masters.entries]
+    owner.append(hanging[masters.owner[known]])
+    entries.append(number[masters.entries[known]])
+    done[hanging] = True
     for block in blocks:
         for a, support in enumerate(_supports(block)):
             new, first = np.unique(block.nodes[:, a], return_index=True)
@@ -202,7 +166,7 @@ def _patches_of_nodes(
             known = is_corner[at]
             owner.append(np.repeat(new, known.sum(axis=1)))
             entries.append(number[at[known]])
-    return lists(np.concatenate(owner), np.concatenate(entries), n)
+    return lists(np.concatenate(owner), np.concatenate(entries), len(is_corner))
 
 
 def _supports(block: Block) -> list[list[int]]:

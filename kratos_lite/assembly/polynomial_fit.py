@@ -116,7 +116,9 @@ def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: I
     left = np.ones(len(patches), dtype=bool)
     if means.any():
         chosen = np.flatnonzero(means)
-        found = _fit(_means(samples), patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen])
+        found = _fit(
+            _means(samples), patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen]
+        )
         frame[chosen], terms[chosen] = found[:2]
         left[chosen] = ~found[2]
     chosen = np.flatnonzero(left)

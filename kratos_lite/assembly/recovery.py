@@ -5,20 +5,22 @@ Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss
-from kratos_lite.assembly.patches import Hanging, Patches, patches
-from kratos_lite.assembly.polynomial_fit import Samples, fit
+from kratos_lite.assembly.element_groups import ElementGroup, floats
+from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
+from kratos_lite.assembly.patches import Patches, patches
+from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.mesh import Block
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron
 from kratos_lite.registry import remembered
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,11 @@ class Sampling:
     from_gauss: Array | None
     degree: int
     means: bool
+
+    @property
+    def count(self) -> int:
+        """How many samples an element has."""
+        return len(self.N)
 
 
 @remembered
@@ -62,74 +69,130 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     return Sampling(N, T, min(degree, 3), simple)
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Region:
-    """Elements of one material, whose values are smooth.
+    """Elements of one material, over which stresses are smooth.
 
     Attributes
     ----------
     groups : its elements.
-    patches : see `Patches`.
-    nodes : its nodes.
+    nodes : (k,) their nodes, ascending.
+    cells : the nodes of each group, numbered 0 … k - 1.
+    patches : of these.
     """
 
     groups: list[ElementGroup]
-    patches: Patches
     nodes: Ints
+    cells: list[Rows]
+    patches: Patches
+
+    def at_nodes(self, points: Array, values: Sequence[Array]) -> Array:
+        """Return values at the nodes (k, 6) from those at the Gauss points of the groups (m, g, 6)."""
+        ways = [sampling(group.element, group.rule) for group in self.groups]
+        places, sampled = [], []
+        for group, way, value in zip(self.groups, ways, values, strict=True):
+            places.append((way.N @ points[group.nodes]).reshape(-1, 3))
+            sampled.append((value if way.from_gauss is None else way.from_gauss @ value).reshape(-1, 6))
+        sizes = [len(group) for group in self.groups]
+        counts, degrees, means = (
+            np.repeat([getattr(way, name) for way in ways], sizes) for name in ("count", "degree", "means")
+        )
+        samples = Samples(
+            np.concatenate(places), np.concatenate(sampled), np.concatenate([[0], np.cumsum(counts)])
+        )
+        elements = self.patches.elements
+        degree = np.minimum.reduceat(degrees[elements.entries], elements.start[:-1])
+        simple = np.maximum.reduceat(means[elements.entries], elements.start[:-1])
+        fitted = fit(samples, elements, self.patches.weights, degree, simple)
+        return fitted.at(points[self.nodes], self.patches.of)
 
 
-def regions(
-    points: Array, groups: Sequence[ElementGroup], hanging: Hanging | None = None
-) -> list[Region]:
+def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
     """Return the groups by material, with their patches."""
     by_material: dict[int, list[ElementGroup]] = {}
     for group in groups:
         by_material.setdefault(id(group.material), []).append(group)
-    found = []
-    for mine in by_material.values():
-        blocks = [Block("", g.nodes, g.rows, 0 * g.rows, g.element.shape) for g in mine]
-        around = patches(points, blocks, hanging)
-        found.append(Region(mine, around, np.flatnonzero(around.of.lengths)))
-    return found
+    return [_region(mesh, mine) for mine in by_material.values()]
 
 
-def recovered(points: Array, region: Region, values: Sequence[Array]) -> Array:
-    """Return values at the nodes of a region (k, 6) from those at the Gauss points of its groups (m, g, 6)."""
-    ways = [sampling(group.element, group.rule) for group in region.groups]
-    places, sampled, counts, degrees, means = [], [], [], [], []
-    for group, way, value in zip(region.groups, ways, values, strict=True):
-        places.append((way.N @ points[group.nodes]).reshape(-1, 3))
-        sampled.append((value if way.from_gauss is None else way.from_gauss @ value).reshape(-1, 6))
-        counts.append(np.full(len(group), len(way.N)))
-        degrees.append(np.full(len(group), way.degree))
-        means.append(np.full(len(group), int(way.means)))
-    offset = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
-    samples = Samples(np.concatenate(places), np.concatenate(sampled), offset)
-    elements = region.patches.elements
-    first = elements.start[:-1]
-    degree = np.minimum.reduceat(np.concatenate(degrees)[elements.entries], first)
-    simple = np.maximum.reduceat(np.concatenate(means)[elements.entries], first)
-    fitted = fit(samples, elements, region.patches.weights, degree, simple)
-    return fitted.at(points[region.nodes], region.patches.of.take(region.nodes))
+def _region(mesh: Mesh, groups: list[ElementGroup]) -> Region:
+    used = np.zeros(mesh.n_nodes, dtype=bool)
+    for group in groups:
+        used[group.nodes] = True
+    nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
+    cells = [number[group.nodes] for group in groups]
+    blocks = [
+        Block("", nodes, group.rows, 0 * group.rows, group.element.shape)
+        for nodes, group in zip(cells, groups, strict=True)
+    ]
+    hanging, masters = (
+        np.zeros(0, dtype=np.int64),
+        Lists(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)),
+    )
+    return Region(groups, nodes, cells, patches(len(nodes), blocks, hanging, masters))
 
 
-def elastic(groups: Sequence[ElementGroup]) -> list[ElementGroup]:
-    """Return groups without their prestress."""
-    return [replace(group, prestress=None) for group in groups]
+class Recovery:
+    """Recovered stresses and strains of a mesh, for any displacements.
 
-
-def recovered_nodal(
-    points: Array, found: Sequence[Region], u: Array, *, stress: bool = True
-) -> tuple[Array, list[Array]]:
-    """Return stresses, or strains, at nodes (n, 6), and those of each region.
-
-    At nodes of several regions, the mean of these.
+    Parameters
+    ----------
+    mesh : of n nodes.
+    groups : its elements.
     """
-    total, count = np.zeros((len(points), 6)), np.zeros(len(points))
-    parts = []
-    for region in found:
-        values = [at_gauss(points, group, u, stress=stress) for group in region.groups]
-        parts.append(recovered(points, region, values))
-        total[region.nodes] += parts[-1]
-        count[region.nodes] += 1
-    return total / np.maximum(count, 1)[:, None], parts
+
+    def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> None:
+        self.points, self.groups = mesh.points, list(groups)
+        self.regions = _regions(mesh, groups)
+
+    def nodal(self, u: Array, *, stress: bool = True) -> Array:
+        """Return recovered stresses with prestress in Pa, or strains, at nodes (n, 6).
+
+        Nodes of several materials have the mean of these; nodes without elements 0.
+        """
+        total, count = np.zeros((len(self.points), 6)), np.zeros(len(self.points))
+        for region, values in self.by_region(u, stress=stress):
+            total[region.nodes] += values
+            count[region.nodes] += 1
+        return total / np.maximum(count, 1)[:, None]
+
+    def by_region(self, u: Array, *, stress: bool = True) -> Iterator[tuple[Region, Array]]:
+        """Yield each region with the values at its nodes (k, 6)."""
+        for region in self.regions:
+            values = [at_gauss(self.points, group, u, stress=stress) for group in region.groups]
+            yield region, region.at_nodes(self.points, values)
+
+    def elastic(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array]]:
+        """Yield each group with its nodes in the region, C ε (m, g, 6), and this recovered at the nodes.
+
+        Prestress is given, and no part of the error.
+        """
+        for region in self.regions:
+            plain = [replace(group, prestress=None) for group in region.groups]
+            values = [at_gauss(self.points, group, u) for group in plain]
+            nodal = region.at_nodes(self.points, values)
+            for group, nodes, value in zip(region.groups, region.cells, values, strict=True):
+                yield group, nodes, value, nodal
+
+    def differences(self, u: Array) -> Iterator[tuple[ElementGroup, Array]]:
+        """Yield each group with recovered minus own stresses at its Gauss points, (m, g, 6) in Pa."""
+        for group, nodes, value, nodal in self.elastic(u):
+            N, _ = tabulate(group.element.shape, group.rule)
+            yield group, N @ nodal[nodes] - value
+
+    def squared_errors(self, u: Array, n_elements: int) -> Array:
+        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J."""
+        found, module = np.zeros(n_elements), kernels("recovery")
+        if module is None:
+            for group, off in self.differences(u):
+                density = ((off @ np.linalg.inv(group.material.C)) * off).sum(axis=-1)
+                found[group.rows] = (density * volumes(self.points, group)).sum(axis=1)
+            return found
+        for group, nodes, value, nodal in self.elastic(u):
+            N, _ = tabulate(group.element.shape, group.rule)
+            dV, S = volumes(self.points, group), np.linalg.inv(group.material.C)
+            cells = np.ascontiguousarray(nodes, dtype=np.int32)
+            found[group.rows] = module.differences(
+                nodal, cells, floats(N), floats(value), floats(dV), floats(S)
+            )
+        return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
+from kratos_lite.typing import Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
 
 NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
@@ -106,25 +106,6 @@ def _column(
 ) -> Numbers:
     """Return whole numbers of a block, read-only."""
     return read_only(whole_numbers(values, f"block {name}: {what}", shape, dtype=dtype, error=MeshError))
-
-
-class Cells(Protocol):
-    """Points and blocks of cells on them, as a mesh has them."""
-
-    @property
-    def points(self) -> Array:
-        """(n, 3) float, m."""
-
-    @property
-    def blocks(self) -> Sequence[Block]:
-        """Blocks of elements."""
-
-    @property
-    def node_ids(self) -> Ints:
-        """(n,) int."""
-
-    def place(self, block: Block, cell: int) -> str:
-        """Return a readable place of a cell for messages."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,10 +66,9 @@ def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array
     -------
     points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
     """
-    parents = _parents(shape)
-    if not parents:
+    if len(shape.nodes) == shape.corners:
         return points, corners
-    nodes = [corners]
+    parents, nodes = _parents(shape), [corners]
     for size in sorted({len(p) for p in parents}):
         group = [p for p in parents if len(p) == size]
         keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Cells, with_rows
+from kratos_lite.mesh.blocks import NO_ROWS, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
+from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.nearest import nearest_element
 from kratos_lite.shapes import Shape, inverse_map
 from kratos_lite.shapes.inverse import outside_by

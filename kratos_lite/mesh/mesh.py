@@ -1,18 +1,18 @@
-"""Mesh: points, blocks and named parts; it does not change."""
+"""Mesh: cells with conditions and named parts; it does not change."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import Block, Part, blocks_of, ids_of, rows_of_ids, select
+from kratos_lite.mesh.blocks import Block, Part, blocks_of, select
+from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.selection import (
     Where,
@@ -22,14 +22,14 @@ from kratos_lite.mesh.selection import (
     find_nodes,
     find_part,
 )
-from kratos_lite.mesh.topology import Faces, inverted, mirror
-from kratos_lite.typing import Array, Ints, Mask
-from kratos_lite.validation import finite, instance, read_only, whole_numbers
+from kratos_lite.mesh.topology import inverted, mirror
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import instance, whole_numbers
 
 PART = "kl.Part(nodes=[4, 5])"
 
 
-class Mesh:
+class Mesh(Cells):
     """Points (n, 3) in m, element blocks, condition blocks and named parts.
 
     A mesh does not change, and its arrays are read-only; `replace` makes another one from it.
@@ -57,11 +57,7 @@ class Mesh:
     (4, 1)
     """
 
-    points: Array
-    node_ids: Ints
-    blocks: tuple[Block, ...]
     conditions: tuple[Block, ...]
-    source: str
     _parts: dict[str, Part]
 
     def __init__(
@@ -74,48 +70,21 @@ class Mesh:
         parts: Mapping[str, Part] | None = None,
         source: str = "",
     ) -> None:
-        X = finite(points, "points", ("n", 3), error=MeshError)
-        n = len(X)
-        ids = np.arange(1, n + 1) if node_ids is None else node_ids
-        vars(self).update(
-            points=read_only(np.ascontiguousarray(X)),
-            node_ids=read_only(whole_numbers(ids, "node_ids", (n,), error=MeshError)),
-            blocks=blocks_of(blocks),
-            conditions=blocks_of(conditions, "conditions"),
-            _parts=dict(
-                instance(parts or {}, "parts", Mapping, "{'top': kl.Part(nodes=[4, 5])}", error=MeshError)
-            ),
-            source=source,
-        )
-        self._check()
-
-    def __setattr__(self, name: str, value: Any) -> NoReturn:
-        raise MeshError(f"a mesh does not change; make another one, as in mesh = mesh.replace({name}=...)")
-
-    def __delattr__(self, name: str) -> NoReturn:
-        self.__setattr__(name, None)
+        super().__init__(points, blocks, node_ids, source)
+        named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
+        vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
+        self._check_rows(self.conditions)
+        self._check_parts()
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
         state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
         return _remade, state
 
-    def _check(self) -> None:
-        """Raise MeshError for ids that occur twice, and for rows of cells and parts that do not exist."""
-        if not self._is_counting:
-            ordered = self.node_ids[self._node_order]
-            twice = ordered[1:][ordered[1:] == ordered[:-1]]
-            if len(twice):
-                raise MeshError(f"node id {twice[0]} occurs more than once; give every node its own")
-        for block in (*self.blocks, *self.conditions):
-            if block.nodes.max(initial=-1) >= self.n_nodes:
-                cell = int(np.argmax((block.nodes >= self.n_nodes).any(axis=1)))
-                raise MeshError(
-                    f"{self.place(block, cell)} uses node rows {block.nodes[cell].tolist()}; "
-                    f"rows are 0 … {self.n_nodes - 1}"
-                )
+    def _check_parts(self) -> None:
+        """Raise MeshError for rows of parts that do not exist."""
         sizes = {"nodes": self.n_nodes, "elements": self.n_elements, "conditions": self.n_conditions}
         for name, part in self.parts.items():
-            instance(part, f"part {name!r}", Part, "kl.Part(nodes=[4, 5])", error=MeshError)
+            instance(part, f"part {name!r}", Part, PART, error=MeshError)
             for what, size in sizes.items():
                 whole_numbers(
                     getattr(part, what), f"part {name!r}: rows of {what}", size=size, error=MeshError
@@ -161,74 +130,10 @@ class Mesh:
             source=self.source,
         )
 
-    # ---- sizes and ids ---------------------------------------------------------------------
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return len(self.points)
-
-    @property
-    def n_elements(self) -> int:
-        """Number of elements in all blocks."""
-        return sum(len(block) for block in self.blocks)
-
     @property
     def n_conditions(self) -> int:
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
-
-    @property
-    def element_ids(self) -> Ints:
-        """(m,) element ids through all blocks in order."""
-        return ids_of(self.blocks)
-
-    @cached_property
-    def _node_order(self) -> Ints:
-        return np.argsort(self.node_ids, kind="stable")
-
-    def node_rows(self, ids: ArrayLike) -> Ints:
-        """Return the rows of nodes by their ids.
-
-        Parameters
-        ----------
-        ids : (...) int.
-
-        Returns
-        -------
-        (...) int
-            Rows of `points`; -1 where there is no such id.
-
-        Raises
-        ------
-        MeshError
-            Ids are no whole numbers.
-        """
-        ids = whole_numbers(ids, "ids of nodes", error=MeshError)
-        if self._is_counting:
-            return np.where((ids >= 1) & (ids <= self.n_nodes), ids - 1, -1)
-        return rows_of_ids(self.node_ids, ids, self._node_order)
-
-    @cached_property
-    def _is_counting(self) -> bool:
-        """Whether the ids are 1 … n in order."""
-        return bool((self.node_ids == np.arange(1, self.n_nodes + 1)).all())
-
-    def place(self, block: Block, cell: int) -> str:
-        """Return a readable place of a cell for messages: ``cube.mdpa:22: element 1 (…3D8N)``.
-
-        Parameters
-        ----------
-        block : an element block.
-        cell : row of the cell in the block.
-
-        Returns
-        -------
-        str
-        """
-        line = f":{block.lines[cell]}" if block.lines is not None else ""
-        where = f"{self.source}{line}: " if self.source else ""
-        return f"{where}element {block.ids[cell]} ({block.name})"
 
     # ---- parts -----------------------------------------------------------------------------
 
@@ -309,18 +214,6 @@ class Mesh:
         """
         return self.part(where).nodes if isinstance(where, str) else find_nodes(where, self.points)
 
-    def used_nodes(self) -> Mask:
-        """Return which nodes belong to an element.
-
-        Returns
-        -------
-        (n,) bool
-        """
-        used = np.zeros(self.n_nodes, dtype=bool)
-        for block in self.blocks:
-            used[block.nodes] = True
-        return used
-
     def elements(self, where: WhereElements = None) -> Ints:
         """Return the rows of elements.
 
@@ -381,19 +274,6 @@ class Mesh:
         return found.require() if required else found
 
     # ---- faces -----------------------------------------------------------------------------
-
-    @cached_property
-    def all_faces(self) -> Faces:
-        """All faces of the elements, and which coincide."""
-        return Faces(self.blocks)
-
-    @property
-    def boundary(self) -> list[Block]:
-        """Faces that belong to one element only, outward, one block per face shape.
-
-        ``ids`` holds the row of the parent element.
-        """
-        return self.all_faces.boundary
 
     def reoriented(self) -> Mesh:
         """Return the mesh in which inverted elements have the node order of their mirror image.

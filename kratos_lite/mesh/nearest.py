@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.mesh.blocks import Cells
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
+from kratos_lite.mesh.cells import Cells
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError, nearest
-from kratos_lite.mesh.blocks import NO_ROWS, Cells, Part, distinct, without_repeats
+from kratos_lite.mesh.blocks import NO_ROWS, Part, distinct, without_repeats
+from kratos_lite.mesh.cells import Cells
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import whole_numbers
 

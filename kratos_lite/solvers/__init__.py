@@ -5,6 +5,6 @@ sides as asked.  Every answer carries its backward error |b - A x| / (|A| |x| + 
 norm: the size of the smallest change of A and b for which x would be exact.
 """
 
-from kratos_lite.solvers.linear_solver import LinearSolver, Solution, backward_error, choose, matrix_norm
+from kratos_lite.solvers.linear_solver import LinearSolver, Solution, choose
 
-__all__ = ["LinearSolver", "Solution", "backward_error", "choose", "matrix_norm"]
+__all__ = ["LinearSolver", "Solution", "choose"]

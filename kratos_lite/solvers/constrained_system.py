@@ -103,7 +103,7 @@ class ConstrainedSystem:
     @cached_property
     def norm(self) -> float:
         """The largest row sum of |K|."""
-        return solvers.matrix_norm(self.K)
+        return self._equations.norm
 
     @cached_property
     def _equations(self) -> solvers.LinearSolver:

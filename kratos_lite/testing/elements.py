@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -191,6 +192,24 @@ def _zeros(K: Array) -> int:
     return int((~(values >= 1e-9 * values[-1])).sum())
 
 
+def stretched(element: Element) -> Measured:
+    """Check cells flattened to a hundredth: as many modes without energy, and u·K u = Σ σ·ε dV of linear u."""
+    errors, zeros = {}, _zeros(element(distorted(element)).stiffness(C_ISOTROPIC))
+    for axis, C in product(range(3), (C_ISOTROPIC, anisotropic())):
+        X = distorted(element)
+        X[:, axis] *= 0.01
+        cell, u = element(X), linear_field(X)[0]
+        K, where = cell.stiffness(C), f"of a cell flattened along {'xyz'[axis]}"
+        size = 1 / np.sqrt(np.abs(np.diag(K)))
+        values = np.sort(np.abs(np.linalg.eigvalsh(size[:, None] * K * size)))
+        ratio = float(values[zeros - 1] / values[zeros]) if 0 < zeros < len(values) and values[zeros] else 0.0
+        errors[f"1e6 times zero over the first elastic eigenvalue {where}"] = 1e6 * ratio
+        energy = float(((strain_of(cell, u, C) * cell.stress(C, u)).sum(axis=-1) * cell.dV).sum())
+        work = float(u.ravel() @ K @ u.ravel())
+        errors[f"1e10 times the error of u·K u {where}"] = 1e10 * abs(work / energy - 1)
+    return Measured(worst(errors)[0], 1.0, worst(errors)[1])
+
+
 def rigid_motions(element: Element) -> Measured:
     """Check that six rigid motions need no force: K r = 0."""
     errors = {}
@@ -309,7 +328,7 @@ def lumped_mass(element: Element) -> Measured:
 
 
 SINGLE = (
-    functions, volume, strain_operator, stiffness, symmetry, rank, rigid_motions, frame_invariance,
+    functions, volume, strain_operator, stiffness, symmetry, rank, stretched, rigid_motions, frame_invariance,
     numbering_invariance, length_scaling, offset, internal_load,
 )  # fmt: skip
 MASS = (body_force, mass_total, consistent_mass, lumped_mass)

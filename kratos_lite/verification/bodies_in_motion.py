@@ -23,7 +23,7 @@ from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads import Gravity
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.verification.meshes import element
-from kratos_lite.verification.problem import Problem
+from kratos_lite.verification.problem import Problem, bounded
 
 RUBBER = Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 SIDES, SPIN = (0.4, 0.6, 1.0), (0.05, 10.0, 0.05)
@@ -248,59 +248,39 @@ def _momentum(kind: str) -> float:
     return float(flying(kind).angular_momentum()[1] / exact)
 
 
-def _problem(
-    name: str,
-    quantity: str,
-    source: str,
-    reference: float,
-    tolerance: float,
-    of: Callable[[str], float],
-    elements: bool = False,
-) -> Problem:
-    return Problem(
-        name=f"body/{name}",
-        quantity=quantity,
-        source=source,
-        reference=float(reference),
-        tolerance=tolerance,
-        of=of,
-        takes=is_total_lagrangian if elements else None,
-    )
-
-
 PROBLEMS: list[Problem] = [
-    _problem("tumbling", "time between two turns about the intermediate axis, J = 1, 2, 3, s",
-             "Landau: 2 K(m) / λ", half_period(), 1e-3, turns_over),
+    bounded("body/tumbling", "time between two turns about the intermediate axis, J = 1, 2, 3, s",
+            "Landau: 2 K(m) / λ", half_period(), 1e-3, turns_over),
     *(
-        _problem(f"momentum_{word}", f"change of momentum of a free top over 20 s, integrator {word}",
-                 "Koziara: conserved", 0, 1e-10, momentum(word))
+        bounded(f"body/momentum_{word}", f"change of momentum of a free top over 20 s, integrator {word}",
+                "Koziara: conserved", 0, 1e-10, momentum(word))
         for word in ("momentum_conserving", "implicit")
     ),
-    _problem("heavy_top", "largest angle of the fast heavy top let go at 0.05, rad", "Goldstein",
-             lowest(50.0, 0.05), 1e-4, nutation(50.0, 0.05, 1.0)),
-    _problem("nutating_top", "largest angle of the slower heavy top let go at 0.5, rad", "Goldstein",
-             lowest(25.0, 0.5), 1e-4, nutation(25.0, 0.5, 2.0)),
-    _problem("projectile", "way of a projectile with drag -m v in 1.976 s, m", "Newton: v (1 - exp(-t))",
-             FLIGHT, 1e-5, thrown),
-    _problem("pendulum", "period of a pendulum let go from the level, s",
-             "Landau, section 11: 4 √(l/g) K(1/2)", 4 / np.pi * ELLIPTIC, 2e-4, pendulum),
-    _problem("pinned_bar", "rate of a pinned bar at its lowest, rad/s", "Newton: energy of a solid bar",
-             PINNED, 1e-4, pinned),
-    _problem("breathing", "frequency of the breathing of a pseudo-rigid cube, rad/s", "Cohen", BREATHING,
-             1e-10, pseudo_rigid_frequency(8)),
-    _problem("shear", "frequency of the shear of a pseudo-rigid cube, rad/s", "Cohen", SHEAR, 1e-10,
-             pseudo_rigid_frequency(5)),
-    _problem("turning_point", "least stretch of a pseudo-rigid cube let go at 1.1", "Cohen: √(2 - 1.1²)",
-             np.sqrt(2 - 1.1**2), 1e-4, turning_point),
-    _problem("stiff_energy", "relative change of energy of a stiff spinning box, ω h = 150, 200 steps",
-             "Simo: conserved", 0, 1e-10, stiff_energy),
-    _problem("inertia", "angular momentum of a spinning box of finite elements / m (a² + c²)/12 ω",
-             "Newton", 1, 1e-11, _momentum, True),
-    _problem("fall", "error of the mass center of a thrown, tumbling box after 0.1 s, m",
-             "Newton: v t + g t²/2", 0, 1e-11, flight(_fall), True),
-    _problem("energy", "relative change of energy of the same", "Simo: conserved", 0, 1e-10, flight(_energy),
-             True),
-    _problem("angular_momentum", "relative change of its angular momentum", "Simo: conserved", 0, 1e-10,
-             flight(_angular), True),
+    bounded("body/heavy_top", "largest angle of the fast heavy top let go at 0.05, rad", "Goldstein",
+            lowest(50.0, 0.05), 1e-4, nutation(50.0, 0.05, 1.0)),
+    bounded("body/nutating_top", "largest angle of the slower heavy top let go at 0.5, rad", "Goldstein",
+            lowest(25.0, 0.5), 1e-4, nutation(25.0, 0.5, 2.0)),
+    bounded("body/projectile", "way of a projectile with drag -m v in 1.976 s, m", "Newton: v (1 - exp(-t))",
+            FLIGHT, 1e-5, thrown),
+    bounded("body/pendulum", "period of a pendulum let go from the level, s",
+            "Landau, section 11: 4 √(l/g) K(1/2)", 4 / np.pi * ELLIPTIC, 2e-4, pendulum),
+    bounded("body/pinned_bar", "rate of a pinned bar at its lowest, rad/s", "Newton: energy of a solid bar",
+            PINNED, 1e-4, pinned),
+    bounded("body/breathing", "frequency of the breathing of a pseudo-rigid cube, rad/s", "Cohen", BREATHING,
+            1e-10, pseudo_rigid_frequency(8)),
+    bounded("body/shear", "frequency of the shear of a pseudo-rigid cube, rad/s", "Cohen", SHEAR, 1e-10,
+            pseudo_rigid_frequency(5)),
+    bounded("body/turning_point", "least stretch of a pseudo-rigid cube let go at 1.1", "Cohen: √(2 - 1.1²)",
+            np.sqrt(2 - 1.1**2), 1e-4, turning_point),
+    bounded("body/stiff_energy", "relative change of energy of a stiff spinning box, ω h = 150, 200 steps",
+            "Simo: conserved", 0, 1e-10, stiff_energy),
+    bounded("body/inertia", "angular momentum of a spinning box of finite elements / m (a² + c²)/12 ω",
+            "Newton", 1, 1e-11, _momentum, is_total_lagrangian),
+    bounded("body/fall", "error of the mass center of a thrown, tumbling box after 0.1 s, m",
+            "Newton: v t + g t²/2", 0, 1e-11, flight(_fall), is_total_lagrangian),
+    bounded("body/energy", "relative change of energy of the same", "Simo: conserved", 0, 1e-10,
+            flight(_energy), is_total_lagrangian),
+    bounded("body/angular_momentum", "relative change of its angular momentum", "Simo: conserved", 0, 1e-10,
+            flight(_angular), is_total_lagrangian),
 ]  # fmt: skip
 """The rows of this family."""

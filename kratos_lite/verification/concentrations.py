@@ -15,7 +15,7 @@ from kratos_lite.verification.problem import Problem, StaticProblem
 from kratos_lite.verification.scenes import Scene
 
 
-def hole(kind: str, n: int = 6) -> Scene:
+def hole(kind: str, n: int = 6, nu: float = scenes.UNIT.nu) -> Scene:
     """Return a quarter of a plate 8 × 8 with a hole of radius 1 under tension along x, in plane strain.
 
     Two blocks of n × n bricks from the hole to the sides, where the exact field is prescribed.
@@ -29,8 +29,8 @@ def hole(kind: str, n: int = 6) -> Scene:
         return np.column_stack([r * c, r * s, 0.5 * X[:, 2]])
 
     mesh = shaped(kind, (n, 2 * n, 1), place)
-    model = Model(mesh, scenes.UNIT)
-    exact = fields.hole(scenes.UNIT.E, scenes.UNIT.nu, 1.0, 1.0)
+    model = Model(mesh, Isotropic3D(E=scenes.UNIT.E, nu=nu))
+    exact = fields.hole(scenes.UNIT.E, nu, 1.0, 1.0)
     outer = (np.abs(mesh.points[:, :2] - 4) < 1e-9).any(axis=1)
     values = np.where(np.abs(mesh.points) < 1e-9, 0.0, exact(mesh.points))
     model.fix(outer, "xy", values[outer, :2])

@@ -126,7 +126,7 @@ def _quadratic(mesh: Callable[[str], Mesh]) -> Callable[[str], tuple[Model, ...]
     return lambda kind: (held(mesh(kind), quadratic, quadratic.body_force()),)
 
 
-def _bent(kind: str) -> tuple[Model, ...]:
+def bent(kind: str) -> tuple[Model, ...]:
     """Return a bar whose ends are held in pure bending."""
     mesh = box((6, 1, 0.5), (3, 2, 1), kind, origin=(0, -0.5, -0.25))
     model = Model(mesh, STEEL)
@@ -185,6 +185,6 @@ PROBLEMS: list[Problem] = [
             _quadratic(_moved), off(quadratic), takes=is_quadratic,
             exact=lambda kind: len(kind_of(kind).shape.nodes) in COMPLETE),
     problem("bending", f"{U}: bar with its ends held in pure bending", "Timoshenko, section 102",
-            _bent, off(bending), takes=is_quadratic),
+            bent, off(bending), takes=is_quadratic),
 ]  # fmt: skip
 """The rows of this family."""

@@ -99,6 +99,17 @@ class Problem:
         return Row(self, element, value, note=note)
 
 
+def bounded(
+    name: str, quantity: str, source: str, reference: float, tolerance: float, of: Callable[[str], float],
+    takes: Of | None = None,
+) -> Problem:  # fmt: skip
+    """Return a problem with a tolerance; without an element unless `takes` says for which it is."""
+    return Problem(
+        name=name, quantity=quantity, source=source, reference=float(reference), tolerance=tolerance, of=of,
+        takes=takes,
+    )  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class StaticProblem(Problem):
     """A problem whose answer follows from the displacements of one or several models at rest.

@@ -14,7 +14,7 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.typing import Array
-from kratos_lite.verification.problem import Problem
+from kratos_lite.verification.problem import Problem, bounded
 
 SOLID = Isotropic3D(E=1e6, nu=0.0, density=1000.0)
 INTEGRATORS: dict[str, tuple[ModelIntegrator, str]] = {
@@ -95,44 +95,25 @@ def energy(_: str) -> float:
     return float(transient.energy() / start - 1)
 
 
-def _problem(
-    name: str,
-    quantity: str,
-    source: str,
-    reference: float,
-    tolerance: float,
-    of: Callable[[str], float],
-) -> Problem:
-    return Problem(
-        name=f"time/{name}",
-        quantity=quantity,
-        source=source,
-        reference=reference,
-        tolerance=tolerance,
-        of=of,
-        takes=None,
-    )
-
-
 PROBLEMS: list[Problem] = [
     *(
-        _problem(f"order_{name}", "order of the error of u in the step, one mode over ω t = 5", source, 2,
-                 0.05, order(integrator))
+        bounded(f"time/order_{name}", "order of the error of u in the step, one mode over ω t = 5", source, 2,
+                0.05, order(integrator))
         for name, (integrator, source) in INTEGRATORS.items()
     ),
-    _problem("turn_newmark", "angle by which a step ω h = 1 turns the mode, rad",
-             "Hughes, chapter 9: 2 atan(ω h / 2)", 2 * np.arctan(0.5), 1e-10, turn(Newmark(), 1.0)),
-    _problem("turn_central_difference", "angle by which a step ω h = 1 turns the mode, rad",
-             "Hughes, chapter 9: acos(1 - (ω h)² / 2)", np.arccos(0.5), 1e-10,
-             turn(CentralDifference(), 1.0)),
+    bounded("time/turn_newmark", "angle by which a step ω h = 1 turns the mode, rad",
+            "Hughes, chapter 9: 2 atan(ω h / 2)", 2 * np.arctan(0.5), 1e-10, turn(Newmark(), 1.0)),
+    bounded("time/turn_central_difference", "angle by which a step ω h = 1 turns the mode, rad",
+            "Hughes, chapter 9: acos(1 - (ω h)² / 2)", np.arccos(0.5), 1e-10,
+            turn(CentralDifference(), 1.0)),
     *(
-        _problem(f"radius_{rho:g}", f"factor of a step ω h = 600, generalized α, ρ∞ = {rho:g}", "Chung, ρ∞",
-                 rho, 0.03, shrinking(GeneralizedAlpha(rho)))
+        bounded(f"time/radius_{rho:g}", f"factor of a step ω h = 600, generalized α, ρ∞ = {rho:g}",
+                "Chung, ρ∞", rho, 0.03, shrinking(GeneralizedAlpha(rho)))
         for rho in (0.8, 0.5)
     ),
-    _problem("radius_hht", "factor of a step ω h = 600, HHT, α = -0.1", "Hilber, (1 + α) / (1 - α)",
-             0.9 / 1.1, 0.03, shrinking(HHT(-0.1))),
-    _problem("energy", "relative change of energy over 1000 steps of the trapezoidal rule",
-             "Hughes, chapter 9: conserved", 0, 1e-11, energy),
+    bounded("time/radius_hht", "factor of a step ω h = 600, HHT, α = -0.1", "Hilber, (1 + α) / (1 - α)",
+            0.9 / 1.1, 0.03, shrinking(HHT(-0.1))),
+    bounded("time/energy", "relative change of energy over 1000 steps of the trapezoidal rule",
+            "Hughes, chapter 9: conserved", 0, 1e-11, energy),
 ]  # fmt: skip
 """The rows of this family."""

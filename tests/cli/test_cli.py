@@ -447,6 +447,14 @@ WRONG_OPTIONS = {
         [*HELD, "--fix", "z+:xyz=1e300", "--json", "out.json"],
         "a prescribed displacement must be at most 1e+50 in size; got 1e+300",
     ),
+    "squares too large": (
+        [*HELD, "--fix", "z+:xyz=1e160", "--json", "out.json"],
+        "a prescribed displacement must be at most 1e+50 in size; got 1e+160",
+    ),
+    "results too large": (
+        ["--material", "Isotropic3D:E=1e-60,nu=0.3,density=1e49", "--fix", "z-:xyz", "--gravity", "0,0,1e50"],
+        "numbers exceed what a computer holds",
+    ),
     "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
 }
 

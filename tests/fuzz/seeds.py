@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 
 import kratos_lite as kl
+from tests.fixtures.run_files import materials
 
 MDPA = """\
 Begin ModelPartData
@@ -159,19 +160,7 @@ KRATOS = {
         ],
     },
 }
-MATERIALS = {
-    "properties": [
-        {
-            "model_part_name": "Structure",
-            "properties_id": 1,
-            "Material": {
-                "constitutive_law": {"name": "LinearElastic3DLaw"},
-                "Variables": {"DENSITY": 1000.0, "YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.3},
-                "Tables": {},
-            },
-        }
-    ]
-}
+MATERIALS = materials("Structure", 1000.0, 1e9, 0.3)
 RUN = {
     "model": "mesh.mdpa",
     "material": {"E": 210e6, "nu": 0.3, "density": 7620},

@@ -1,12 +1,11 @@
 """The same dynamic run files in Kratos, live, and here: displacements, velocities and accelerations."""
 
 import json
-import subprocess
-import sys
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 import pytest
+from run_files import materials, process, run_file, run_kratos
 
 import kratos_lite as kl
 from kratos_lite.io.files import read_case
@@ -18,35 +17,7 @@ for wheel in ("Multiphysics", "StructuralMechanicsApplication"):
     except PackageNotFoundError:
         pytest.skip(f"Kratos{wheel} is not installed", allow_module_level=True)
 
-DRIVER = """
-import importlib, json, os, sys
-import KratosMultiphysics as KM
-name = "KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis"
-for folder in sys.argv[1:]:
-    os.chdir(folder)
-    model = KM.Model()
-    parameters = KM.Parameters(open("ProjectParameters.json").read())
-    importlib.import_module(name).StructuralMechanicsAnalysis(model, parameters).Run()
-    nodes = model["Structure"].Nodes
-    found = {
-        name: {node.Id: list(node.GetSolutionStepValue(getattr(KM, name))) for node in nodes}
-        for name in ("DISPLACEMENT", "VELOCITY", "ACCELERATION", "REACTION")
-    }
-    json.dump(found, open("kratos.json", "w"))
-"""
-MATERIALS = {
-    "properties": [
-        {
-            "model_part_name": "Structure.Body",
-            "properties_id": 1,
-            "Material": {
-                "constitutive_law": {"name": "LinearElastic3DLaw"},
-                "Variables": {"DENSITY": 2500.0, "YOUNG_MODULUS": 3e8, "POISSON_RATIO": 0.2},
-                "Tables": {},
-            },
-        }
-    ]
-}
+MATERIALS = materials("Structure.Body", 2500.0, 3e8, 0.2)
 TO_NODES, TO_CONDITIONS = "assign_vector_variable_process", "assign_vector_variable_to_conditions_process"
 
 
@@ -73,54 +44,25 @@ def column(size, cells, element):
     return mesh
 
 
-def process(module, part, variable, value, **settings):
-    parameters = {
-        "model_part_name": f"Structure.{part}",
-        "variable_name": variable,
-        "value": value,
-        **settings,
-    }
-    return {"python_module": module, "kratos_module": "KratosMultiphysics", "Parameters": parameters}
-
-
-CLAMP = process(TO_NODES, "Bottom", "DISPLACEMENT", [0.0, 0.0, 0.0])
-WEIGHT = process(TO_NODES, "Body", "VOLUME_ACCELERATION", [0.0, 0.0, -9.81], constrained=[False] * 3)
+CLAMP = process(TO_NODES, "Structure.Bottom", "DISPLACEMENT", value=[0.0, 0.0, 0.0])
+WEIGHT = process(
+    TO_NODES, "Structure.Body", "VOLUME_ACCELERATION", value=[0.0, 0.0, -9.81], constrained=[False] * 3
+)
 
 
 def push(*value, **settings):
-    return process(TO_CONDITIONS, "Top", "SURFACE_LOAD", list(value), **settings)
+    return process(TO_CONDITIONS, "Structure.Top", "SURFACE_LOAD", value=list(value), **settings)
 
 
 def start(variable, *value):
-    return process(TO_NODES, "Body", variable, list(value), constrained=[False] * 3, interval=[0.0, 0.0])
+    return process(
+        TO_NODES, "Structure.Body", variable, value=list(value), constrained=[False] * 3, interval=[0.0, 0.0]
+    )
 
 
-def run_file(constraints, loads, *, step=2e-3, end=0.1, **solver):
-    return {
-        "problem_data": {
-            "problem_name": "column",
-            "parallel_type": "OpenMP",
-            "start_time": 0.0,
-            "end_time": end,
-            "echo_level": 0,
-        },
-        "solver_settings": {
-            "solver_type": "Dynamic",
-            "time_integration_method": "implicit",
-            "model_part_name": "Structure",
-            "domain_size": 3,
-            "echo_level": 0,
-            "analysis_type": "linear",
-            "move_mesh_flag": False,
-            "model_import_settings": {"input_type": "mdpa", "input_filename": "mesh"},
-            "material_import_settings": {"materials_filename": "materials.json"},
-            "time_stepping": {"time_step": step},
-            "linear_solver_settings": {"solver_type": "skyline_lu_factorization"},
-            **solver,
-        },
-        "processes": {"constraints_process_list": constraints, "loads_process_list": loads},
-        "output_processes": {},
-    }
+def in_time(constraints, loads, **solver):
+    implicit = {"solver_type": "Dynamic", "time_integration_method": "implicit", "move_mesh_flag": False}
+    return run_file(constraints, loads, mesh="mesh", step=2e-3, end=0.1, **implicit, **solver)
 
 
 NEWMARK = {"scheme_type": "newmark"}
@@ -133,18 +75,18 @@ FADING = [
     WEIGHT,
     push("1e5*t", 0.0, 0.0, interval=[0.0, 0.03]),  # stays at its last value
     push(0.0, "1e4*t", None, interval=[0.02, 0.07]),
-    process(TO_CONDITIONS, "Tips", "POINT_LOAD", [0.0, "5*t", 1.0], interval=[0.01, "End"]),
+    process(TO_CONDITIONS, "Structure.Tips", "POINT_LOAD", value=[0.0, "5*t", 1.0], interval=[0.01, "End"]),
 ]
 CASES = {
-    "cantilever, newmark": (CANTILEVER, run_file([CLAMP], [WEIGHT, push(1e4, 0.0, 0.0)], **NEWMARK)),
-    "cantilever, bossak": (CANTILEVER, run_file([CLAMP], SWING)),
-    "column, newmark, damped": (HEX, run_file([CLAMP], [WEIGHT, *SWING], **NEWMARK, **DAMPED)),
-    "column, bossak -0.1, damped": (HEX, run_file([CLAMP], SWING, damp_factor_m=-0.1, **DAMPED)),
-    "loads that come and stay": (HEX, run_file([CLAMP], FADING, **DAMPED)),
-    "thrown, newmark": (HEX, run_file(THROWN, [], **NEWMARK, **DAMPED)),
-    "thrown, bossak": (HEX, run_file(THROWN, [WEIGHT], **DAMPED)),
-    "let go, newmark": (HEX, run_file(PULLED, SWING, **NEWMARK)),
-    "let go, bossak": (HEX, run_file(PULLED, [], **DAMPED)),
+    "cantilever, newmark": (CANTILEVER, in_time([CLAMP], [WEIGHT, push(1e4, 0.0, 0.0)], **NEWMARK)),
+    "cantilever, bossak": (CANTILEVER, in_time([CLAMP], SWING)),
+    "column, newmark, damped": (HEX, in_time([CLAMP], [WEIGHT, *SWING], **NEWMARK, **DAMPED)),
+    "column, bossak -0.1, damped": (HEX, in_time([CLAMP], SWING, damp_factor_m=-0.1, **DAMPED)),
+    "loads that come and stay": (HEX, in_time([CLAMP], FADING, **DAMPED)),
+    "thrown, newmark": (HEX, in_time(THROWN, [], **NEWMARK, **DAMPED)),
+    "thrown, bossak": (HEX, in_time(THROWN, [WEIGHT], **DAMPED)),
+    "let go, newmark": (HEX, in_time(PULLED, SWING, **NEWMARK)),
+    "let go, bossak": (HEX, in_time(PULLED, [], **DAMPED)),
 }
 
 
@@ -158,14 +100,7 @@ def folders(tmp_path_factory):
         kl.write(folder / "mesh.mdpa", column(size, cells, element))
         (folder / "materials.json").write_text(json.dumps(MATERIALS))
         (folder / "ProjectParameters.json").write_text(json.dumps(content))
-    run = subprocess.run(
-        [sys.executable, "-c", DRIVER, *found.values()],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-2000:]
+    run_kratos(*found.values())
     return found
 
 

@@ -84,7 +84,8 @@ def test_a_plate_of_linear_elements(element):
 @pytest.mark.parametrize("element", CELLS)
 def test_stiff_and_soft_layers(element):
     soft = body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1)
-    check(soft, rtol=1e-7)  # rounding times the contrast of 2e8
+    # both solutions of the 20-node bricks are off by up to a tenth of rounding times their condition, 9e8
+    check(soft, rtol=3e-8 if element == "20N" else 1e-8)
 
 
 @pytest.mark.parametrize("element", CELLS)

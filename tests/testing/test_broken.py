@@ -9,6 +9,8 @@ import pytest
 
 from kratos_lite.elements import (
     ELEMENTS,
+    BBar3D8N,
+    EnhancedStrain3D8N,
     KinematicLinear,
     KinematicLinear3D4N,
     KinematicLinear3D8N,
@@ -416,6 +418,85 @@ def test_an_own_B_that_is_broken_is_found(B, check):
     assert check in failed(check_element(type("Broken", (Bbar3D8N,), {"B": B})))
 
 
+def unscaled(self, xi):
+    """j0 / j is left out: the modes have a mean on distorted cells, and do work on constant stress."""
+    J0, J = self.J(np.zeros(3)), self.J(xi)
+    ratio = np.linalg.det(J0)[..., None] / np.linalg.det(J)
+    return EnhancedStrain3D8N._modes(self, xi) / ratio[..., None, None]
+
+
+def with_a_mean(self, xi):
+    G = EnhancedStrain3D8N._modes(self, xi).copy()
+    G[..., 0] += 0.1 * G[..., :1, :, 0]
+    return G
+
+
+def one_left_out(self, xi):
+    return EnhancedStrain3D8N._modes(self, xi)[..., 1:]
+
+
+def in_global_axes(self, xi):
+    """Three shears more, in x, y, z in place of the frame of the cell."""
+    G = EnhancedStrain3D8N._modes(self, xi)
+    more = np.zeros((*G.shape[:-1], 3))
+    for c in range(3):
+        more[..., 3 + c, c] = xi[:, c] * xi[:, (c + 1) % 3]
+    return np.concatenate([G, more], axis=-1)
+
+
+def every_product(self, xi):
+    """All six monomials for all six strains: nothing but constant strain has energy left."""
+    products = np.column_stack([xi, xi * np.roll(xi, -1, axis=1)])
+    modes = np.einsum("gp,cd->gcpd", products, np.eye(6)).reshape(len(xi), 6, 36)
+    return np.broadcast_to(modes, (*self.X.shape[:-2], *modes.shape))
+
+
+@pytest.mark.parametrize(
+    ("modes", "check"),
+    [
+        (unscaled, "linear patch"),
+        (with_a_mean, "linear patch"),
+        (one_left_out, "numbering invariance"),
+        (in_global_axes, "frame invariance"),
+        (every_product, "rank"),
+    ],
+)
+def test_enhanced_modes_that_are_broken_are_found(modes, check):
+    broken = type("Broken", (EnhancedStrain3D8N,), {"_modes": modes, "batched": True})
+    assert check in failed(check_element(broken))
+
+
+def test_a_dilatation_projected_without_the_volumes_of_the_points_is_found():
+    class Broken(BBar3D8N):
+        batched = True
+
+        def _projected(self, xi):
+            B = self.B(self.rule.points)
+            mean = (TRACE @ B).mean(axis=-2, keepdims=True)
+            return np.broadcast_to(mean, (*mean.shape[:-2], len(xi), mean.shape[-1]))
+
+    assert set(failed(check_element(Broken))) == {"linear patch"}
+
+
+def test_spurious_modes_that_a_patch_keeps_are_found():
+    class Broken(KinematicLinear3D8N):
+        spurious_modes = 12
+        rule = hexahedron(1)
+
+    assert "spurious modes in a patch of 2x2x2 bricks" in failed(check_element(Broken))["rank"].detail
+
+
+def test_digits_lost_in_flat_cells_are_found():
+    class Broken(KinematicLinear3D8N):
+        batched = True
+
+        def _stiffness(self, C):
+            size = np.ptp(self.X, axis=-2)
+            return super()._stiffness(C) * (1 + 1e-8 * (size.max() > 50 * size.min()))
+
+    assert set(failed(check_element(Broken))) == {"stretched"}
+
+
 def test_an_own_stress_without_symmetry_is_found():
     class Broken(KinematicLinear3D8N):
         def stress(self, C, u):
@@ -464,6 +545,7 @@ def test_a_stiffness_that_does_not_belong_to_the_strain_is_found():
         "strain operator",
         "stiffness",
         "internal load",
+        "stretched",
         "linear patch",
     }
 
@@ -496,13 +578,13 @@ def element_with(parent, **changes):
         (
             KinematicLinear3D13N,
             five_points(),
-            {"rank", "linear patch", "quadratic patch", "bending"},
+            {"rank", "stretched", "linear patch", "quadratic patch", "bending"},
         ),
         (KinematicLinear3D13N, pyramid(3), {"rank"}),
         (
             KinematicLinear3D10N,
             tetrahedron(1),
-            {"rank", "linear patch", "quadratic patch", "bending"},
+            {"rank", "stretched", "linear patch", "quadratic patch", "bending"},
         ),
         (KinematicLinear3D8N, hexahedron(1), {"rank", "linear patch", "bending"}),
         (KinematicLinear3D10N, truncated(), {"rule monomials"}),
@@ -769,7 +851,7 @@ def test_a_long_report_is_cut_and_counted():
 
 def test_a_finding_that_passes_says_what_holds_and_not_how_to_fix_it():
     texts = [str(finding) for finding in check_element(KinematicLinear3D20N) if finding.passed]
-    assert len(texts) == 34
+    assert len(texts) == 35
     assert any(text.startswith("faces: faces are outward, closed") for text in texts)
     assert not any("problem" in text or "helps" in text for text in texts)
 

@@ -1,8 +1,6 @@
 """Run files of Kratos: real folders, what Kratos computes of them, and the style of their entries."""
 
 import json
-import subprocess
-import sys
 from importlib.util import find_spec
 
 import numpy as np
@@ -17,6 +15,7 @@ from run_files import (
     process,
     push,
     run_file,
+    run_kratos,
     same_field,
     solved,
     write,
@@ -26,21 +25,6 @@ from scenes import case, present
 import kratos_lite as kl
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.io.files import read_case
-
-RUN_KRATOS = """
-import importlib, json
-import KratosMultiphysics as KM
-name = "KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis"
-model = KM.Model()
-parameters = KM.Parameters(open("ProjectParameters.json").read())
-importlib.import_module(name).StructuralMechanicsAnalysis(model, parameters).Run()
-nodes = model["Structure"].Nodes
-found = {
-    name: {node.Id: list(node.GetSolutionStepValue(getattr(KM, name))) for node in nodes}
-    for name in ("DISPLACEMENT", "REACTION")
-}
-json.dump(found, open("kratos.json", "w"))
-"""
 
 MANY_STEPS = run_file(
     [
@@ -97,10 +81,7 @@ MANY_STEPS = run_file(
 @pytest.mark.parametrize("content", [ONE_STEP, MANY_STEPS], ids=["one step", "four steps"])
 def test_the_same_folder_runs_in_kratos_and_here(folder, content):
     path = write(folder, content)
-    run = subprocess.run(
-        [sys.executable, "-c", RUN_KRATOS], cwd=folder, capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-2000:]
+    run_kratos(folder)
     expected = json.loads((folder / "kratos.json").read_text())
     project = read_case(path)
     result = project.model.solve()

@@ -1,0 +1,299 @@
+"""Quantities of interest: one number of a result, linear in its displacements, whose error is estimated."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite import voigt
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import body_force
+from kratos_lite.assembly.point_fields import stress_operator
+from kratos_lite.errors import ModelError
+from kratos_lite.mesh import Located, Mesh, Where
+from kratos_lite.model.loads import Traction
+from kratos_lite.model.supports import AXES
+from kratos_lite.typing import Array
+from kratos_lite.validation import choice, finite
+
+COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
+
+
+class Solved(Protocol):
+    """What quantities read of a `Result`."""
+
+    mesh: Mesh
+    groups: list[ElementGroup]
+    u: Array
+    reactions: Array
+
+    def stress(self, at: ArrayLike) -> Any:
+        """Return stresses (..., 6) in Pa at points."""
+
+
+class Quantity(ABC):
+    """A number Q(u) of a result, linear in u but for a constant.  One of your own needs these methods.
+
+    Attributes
+    ----------
+    unit : of the value.
+    """
+
+    unit: ClassVar[str] = ""
+
+    @abstractmethod
+    def value(self, result: Solved) -> float:
+        """Return the value in a result.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            The quantity does not fit the mesh.
+        """
+
+    def load(self, result: Solved) -> Array:
+        """Return ∂Q/∂u, the load of the adjoint solution; 0 if the class has none.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        (n, 3) in the unit of the value per m.
+        """
+        return np.zeros_like(result.u)
+
+    def motion(self, result: Solved) -> Array:
+        """Return by how much the adjoint solution displaces supports; 0 if the class does not.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        (n, 3), read where a displacement is prescribed.
+        """
+        return np.zeros_like(result.u)
+
+
+class DisplacementAt(Quantity):
+    """The displacement of a point along an axis, as ``result.displacement(at=point)``.
+
+    Parameters
+    ----------
+    point : (3,) m, anywhere in the undeformed mesh.
+    axis : ``"x"``, ``"y"`` or ``"z"``.
+
+    Raises
+    ------
+    InputError
+        The point is no point, or there is no such axis.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((4, 1, 1), (8, 2, 2)), kl.Isotropic3D(E=1e6, nu=0.3))
+    >>> bar.fix("x-")
+    >>> bar.add(kl.Traction("x+", (0, 0, 1.0)))
+    >>> tip = kl.DisplacementAt((4, 0.5, 0.5), "z")
+    >>> result = bar.solve()
+    >>> bool(abs(tip.value(result) / result.displacement(at=(4, 0.5, 0.5))[2] - 1) < 1e-12)
+    True
+    """
+
+    unit = "m"
+
+    def __init__(self, point: ArrayLike, axis: str) -> None:
+        self.point = finite(point, "a point", (3,))
+        self.axis = choice(axis, "axis", AXES)
+
+    def value(self, result: Solved) -> float:
+        """Return the displacement in m."""
+        return float((self.load(result) * result.u).sum())
+
+    def load(self, result: Solved) -> Array:
+        """Return N (n, 3) of the element that contains the point, along the axis."""
+        load = np.zeros_like(result.u)
+        nodes, weights = _located(result, self.point).nodes_and_weights()
+        load[nodes, AXES.index(self.axis)] = weights
+        return load
+
+    def __repr__(self) -> str:
+        return f"DisplacementAt({self.point.tolist()}, {self.axis!r})"
+
+
+class MeanDisplacement(Quantity):
+    """The mean displacement of a part along an axis: over its faces, or over the volume of its elements.
+
+    Parameters
+    ----------
+    part : nodes by part name, predicate, mask or rows.  The faces on the boundary among them count; a part
+        without any counts by the elements that have all their nodes in it.
+    axis : ``"x"``, ``"y"`` or ``"z"``.
+
+    Raises
+    ------
+    InputError
+        There is no such axis.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+    >>> print(f"{kl.MeanDisplacement('z+', 'z').value(bar.solve()):.1e} m")
+    5.0e-06 m
+    """
+
+    unit = "m"
+
+    def __init__(self, part: Where, axis: str) -> None:
+        self.part, self.axis = part, choice(axis, "axis", AXES)
+
+    def value(self, result: Solved) -> float:
+        """Return the mean displacement in m."""
+        return float((self.load(result) * result.u).sum())
+
+    def load(self, result: Solved) -> Array:
+        """Return ∫ N dA / A (n, 3) along the axis, or ∫ N dV / V.
+
+        Raises
+        ------
+        ModelError
+            The part has neither a face on the boundary nor an element.
+        """
+        unit = np.eye(3)[AXES.index(self.axis)]
+        mesh, groups = result.mesh, result.groups
+        if mesh.faces(self.part):
+            load = Traction(self.part, unit).forces(mesh, groups)
+        else:
+            load = np.zeros_like(result.u)
+            inside = np.zeros(mesh.n_nodes, dtype=bool)
+            inside[mesh.nodes(self.part)] = True
+            for group in groups:
+                chosen = np.asarray(inside[group.nodes].all(axis=1))
+                if chosen.any():
+                    load += body_force(mesh.points, group.take(chosen), unit)
+        size = float(load.sum())
+        if not size > 0:
+            raise ModelError(
+                f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
+                "DisplacementAt takes a point"
+            )
+        return load / size
+
+    def __repr__(self) -> str:
+        return f"MeanDisplacement({_name(self.part)}, {self.axis!r})"
+
+
+class ReactionOf(Quantity):
+    """The force of the supports of a part on the body along an axis.
+
+    It is the sum of nodal reactions, which is the virtual work for a unit displacement of the part: as
+    accurate as the energy, far more than an integral of stresses over the surface.
+
+    Parameters
+    ----------
+    part : nodes by part name, predicate, mask or rows.
+    axis : ``"x"``, ``"y"`` or ``"z"``.
+
+    Raises
+    ------
+    InputError
+        There is no such axis.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+    >>> print(f"{kl.ReactionOf('z-', 'z').value(bar.solve()):.3f} N")
+    -5.000 N
+    """
+
+    unit = "N"
+
+    def __init__(self, part: Where, axis: str) -> None:
+        self.part, self.axis = part, choice(axis, "axis", AXES)
+
+    def value(self, result: Solved) -> float:
+        """Return the force in N."""
+        return float(result.reactions[result.mesh.nodes(self.part), AXES.index(self.axis)].sum())
+
+    def motion(self, result: Solved) -> Array:
+        """Return the displacement of the part by one, against the axis."""
+        motion = np.zeros_like(result.u)
+        motion[result.mesh.nodes(self.part), AXES.index(self.axis)] = -1.0
+        return motion
+
+    def __repr__(self) -> str:
+        return f"ReactionOf({_name(self.part)}, {self.axis!r})"
+
+
+class StressAt(Quantity):
+    """A component of the stress at a point, as ``result.stress(at=point)``.
+
+    Parameters
+    ----------
+    point : (3,) m, anywhere in the undeformed mesh.
+    component : one of ``xx yy zz xy yz zx``.
+
+    Raises
+    ------
+    InputError
+        The point is no point, or there is no such component.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+    >>> bar.fix("z-")
+    >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+    >>> print(f"{kl.StressAt((0.2, 0.3, 0.9), 'zz').value(bar.solve()):.3f} Pa")
+    5.000 Pa
+    """
+
+    unit = "Pa"
+
+    def __init__(self, point: ArrayLike, component: str) -> None:
+        self.point = finite(point, "a point", (3,))
+        self.component = choice(component, "component", COMPONENTS)
+
+    def value(self, result: Solved) -> float:
+        """Return the stress in Pa."""
+        return float(result.stress(at=self.point)[COMPONENTS.index(self.component)])
+
+    def load(self, result: Solved) -> Array:
+        """Return C B (n, 3) of the element that contains the point."""
+        nodes, operator = stress_operator(result.groups, _located(result, self.point))
+        load = np.zeros_like(result.u)
+        load[nodes] = operator[COMPONENTS.index(self.component)]
+        return load
+
+    def __repr__(self) -> str:
+        return f"StressAt({self.point.tolist()}, {self.component!r})"
+
+
+def _located(result: Solved, point: Array) -> Located:
+    """Return where a point lies in the mesh of a result."""
+    return result.mesh.locate(point, required=True)
+
+
+def _name(part: Where) -> str:
+    """Return a part as text for messages."""
+    return repr(part) if isinstance(part, str) else "…"

@@ -1,0 +1,317 @@
+"""Quantities of interest: their values, and their estimated beside their true errors."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.verification import fields, scenes
+from kratos_lite.verification.meshes import body_forces, on_boundary, straight
+
+KINDS = ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"]
+E, NU = 1.0, 0.3
+LAM, MU = fields.lame(E, NU)
+
+
+def bump(X, orders=(0, 0, 0)):
+    """Return 64 x (1-x) y (1-y) z (1-z) (1 + 0.4 x - 0.3 y z²) or its derivatives, by NumPy's polynomials."""
+    P = np.polynomial.Polynomial
+    out = 0.0
+    for weight, powers in ((1.0, (0, 0, 0)), (0.4, (1, 0, 0)), (-0.3, (0, 1, 2))):
+        term = 64 * weight
+        for axis in range(3):
+            factor = P([0, 1]) * P([1, -1]) * P([0, 1]) ** powers[axis]
+            term = term * factor.deriv(orders[axis])(X[..., axis])
+        out = out + term
+    return out
+
+
+DIRECTION = np.array([1.0, -0.5, 0.7])
+
+
+def force(X):
+    """Return the body force that makes `bump` times DIRECTION the exact field."""
+    axes = np.eye(3, dtype=int)
+    laplace = sum(bump(X, 2 * a) for a in axes)
+    div = [sum(DIRECTION[j] * bump(X, axes[i] + axes[j]) for j in range(3)) for i in range(3)]
+    return np.stack([-(LAM + MU) * div[i] - MU * DIRECTION[i] * laplace for i in range(3)], axis=-1)
+
+
+def clamped_cube(kind, n):
+    """Return a cube clamped on all sides, whose exact displacement is `bump` times DIRECTION."""
+    mesh = straight(kind, (n, n, n), lambda X: X)
+    model = kl.Model(mesh, kl.Isotropic3D(E=E, nu=NU))
+    model.fix(on_boundary(mesh))
+    model.add(kl.NodalForces(body_forces(mesh, force)))
+    return model
+
+
+def pulled_bar(kind="KinematicLinear3D8N", cells=(4, 2, 2), end=0.01):
+    """Return a bar 2 x 1 x 1 clamped at one end, the other displaced along x."""
+    model = kl.Model(kl.box((2, 1, 1), cells, kind), kl.Isotropic3D(E=1e3, nu=0.3))
+    model.fix("x-")
+    model.fix("x+", "x", end)
+    return model
+
+
+# ---- values ------------------------------------------------------------------------------------------
+
+
+def test_values_are_those_of_the_result():
+    result = pulled_bar().solve()
+    point = (1.3, 0.4, 0.2)
+    assert kl.DisplacementAt(point, "y").value(result) == pytest.approx(result.displacement(at=point)[1])
+    assert kl.StressAt(point, "xy").value(result) == result.stress(at=point)[3]
+    reaction = kl.ReactionOf("x-", "x").value(result)
+    assert reaction == pytest.approx(result.reaction("x-")[:, 0].sum())
+    assert kl.MeanDisplacement("x+", "x").value(result) == pytest.approx(0.01)
+
+
+def test_mean_displacement_is_an_integral_not_the_mean_of_nodes():
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.3))
+    mesh = kl.box((1, 1, 1), (2, 1, 1))
+    mesh = mesh.replace(points=mesh.points**2)  # cells of unequal length
+    model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3))
+    model.fix(np.arange(12), "xyz", mesh.points * [1.0, 2.0, 3.0])
+    result = model.solve()
+    assert kl.MeanDisplacement("y+", "x").value(result) == pytest.approx(0.5)
+    everything = kl.MeanDisplacement(np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]), "z")
+    assert everything.value(result) == pytest.approx(1.5)
+
+
+def test_mean_over_a_volume_inside():
+    mesh = kl.box((1, 1, 1), (3, 3, 3))
+    model = kl.Model(mesh, kl.Isotropic3D(E=1.0, nu=0.3))
+    model.fix(on_boundary(mesh), "xyz", mesh.points[on_boundary(mesh)] @ np.diag([1.0, 2.0, 3.0]))
+    inside = (np.abs(mesh.points - 0.5) < 0.2).all(axis=1)
+    mean = kl.MeanDisplacement(inside, "z").value(model.solve())
+    assert mean == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("kind", ["KinematicLinear3D8N", "EnhancedStrain3D8N", "KinematicLinear3D10N"])
+def test_loads_are_derivatives_of_values(kind):
+    model = pulled_bar(kind, (2, 1, 1))
+    result, step = model.solve(), np.random.default_rng(1).uniform(-1, 1, model.mesh.points.shape)
+    moved = kl.Model(model.mesh, kl.Isotropic3D(E=1e3, nu=0.3))
+    moved.fix(np.arange(model.mesh.n_nodes), "xyz", result.u + step)
+    moved = moved.solve()
+    point = (0.31, 0.62, 0.23)
+    for quantity in (
+        kl.DisplacementAt(point, "z"),
+        kl.MeanDisplacement("z+", "x"),
+        *(kl.StressAt(point, component) for component in ("xx", "yy", "zx")),
+    ):
+        change = quantity.value(moved) - quantity.value(result)
+        assert abs((quantity.load(result) * step).sum() - change) < 1e-9 * abs(change)
+
+
+# ---- errors ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_error_where_the_mesh_has_the_exact_field(kind):
+    mesh = kl.box((1.0, 0.8, 0.6), (2, 2, 2), f"KinematicLinear3D{kind}")
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e3, nu=0.3))
+    for side in ("x-", "y-", "z-"):
+        model.fix(side, side[0])
+    model.add(kl.Traction("x+", (5.0, 0.0, 0.0)))
+    result = model.solve()
+    for quantity, scale in (
+        (kl.DisplacementAt((1, 0.8, 0.6), "x"), 5e-3),
+        (kl.MeanDisplacement("y+", "y"), 1e-3),
+        (kl.ReactionOf("x-", "x"), 2.4),
+        (kl.StressAt((0.3, 0.2, 0.5), "xx"), 5.0),
+    ):
+        error = result.error(of=quantity)
+        assert abs(quantity.value(result)) > 0.2 * scale
+        assert error.bound < 1e-9 * scale
+        assert abs(error.signed) <= error.bound * (1 + 1e-12)
+
+
+def test_reaction_of_what_is_pulled_has_the_energy_error():
+    """R = 2 U / δ, and the energy U of a solution under prescribed displacements is too large by ‖e‖² / 2."""
+    model = pulled_bar(end=0.01)
+    result = model.solve()
+    error = result.error(of=kl.ReactionOf("x+", "x"))
+    assert error.value == pytest.approx(2 * result.energy() / 0.01)
+    assert error.signed == pytest.approx(-(result.error().absolute ** 2) / 0.01)
+    assert error.per_element == pytest.approx(-(result.error().per_element ** 2) / 0.01)
+    other = result.error(of=kl.ReactionOf("x-", "x"))
+    assert other.signed == pytest.approx(-error.signed)
+
+
+def test_displacement_under_the_load_has_the_energy_error():
+    """u = 2 U / F, and the energy of a solution under loads is too small by ‖e‖² / 2."""
+    model = kl.Model(kl.box((3, 1, 1), (6, 2, 2)), kl.Isotropic3D(E=1e3, nu=0.3))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0.0, 0.0, 2.0)))
+    result = model.solve()
+    error = result.error(of=kl.MeanDisplacement("x+", "z"))
+    assert error.value == pytest.approx(2 * result.energy() / 2.0)
+    assert error.signed == pytest.approx(result.error().absolute ** 2 / 2.0)
+    assert error.relative == pytest.approx(error.signed / (error.value + error.signed))
+    assert error.bound == pytest.approx(np.abs(error.per_element).sum())
+
+
+@pytest.mark.parametrize(("kind", "n", "low", "high"), [("8N", 8, 0.7, 1.3), ("4N", 6, 0.6, 1.4)])
+def test_error_of_a_mean_beside_the_exact_one(kind, n, low, high):
+    model = clamped_cube(kind, n)
+    half = kl.MeanDisplacement(lambda X: X[:, 0] < 0.5 + 1e-9, "x")
+    half.load = lambda result: _over_half(model, result)
+    result = model.solve()
+    x, w = np.polynomial.legendre.leggauss(6)
+    x, w = (x + 1) / 2, w / 2
+    grid = np.stack(np.meshgrid(x / 2, x, x, indexing="ij"), axis=-1)
+    exact = (bump(grid) * w[:, None, None] * w[:, None] * w).sum() * DIRECTION[0]
+    error = result.error(of=half)
+    true = exact - error.value
+    assert low * true < error.signed < high * true
+    assert abs(true) < 1.3 * error.bound
+
+
+def _over_half(model, result):
+    from kratos_lite.assembly.gauss_point_fields import body_force
+
+    (group,) = result.groups
+    half = group.take(result.mesh.points[group.nodes].mean(axis=1)[:, 0] < 0.5)
+    return body_force(result.mesh.points, half, np.array([2.0, 0.0, 0.0]))
+
+
+def test_a_part_that_nothing_moves_has_no_error():
+    mesh = scenes.joined([kl.box(cells=(2, 2, 2), origin=(2.0 * i, 0, 0)) for i in range(2)])
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e3, nu=0.3))
+    model.fix("z-")
+    top = (mesh.points[:, 2] == 1) & (mesh.points[:, 0] < 1.5)
+    model.add(kl.Traction(top, (1.0, 0.0, 0.0)))
+    analysis = model.static()
+    result = analysis.solve()
+    assert result.error(of=kl.DisplacementAt((2.5, 0.5, 1.0), "x")).bound == 0
+    loaded = result.error(of=kl.DisplacementAt((0.5, 0.5, 1.0), "x"))
+    assert 0 < loaded.signed <= loaded.bound
+    again = model.solve().error(of=kl.DisplacementAt((0.5, 0.5, 1.0), "x"))
+    assert again.signed == pytest.approx(loaded.signed)
+
+
+def test_prestress_and_prescribed_values_are_no_part_of_the_adjoint():
+    plain = pulled_bar()
+    other = pulled_bar()
+    other.add_prestress([7.0, 7.0, 7.0, 0.0, 0.0, 0.0])
+    other.fix("y-", "y", 0.0)
+    plain.fix("y-", "y", 0.0)
+    quantity = kl.StressAt((1.2, 0.4, 0.3), "xx")
+    a, b = (model.solve() for model in (plain, other))
+    both = plain.solve().error(of=quantity), other.solve().error(of=quantity)
+    difference = b.error(of=quantity).value - a.error(of=quantity).value
+    stress = b.stress(at=(1.2, 0.4, 0.3)) - a.stress(at=(1.2, 0.4, 0.3))
+    assert difference == pytest.approx(stress[0])
+    assert both[1].per_element.shape == both[0].per_element.shape
+
+
+def test_hanging_nodes_of_a_support_belong_to_its_reaction():
+    """A fine bar beside a coarse one on the same support: slaves there follow nodes that are held."""
+    model = pulled_bar()
+    held = model.solve().error(of=kl.ReactionOf("x+", "x"))
+    tied = kl.Model(model.mesh, kl.Isotropic3D(E=1e3, nu=0.3))
+    tied.fix("x-")
+    rows = tied.mesh.nodes("x+")
+    tied.fix(rows[:1], "x", 0.01)
+    for row in rows[1:]:
+        tied.constrain((int(row), "x"), {(int(rows[0]), "x"): 1.0})
+    found = tied.solve().error(of=kl.ReactionOf("x+", "x"))
+    assert found.value == pytest.approx(held.value)
+    assert found.signed == pytest.approx(held.signed)
+
+
+def test_a_support_that_goes_on_beside_the_part_is_reported():
+    result = pulled_bar().solve()
+    assert result.error(of=kl.ReactionOf("x-", "x")).warnings == []
+    shared = result.error(of=kl.ReactionOf(lambda X: (X[:, 0] == 0) & (X[:, 1] < 0.6), "y")).warnings
+    assert len(shared) == 1
+    assert shared[0].startswith("2 faces beside the part are held along y, too")
+
+
+def test_a_quantity_of_your_own():
+    class Opening(kl.Quantity):
+        unit = "m"
+
+        def value(self, result):
+            return float((self.load(result) * result.u).sum())
+
+        def load(self, result):
+            one, other = (kl.MeanDisplacement(part, "y").load(result) for part in ("y+", "y-"))
+            return one - other
+
+    model = pulled_bar()
+    result = model.solve()
+    error = result.error(of=Opening())
+    assert error.value == pytest.approx(2 * kl.MeanDisplacement("y+", "y").value(result))
+    assert error.unit == "m"
+    assert "m" in str(error)
+
+
+# ---- what is refused ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "words"),
+    [
+        (lambda: kl.DisplacementAt((0, 0), "x"), InputError, "a point must have shape"),
+        (lambda: kl.DisplacementAt((0, 0, np.nan), "x"), InputError, "must be finite"),
+        (lambda: kl.DisplacementAt((0, 0, 0), "w"), InputError, "axis must be one of x, y, z"),
+        (lambda: kl.MeanDisplacement("x+", 1), InputError, "axis must be one of x, y, z"),
+        (lambda: kl.ReactionOf("x-", "xy"), InputError, "axis must be one of x, y, z"),
+        (lambda: kl.StressAt((0, 0, 0), "xz"), InputError, "component must be one of xx, yy, zz, xy, yz, zx"),
+    ],
+)
+def test_wrong_quantities(make, kind, words):
+    with pytest.raises(kind, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "kind", "words"),
+    [
+        ("tip", InputError, "of must be a Quantity, such as kl.DisplacementAt"),
+        (kl.DisplacementAt, InputError, "of must be a Quantity"),
+        (kl.DisplacementAt((9, 0, 0), "x"), MeshError, "lies outside the mesh"),
+        (kl.StressAt((9, 0, 0), "xx"), MeshError, "lies outside the mesh"),
+        (kl.MeanDisplacement("nowhere", "x"), MeshError, "there is no part 'nowhere'"),
+        (kl.MeanDisplacement([0, 1], "x"), ModelError, "neither a face on the boundary nor an element"),
+        (kl.ReactionOf("nowhere", "x"), MeshError, "there is no part 'nowhere'"),
+        (
+            kl.ReactionOf(lambda X: X[:, 0] == 1, "y"),
+            ModelError,
+            "nothing is prescribed on the part along this axis",
+        ),
+    ],
+)
+def test_quantities_that_do_not_fit(quantity, kind, words):
+    model = pulled_bar(cells=(2, 1, 1))
+    with pytest.raises(kind, match=words):
+        model.solve().error(of=quantity)
+
+
+def test_a_reaction_that_constraints_share_is_refused():
+    model = pulled_bar(cells=(2, 1, 1))
+    inner = model.mesh.nodes(lambda X: np.abs(X[:, 0] - 1) < 1e-9)
+    end = model.mesh.nodes("x+")
+    model.constrain((int(inner[0]), "x"), {(int(end[0]), "x"): 0.5})
+    result = model.solve()
+    with pytest.raises(ModelError, match="multi-point constraints tie the part"):
+        result.error(of=kl.ReactionOf("x+", "x"))
+
+
+def test_a_model_that_has_changed_is_refused():
+    model = pulled_bar(cells=(2, 1, 1))
+    result = model.solve()
+    model.fix("y-", "y")
+    with pytest.raises(ModelError, match="the model has changed since"):
+        result.error(of=kl.DisplacementAt((1, 1, 1), "z"))
+
+
+def test_results_of_a_motion_or_a_time_are_refused():
+    wheel = kl.Model(kl.annulus(0.2, 1.0, 0.1), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    wheel.fix("inner")
+    wheel.add(kl.ale.Rotation("z", rate=10.0))
+    with pytest.raises(InputError, match="needs the matrix of a static analysis"):
+        wheel.solve().error(of=kl.DisplacementAt((0.5, 0, 0), "x"))
