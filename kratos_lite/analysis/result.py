@@ -368,7 +368,7 @@ class Result:
 
     @cached_property
     def _error(self) -> ErrorEstimate:
-        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
+        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)[0]
         total = float(squares.sum())
         size = 2 * self.energy() + total
         return ErrorEstimate(total**0.5, (total / size) ** 0.5 if size else 0.0, np.sqrt(squares))

@@ -10,15 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
+from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.patches import Patches, patches
 from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import kernels
-from kratos_lite.quadrature import Rule, hexahedron
+from kratos_lite.quadrature import Rule, hexahedron, rule_for
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array, Ints, Rows
 
@@ -106,6 +109,14 @@ class Region:
         fitted = fit(samples, elements, self.patches.weights, degree, simple)
         return fitted.at(points[self.nodes], self.patches.of)
 
+    def averaged(self, values: Sequence[Array]) -> Array:
+        """Return the same, extrapolated to the nodes of each element and averaged there."""
+        total, count = np.zeros((len(self.nodes), 6)), np.zeros(len(self.nodes))
+        for group, cells, value in zip(self.groups, self.cells, values, strict=True):
+            add_nodal(total, cells, extrapolation(group.element, group.rule) @ value)
+            count += np.bincount(cells.ravel(), minlength=len(count))
+        return total / count[:, None]
+
 
 def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
     """Return the groups by material, with their patches."""
@@ -162,37 +173,49 @@ class Recovery:
             values = [at_gauss(self.points, group, u, stress=stress) for group in region.groups]
             yield region, region.at_nodes(self.points, values)
 
-    def elastic(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array]]:
-        """Yield each group with its nodes in the region, C ε (m, g, 6), and this recovered at the nodes.
-
-        Prestress is given, and no part of the error.
-        """
-        for region in self.regions:
-            plain = [replace(group, prestress=None) for group in region.groups]
-            values = [at_gauss(self.points, group, u) for group in plain]
-            nodal = region.at_nodes(self.points, values)
-            for group, nodes, value in zip(region.groups, region.cells, values, strict=True):
-                yield group, nodes, value, nodal
-
     def differences(self, u: Array) -> Iterator[tuple[ElementGroup, Array]]:
-        """Yield each group with recovered minus own stresses at its Gauss points, (m, g, 6) in Pa."""
-        for group, nodes, value, nodal in self.elastic(u):
+        """Yield each group with recovered minus own stresses at its points, (m, g, 6) in Pa.
+
+        The groups have no prestress, which is given and no part of the error, and rules that are good for the
+        square of the difference.
+        """
+        for group, nodes, value, nodal, _ in self._compared(u):
             N, _ = tabulate(group.element.shape, group.rule)
             yield group, N @ nodal[nodes] - value
 
-    def squared_errors(self, u: Array, n_elements: int) -> Array:
-        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J."""
-        found, module = np.zeros(n_elements), kernels("recovery")
-        if module is None:
-            for group, off in self.differences(u):
-                density = ((off @ np.linalg.inv(group.material.C)) * off).sum(axis=-1)
-                found[group.rows] = (density * volumes(self.points, group)).sum(axis=1)
-            return found
-        for group, nodes, value, nodal in self.elastic(u):
+    def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
+        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
+        found = np.zeros((2, n_elements))
+        for group, nodes, value, *nodal in self._compared(u):
             N, _ = tabulate(group.element.shape, group.rule)
             dV, S = volumes(self.points, group), np.linalg.inv(group.material.C)
-            cells = np.ascontiguousarray(nodes, dtype=np.int32)
-            found[group.rows] = module.differences(
-                nodal, cells, floats(N), floats(value), floats(dV), floats(S)
-            )
-        return found
+            for row, values in zip(found, nodal, strict=True):
+                row[group.rows] = _squares(values, nodes, N, value, dV, S)
+        return found[0], found[1]
+
+    def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array, Array]]:
+        """Yield each group, its nodes in the region, C ε at its points, and recovered and averaged at nodes."""
+        for region in self.regions:
+            plain = [replace(group, prestress=None) for group in region.groups]
+            values = [at_gauss(self.points, group, u) for group in plain]
+            nodal, averaged = region.at_nodes(self.points, values), region.averaged(values)
+            for group, nodes, value in zip(plain, region.cells, values, strict=True):
+                fine = _compared_at(group)
+                yield fine, nodes, value if fine is group else at_gauss(self.points, fine, u), nodal, averaged
+
+
+def _compared_at(group: ElementGroup) -> ElementGroup:
+    """Return a group with a rule for squared errors, where its stresses are known at any points."""
+    shape = group.element.shape
+    if group.rule.degree >= 2 * shape.degree or not group.element.inherits(*GEOMETRY, *STRAIN, "stress"):
+        return group
+    return replace(group, rule=rule_for(shape.cell, 2 * shape.degree))
+
+
+def _squares(nodal: Array, cells: Rows, N: Array, value: Array, dV: Array, S: Array) -> Array:
+    """Return ∫ (N σ* - σ) : S : (N σ* - σ) dV of each element, (m,)."""
+    if module := kernels("recovery"):
+        rows = np.ascontiguousarray(cells, dtype=np.int32)
+        return module.differences(nodal, rows, floats(N), floats(value), floats(dV), floats(S))
+    off = N @ nodal[cells] - value
+    return (((off @ S) * off).sum(axis=-1) * dV).sum(axis=1)
