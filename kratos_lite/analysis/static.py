@@ -183,7 +183,7 @@ class StaticAnalysis:
                 raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         with phase("load"):
             mesh, fixed = self.model.mesh, self.model.supports.fixed
-            external = external_loads(mesh, self.groups, loads)
+            external = self.model.supports.on_masters(external_loads(mesh, self.groups, loads))
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
             checks.check_carried(mesh, forces, self._used)
@@ -234,7 +234,7 @@ class StaticAnalysis:
             reactions = model.supports.supported(reactions)
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
-            inner = stress_load(model, self.groups, u)
+            inner = model.supports.on_masters(stress_load(model, self.groups, u))
             rounding = count * max(noise, self._initial_noise())
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
             judge(solution, u, balance)
@@ -303,6 +303,7 @@ class StaticAnalysis:
             warnings=warnings,
             notes=list(self.model.notes),
             skipped=self._skipped(case.moving),
+            formulation=self.model.chosen(self.groups),
         )
 
     def _at_rest(self) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, blocks_of, ids_of, rows_of_ids
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.mesh.topology import Faces
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, read_only, whole_numbers
@@ -25,6 +26,7 @@ class Cells:
     blocks : cells (m, k) by element name, rows of `points` from 0; or a list of `Block`.
     node_ids : (n,) int, ids of the nodes; 1 … n if not given.
     source : name of the file they came from, used in messages.
+    hanging : nodes inside edges or faces of larger neighbors, or None.
 
     Raises
     ------
@@ -36,6 +38,7 @@ class Cells:
     node_ids: Ints
     blocks: tuple[Block, ...]
     source: str
+    hanging: HangingNodes | None
 
     def __init__(
         self,
@@ -43,6 +46,7 @@ class Cells:
         blocks: Mapping[str, ArrayLike] | Sequence[Block],
         node_ids: ArrayLike | None,
         source: str,
+        hanging: HangingNodes | None = None,
     ) -> None:
         X = finite(points, "points", ("n", 3), error=MeshError)
         n = len(X)
@@ -52,6 +56,7 @@ class Cells:
             node_ids=read_only(whole_numbers(ids, "node_ids", (n,), error=MeshError)),
             blocks=blocks_of(blocks),
             source=source,
+            hanging=hanging,
         )
         if not self._is_counting:
             ordered = self.node_ids[self._node_order]
@@ -153,7 +158,7 @@ class Cells:
     @cached_property
     def all_faces(self) -> Faces:
         """All faces of the elements, and which coincide."""
-        return Faces(self.blocks)
+        return Faces(self.blocks, self.hanging)
 
     @property
     def boundary(self) -> list[Block]:

@@ -8,8 +8,10 @@ from itertools import permutations
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import SIDES, Mesh, Part
+from kratos_lite.mesh.order import raise_order
 from kratos_lite.shapes import Hexahedron8, Shape
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, fits_memory
@@ -53,43 +55,6 @@ def _grid(cells: tuple[int, int, int], with_centers: bool) -> tuple[Array, Ints]
     return points, bricks
 
 
-def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
-    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
-
-    Parameters
-    ----------
-    points : (n, 3) float.
-    corners : (m, c) int, corner nodes of each cell in Kratos order.
-    shape : the shape wanted.
-
-    Returns
-    -------
-    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
-    """
-    if len(shape.nodes) == shape.corners:
-        return points, corners
-    parents, nodes = _parents(shape), [corners]
-    for size in sorted({len(p) for p in parents}):
-        group = [p for p in parents if len(p) == size]
-        keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)
-        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
-        nodes.append(len(points) + inverse.reshape(len(corners), len(group)))
-        points = np.vstack([points, points[unique].mean(axis=1)])
-    return points, np.hstack(nodes)
-
-
-def _parents(shape: type[Shape]) -> list[tuple[int, ...]]:
-    """Return the corners whose middle each further node is: edges, then faces, then the cell."""
-    corner = shape.nodes[: shape.corners]
-    groups = [*shape.edges, *(f[: 4 if len(f) > 6 else 3] for f in shape.faces), tuple(range(shape.corners))]
-    middles = [corner[list(g)].mean(axis=0) for g in groups]
-    found = []
-    for node in shape.nodes[shape.corners :]:
-        distance = [np.abs(node - middle).max() for middle in middles]
-        found.append(tuple(groups[int(np.argmin(distance))]))
-    return found
-
-
 def _cells(cells: Sequence[int]) -> tuple[int, int, int]:
     counts = finite(cells, "cells")
     if counts.shape != (3,) or (counts < 1).any() or (counts != counts.round()).any():
@@ -123,7 +88,7 @@ def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Int
     split = np.array(SPLITS[shape.cell])
     corners = bricks[:, split].reshape(-1, split.shape[1])
     points, nodes = raise_order(points, corners, shape)
-    return points, {kind.__name__: nodes}
+    return points, {element if is_unnamed(element) else kind.__name__: nodes}
 
 
 def _sides(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
@@ -143,7 +108,7 @@ def box(
     ----------
     size : edge lengths in m, > 0.
     cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
-    element : name of the element.
+    element : name of the element; ``Element3D8N`` and its kin are computed by one that does not lock.
     origin : the corner with the smallest coordinates, m.
 
     Returns
@@ -182,7 +147,7 @@ def annulus(
     inner, outer : radii in m, 0 < inner < outer.
     width : length along z in m; z runs from 0 to `width`.
     cells : bricks along the radius, around (≥ 3) and along z.
-    element : name of the element; mid-edge nodes lie on the circles.
+    element : name of the element, as for `box`; mid-edge nodes lie on the circles.
 
     Returns
     -------

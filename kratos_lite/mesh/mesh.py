@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part, blocks_of, select
 from kratos_lite.mesh.cells import Cells
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.selection import (
     Where,
@@ -42,6 +43,7 @@ class Mesh(Cells):
     conditions : condition blocks.
     parts : named parts; a child of part ``A`` is named ``A.b``.
     source : name of the file it came from, used in messages.
+    hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
 
     Raises
     ------
@@ -69,8 +71,9 @@ class Mesh(Cells):
         conditions: Mapping[str, ArrayLike] | Sequence[Block] = (),
         parts: Mapping[str, Part] | None = None,
         source: str = "",
+        hanging: HangingNodes | None = None,
     ) -> None:
-        super().__init__(points, blocks, node_ids, source)
+        super().__init__(points, blocks, node_ids, source, hanging)
         named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
         vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
         self._check_rows(self.conditions)
@@ -78,7 +81,7 @@ class Mesh(Cells):
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
         state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
-        return _remade, state
+        return _remade, (*state, self.hanging)
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""
@@ -128,6 +131,7 @@ class Mesh(Cells):
             conditions=self.conditions if conditions is None else conditions,
             parts=self._parts if parts is None else parts,
             source=self.source,
+            hanging=self.hanging,
         )
 
     @property
@@ -311,6 +315,16 @@ class Mesh(Cells):
         return [block for block in chosen if len(block)]
 
 
-def _remade(points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str) -> Mesh:
+def _remade(
+    points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str, hanging: Any
+) -> Mesh:
     """Return a mesh from what it was made of."""
-    return Mesh(points, blocks, node_ids=node_ids, conditions=conditions, parts=parts, source=source)
+    return Mesh(
+        points,
+        blocks,
+        node_ids=node_ids,
+        conditions=conditions,
+        parts=parts,
+        source=source,
+        hanging=hanging,
+    )

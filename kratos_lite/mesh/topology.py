@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
+from kratos_lite.mesh.centers import keys_of
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.native import kernels
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
@@ -89,15 +91,25 @@ class Faces:
     Parameters
     ----------
     blocks : blocks of elements; one without a shape has no faces.
+    hanging : hanging nodes, whose large and small faces meet.
 
     Attributes
     ----------
-    one, other : pairs of faces that have the same corners.
+    one, other : pairs of faces that meet: with the same corners, then large and small ones.
     """
 
-    def __init__(self, blocks: Sequence[Block]) -> None:
+    def __init__(self, blocks: Sequence[Block], hanging: HangingNodes | None = None) -> None:
         self.blocks = list(blocks)
         self.one, self.other = equal_sets([(b.nodes, [corners(f) for f in faces_of(b)]) for b in blocks])
+        self._n_equal = len(self.one)
+        if hanging is not None and len(hanging.large):
+            keys = np.concatenate([keys_of(b.nodes[:, corners(f)]) for b in blocks for f in faces_of(b)])
+            order = np.argsort(keys, kind="stable")
+            large, small = (
+                order[np.searchsorted(keys, wanted, sorter=order)]
+                for wanted in (hanging.large, hanging.small)
+            )
+            self.one, self.other = np.append(self.one, large), np.append(self.other, small)
 
     @cached_property
     def element(self) -> Ints:
@@ -110,8 +122,9 @@ class Faces:
         if all(len(face) == len(corners(face)) for block in self.blocks for face in faces_of(block)):
             return NO_ROWS, NO_ROWS
         keys = set_keys([(block.nodes, faces_of(block)) for block in self.blocks])
-        open_ = keys[self.one] != keys[self.other]
-        return self.one[open_], self.other[open_]
+        one, other = self.one[: self._n_equal], self.other[: self._n_equal]
+        open_ = keys[one] != keys[other]
+        return one[open_], other[open_]
 
     @cached_property
     def boundary(self) -> list[Block]:

@@ -17,12 +17,14 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.model.locking import check_locking
 from kratos_lite.model.solid import Solid
-from kratos_lite.model.supports import AXES, Supports
+from kratos_lite.model.spurious_modes import check_spurious_modes
+from kratos_lite.model.supports import AXES, Fixing, Supports
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite
+from kratos_lite.validation import finite, function_or_none
 
 
 class Attachment(ABC):
@@ -50,6 +52,7 @@ class Structure(Solid):
     ----------
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
+    formulation : of the elements, in place of what their names in the mesh say; see `Solid.formulation`.
 
     Attributes
     ----------
@@ -60,15 +63,18 @@ class Structure(Solid):
     Raises
     ------
     InputError
-        `mesh` is not a Mesh, or `material` not a material.
+        `mesh` is not a Mesh, `material` not a material, or an element of the mesh has no such formulation.
     MeshError
         A part or property of `material` does not exist.
     """
 
     def __init__(
-        self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
+        self,
+        mesh: Mesh,
+        material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
+        formulation: str | None = None,
     ) -> None:
-        super().__init__(mesh, material)
+        super().__init__(mesh, material, formulation)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self._motion: Attachment | None = None
@@ -99,6 +105,7 @@ class Structure(Solid):
         axes: str = "xyz",
         value: ArrayLike | Callable[[float], float] = 0.0,
         *,
+        field: Callable[[Array], ArrayLike] | None = None,
         override: bool = False,
     ) -> None:
         """Prescribe the displacement of nodes.
@@ -109,6 +116,8 @@ class Structure(Solid):
         axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
         value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
             which statics take at the time 0.
+        field : in place of a value, a function of places (k, 3) in m that returns one row per node or one
+            number per axis in m.  A mesh that is made finer takes its values, others are interpolated.
         override : let this value win over an earlier one for the same degree of freedom.
 
         Raises
@@ -124,10 +133,9 @@ class Structure(Solid):
         if not len(rows):
             what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
             raise ModelError(f"cannot fix {axes}: {what}")
-        if callable(value):
-            self.supports.prescribe_motion(rows, axes, value, override)
-        else:
-            self.supports.fix(rows, axes, value, override)
+        function_or_none(field, "field must be a function of places (k, 3)")
+        known = where if isinstance(where, str) or callable(where) else None
+        self.supports.apply(Fixing(known, rows, axes, value, field, override))
 
     def constrain(
         self,
@@ -250,6 +258,8 @@ class Structure(Solid):
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
+        warnings += check_locking(mesh, groups, self.supports, faces)
+        check_spurious_modes(mesh, groups, self.supports, faces)
         if not used.all():
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
@@ -275,6 +285,7 @@ class Structure(Solid):
         without = int((self._material_of < 0).sum())
         rows = [("nodes", str(mesh.n_nodes))]
         rows += [("elements", f"{len(block)} {block.name}") for block in mesh.blocks if len(block)]
+        rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in used]
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))

@@ -56,6 +56,28 @@ class PrescribedMotion:
     given: object
 
 
+@dataclass(frozen=True, eq=False)
+class Fixing:
+    """One call of `Structure.fix`, from which a finer mesh is fixed alike.
+
+    Attributes
+    ----------
+    where : nodes by part name or predicate, or None where rows were given.
+    rows : the nodes.
+    axes : such as ``"xz"``.
+    value : m; as given, or a function of time.
+    field : function of places, or None.
+    override : whether it won over earlier ones.
+    """
+
+    where: str | Callable[[Array], ArrayLike] | None
+    rows: Ints
+    axes: str
+    value: ArrayLike | Callable[[float], float]
+    field: Callable[[Array], ArrayLike] | None
+    override: bool
+
+
 class Supports:
     """What holds a structure: prescribed displacements, prescribed motion and multi-point constraints.
 
@@ -64,6 +86,7 @@ class Supports:
     fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
     values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
     motions : the prescribed motion.
+    fixings : the calls of `Structure.fix` that all this came from, in order.
     version : counts the changes of what is prescribed, but for values and functions of time.
     value_version : counts all changes.
     """
@@ -74,7 +97,11 @@ class Supports:
         self._values: Array = np.zeros(mesh.points.shape)
         self.fixed, self.values = self._fixed.view(), self._values.view()
         self.fixed.flags.writeable = self.values.flags.writeable = False
-        self._constraints: tuple[MultiPointConstraint, ...] = ()
+        self._constraints = hanging_constraints(mesh)
+        self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
+        if mesh.hanging is not None:
+            self._hangs[mesh.hanging.nodes] = True
+        self.fixings: list[Fixing] = []
         self.motions: tuple[PrescribedMotion, ...] = ()
         self.version = self.value_version = 0
         self._slaves: tuple[int, Slaves] = (-1, {})
@@ -84,6 +111,26 @@ class Supports:
         return f"node {self.mesh.node_ids[dof // 3]} along {AXES[dof % 3]}"
 
     # ---- prescribed displacements ------------------------------------------------------------------------
+
+    def apply(self, fixing: Fixing) -> None:
+        """Prescribe what a call of `Structure.fix` asks for; hanging nodes follow their masters instead.
+
+        Raises
+        ------
+        InputError, ModelError
+            As by `fix` and `prescribe_motion`.
+        """
+        rows, value = fixing.rows, fixing.value
+        stays = ~self._hangs[rows]
+        if callable(value):
+            self.prescribe_motion(rows[stays], fixing.axes, value, fixing.override)
+        else:
+            if fixing.field is not None:
+                value = fixing.field(self.mesh.points[rows])
+            if np.ndim(value) == 2 and len(np.asarray(value)) == len(rows) and not stays.all():
+                value = np.asarray(value)[stays]
+            self.fix(rows[stays], fixing.axes, value, fixing.override)
+        self.fixings.append(fixing)
 
     def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
         """Prescribe the displacement of nodes along axes.
@@ -266,7 +313,11 @@ class Supports:
         """Return a residual (n, 3) where supports or constraints act, and 0 elsewhere."""
         acts = self.fixed.copy()
         acts.flat[[dof for c in self.constraints for dof in (c.slave, *c.masters)]] = True
-        return np.where(acts, residual, 0.0)
+        return np.where(acts, self.on_masters(residual), 0.0)
+
+    def on_masters(self, forces: Array) -> Array:
+        """Return nodal forces (n, 3) with those on hanging nodes passed on to their masters."""
+        return forces if self.mesh.hanging is None else self.mesh.hanging.gather(forces)
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
         """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight)."""
@@ -277,3 +328,12 @@ class Supports:
             dof.append(np.array([constraint.slave, *constraint.masters], dtype=np.int64))
             weight.append(np.array([1.0, *(-w for w in constraint.weights)]))
         return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)
+
+
+def hanging_constraints(mesh: Mesh) -> tuple[MultiPointConstraint, ...]:
+    """Return the constraints that keep the displacement continuous at the hanging nodes of a mesh."""
+    return tuple(
+        MultiPointConstraint(3 * node + axis, tuple((3 * masters + axis).tolist()), tuple(weights.tolist()))
+        for node, masters, weights in mesh.hanging or ()
+        for axis in range(3)
+    )

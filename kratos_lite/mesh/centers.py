@@ -1,0 +1,97 @@
+"""Centers: the nodes in the middle of edges, faces and cells, known by the corners around them.
+
+Whatever makes an element quadratic or cuts it into smaller ones puts nodes there, so that two elements
+agree on a node if they agree on the corners of what they share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.mesh.blocks import NO_ROWS, Block
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import LINEAR, Shape
+from kratos_lite.typing import Array, Ints, Rows
+
+Keys = NDArray[np.uint64]
+_MIX = (np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
+
+
+def keys_of(corners: Ints | Rows) -> Keys:
+    """Return a number for each set of nodes (..., k), the same in whatever order they stand.
+
+    It is the sum of well-mixed numbers of the nodes, of 64 bits: two sets share it by accident alone.
+    Source: Steele, Lea & Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+    """
+    with np.errstate(over="ignore"):
+        z = (np.asarray(corners).astype(np.uint64) + np.uint64(1)) * _MIX[0]
+        z = (z ^ (z >> np.uint64(30))) * _MIX[1]
+        z = (z ^ (z >> np.uint64(27))) * _MIX[2]
+        return (z ^ (z >> np.uint64(31))).sum(axis=-1, dtype=np.uint64)
+
+
+@remembered
+def surroundings(shape: type[Shape]) -> tuple[tuple[int, ...], ...]:
+    """Return for each node of a shape beyond its corners the corners that it is in the middle of."""
+    return tuple(corners_around(shape.cell, xi) for xi in shape.nodes[shape.corners :])
+
+
+def corners_around(cell: str, xi: Array) -> tuple[int, ...]:
+    """Return the corners of the edge, face or cell inside which a point (d,) of a reference cell lies.
+
+    >>> corners_around("hexahedron", np.array([0.0, -1.0, -1.0]))
+    (0, 1)
+    """
+    return tuple(np.flatnonzero(np.abs(LINEAR[cell].N(xi)) > 1e-12).tolist())
+
+
+class Centers:
+    """Which node lies in the middle of which corners.
+
+    Parameters
+    ----------
+    blocks : elements; their nodes beyond the corners are known from the start.
+    """
+
+    def __init__(self, blocks: Iterable[Block] = ()) -> None:
+        self._keys: Keys = np.zeros(0, dtype=np.uint64)
+        self._nodes: Ints = NO_ROWS
+        for block in blocks:
+            shape = block.shape
+            if shape is None or not len(block):
+                continue
+            for node, around in enumerate(surroundings(shape), start=shape.corners):
+                self.add(keys_of(block.nodes[:, list(around)]), block.nodes[:, node])
+        self.sort()
+
+    def add(self, keys: Keys, nodes: Ints | Rows) -> None:
+        """Take up nodes (k,) by the keys (k,) of their corners; `find` needs `sort` first."""
+        self._keys = np.concatenate([self._keys, keys])
+        self._nodes = np.concatenate([self._nodes, np.asarray(nodes, dtype=np.int64)])
+
+    def sort(self) -> None:
+        """Make what was taken up ready to be found."""
+        self._keys, first = np.unique(self._keys, return_index=True)
+        self._nodes = self._nodes[first]
+
+    def find(self, keys: Keys) -> Ints:
+        """Return the node of each key (...), -1 where there is none."""
+        if not len(self._keys):
+            return np.full(keys.shape, -1)
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return np.where(self._keys[at] == keys, self._nodes[at], -1)
+
+    def make(self, keys: Keys, first: int) -> Ints:
+        """Give new nodes, from number `first` on, to keys (k,) that have none; return which key came first.
+
+        Numbers follow the order in which keys come.
+        """
+        missing = np.flatnonzero(self.find(keys) < 0)
+        _, at = np.unique(keys[missing], return_index=True)
+        new: Ints = missing[np.sort(at)]
+        self.add(keys[new], first + np.arange(len(new)))
+        self.sort()
+        return new

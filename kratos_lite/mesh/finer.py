@@ -1,0 +1,166 @@
+"""Finer: a mesh made from another one, and what becomes of nodes, elements, conditions and parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kratos_lite.mesh.blocks import Block, Part
+from kratos_lite.mesh.centers import Keys, corners_around, keys_of
+from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.typing import Array, Ints, Mask, Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """A mesh made from a coarser one, whose nodes are the first of its own.
+
+    Attributes
+    ----------
+    coarse, mesh : the two.
+    elements : (m',) int, row of the coarse element that each element has come from.
+    conditions : (c',) int, likewise of the conditions.
+    start, nodes, weights : new nodes from old ones, in compressed rows.
+    inside : (k,) key of the corners of the edge, face or cell in which each new node lies.
+    """
+
+    coarse: Mesh
+    mesh: Mesh
+    elements: Ints
+    conditions: Ints
+    start: Ints
+    nodes: Ints
+    weights: Array
+    inside: Keys
+
+    def interpolate(self, values: Array) -> Array:
+        """Return nodal values (n, ...) of the coarse mesh on all nodes of the finer one.
+
+        Parameters
+        ----------
+        values : (n, ...) float.
+
+        Returns
+        -------
+        (n', ...) float
+        """
+        return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
+
+    def grown(self, rows: Ints) -> Ints:
+        """Return the nodes of the finer mesh that belong to a set of nodes of the coarse one.
+
+        A set of nodes on the surface means the boundary faces of elements that have all their nodes in it;
+        new nodes inside these and on their edges belong to it.  A set with nodes that are on no such face
+        means the edges, faces and elements, too, that have all their nodes in it and one of these.
+
+        Parameters
+        ----------
+        rows : (k,) int, nodes of the coarse mesh.
+
+        Returns
+        -------
+        (k',) int
+            The same nodes, and new ones.
+        """
+        if not len(self.inside) or not len(rows):
+            return rows
+        keys = _keys_among(self.coarse, rows)
+        new = np.flatnonzero(np.isin(self.inside, keys)) + self.coarse.n_nodes
+        return np.concatenate([rows, new])
+
+    def children(self, rows: Ints) -> Ints:
+        """Return the elements of the finer mesh that have come from elements of the coarse one.
+
+        Parameters
+        ----------
+        rows : (k,) int, elements of the coarse mesh.
+
+        Returns
+        -------
+        (k',) int
+        """
+        return _descendants(self.elements, rows, self.coarse.n_elements)
+
+    def part(self, part: Part) -> Part:
+        """Return a part of the coarse mesh as one of the finer mesh.
+
+        Parameters
+        ----------
+        part : of the coarse mesh.
+
+        Returns
+        -------
+        Part
+        """
+        conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
+        return replace(
+            part, nodes=self.grown(part.nodes), elements=self.children(part.elements), conditions=conditions
+        )
+
+
+def _interpolated(values: Array, start: Ints, nodes: Ints, weights: Array) -> Array:
+    if not len(start) - 1:
+        return np.zeros((0, *values.shape[1:]))
+    weighted = weights.reshape(-1, *[1] * (values.ndim - 1)) * values[nodes]
+    return np.add.reduceat(weighted, start[:-1])
+
+
+def _descendants(parents: Ints, rows: Ints, size: int) -> Ints:
+    chosen = np.zeros(size, dtype=bool)
+    chosen[rows] = True
+    return np.flatnonzero(chosen[parents])
+
+
+# ---- sets of nodes -----------------------------------------------------------------------------------
+
+
+def _keys_among(mesh: Mesh, rows: Ints) -> Keys:
+    """Return the keys of the edges, faces and cells that a set of nodes means; see `Finer.grown`."""
+    inside = np.zeros(mesh.n_nodes, dtype=bool)
+    inside[rows] = True
+    keys: list[Keys] = [np.zeros(0, dtype=np.uint64)]
+    alone = inside.copy()
+    for faces in mesh.boundary:
+        chosen = faces.nodes[inside[faces.nodes].all(axis=1)]
+        alone[chosen] = False
+        keys += _edges_and_face(chosen, FACE_SHAPES[faces.nodes.shape[1]])
+    if alone.any():
+        for block in mesh.blocks:
+            keys += _with_lone_nodes(block, inside, alone)
+    return np.unique(np.concatenate(keys))
+
+
+def _edges_and_face(nodes: Rows, shape: type[Shape]) -> list[Keys]:
+    """Return the keys of faces (m, k) and of their edges."""
+    columns = [range(shape.corners), *shape.edges]
+    return [keys_of(nodes[:, list(picked)]) for picked in columns]
+
+
+def _with_lone_nodes(block: Block, inside: Mask, alone: Mask) -> list[Keys]:
+    """Return the keys of edges, faces and cells with all nodes inside and one of them on no chosen face."""
+    shape = block.shape
+    if shape is None or not len(block):
+        return []
+    around = [tuple(sorted(set(corners))) for corners in (*shape.edges, *_corner_faces(shape))]
+    around.append(tuple(range(shape.corners)))
+    found = []
+    for corners in around:
+        own = _nodes_on(shape, corners)
+        nodes = block.nodes[:, list(own)]
+        chosen = block.nodes[inside[nodes].all(axis=1) & alone[nodes].any(axis=1)]
+        parts = [part for part in around if set(part) <= set(corners)]
+        found += [keys_of(chosen[:, list(part)]) for part in parts]
+    return found
+
+
+def _corner_faces(shape: type[Shape]) -> list[tuple[int, ...]]:
+    return [face[: FACE_SHAPES[len(face)].corners] for face in shape.faces]
+
+
+def _nodes_on(shape: type[Shape], corners: tuple[int, ...]) -> list[int]:
+    """Return the nodes of a shape that lie on the edge, face or cell between some corners."""
+    return [
+        node for node, xi in enumerate(shape.nodes) if set(corners_around(shape.cell, xi)) <= set(corners)
+    ]

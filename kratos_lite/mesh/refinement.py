@@ -1,0 +1,160 @@
+"""Refinement: cells cut into smaller ones, where they are marked, with hanging nodes at their borders.
+
+Neighbors that share an edge or a face differ by one level at most; more cells are cut where needed.  New
+points and nodal values follow the isoparametric map of the cell that they are made in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kratos_lite.errors import MeshError
+from kratos_lite.mesh.blocks import Block, with_rows
+from kratos_lite.mesh.centers import Centers, Keys, keys_of
+from kratos_lite.mesh.finer import Finer
+from kratos_lite.mesh.growth import Cut, Growth, name_of
+from kratos_lite.mesh.hanging import entity_keys, is_corner, known_centers, split_edges, split_faces
+from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.subdivision import pieces, shortest_diagonal
+from kratos_lite.shapes import Shape, Tetrahedron4, Tetrahedron10
+from kratos_lite.typing import Ints, Mask
+from kratos_lite.validation import whole_numbers
+
+
+def refine(mesh: Mesh, elements: ArrayLike | None = None) -> Finer:
+    """Return a mesh in which elements are cut into smaller ones of the same kind.
+
+    A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
+    is, nodes hang: they take what its edge or face interpolates.
+
+    Parameters
+    ----------
+    mesh : the mesh.
+    elements : rows of the elements, or a mask; all if not given.
+
+    Returns
+    -------
+    Finer
+        The mesh, and how it has come from the old one.
+
+    Raises
+    ------
+    MeshError
+        Rows do not exist, or an element has no shape that can be cut.
+
+    Examples
+    --------
+    >>> from kratos_lite import box
+    >>> finer = refine(box(cells=(2, 1, 1)), [0])
+    >>> finer.mesh.n_elements, len(finer.mesh.hanging)
+    (9, 5)
+    """
+    marked = _mask(mesh, elements)
+    centers = known_centers(mesh.blocks, mesh.hanging)
+    if mesh.hanging is not None:
+        marked = _closed(mesh, centers, marked)
+    growth = Growth(mesh, centers, _target)
+    growth.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at])))
+    cut = _cut_entities(mesh, marked)
+    growth.conditions(lambda block, at: _condition_cuts(block, cut))
+    return growth.finer()
+
+
+def _mask(mesh: Mesh, elements: ArrayLike | None) -> Mask:
+    """Return which elements (m,) are marked."""
+    m = mesh.n_elements
+    if elements is None:
+        return np.ones(m, dtype=bool)
+    chosen = np.asarray(elements)
+    if chosen.dtype == np.bool_:
+        if chosen.shape != (m,):
+            raise MeshError(f"a mask of elements must have shape ({m},); got {chosen.shape}")
+        return chosen.copy()
+    marked = np.zeros(m, dtype=bool)
+    marked[whole_numbers(elements, "rows of elements to refine", ("k",), size=m, error=MeshError)] = True
+    return marked
+
+
+def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
+    """Return name and shape of the pieces of a block: of the same order."""
+    shape = block.shape
+    assert shape is not None
+    if cell != shape.cell:
+        shape = Tetrahedron4 if len(shape.nodes) == shape.corners else Tetrahedron10
+        return name_of(block.name, shape), shape
+    return block.name, shape
+
+
+def _cuts(mesh: Mesh, block: Block, cells: Ints) -> list[Cut]:
+    """Return cells of a block with the pieces that they are cut into."""
+    if not len(cells):
+        return []
+    if block.shape is None or block.shape.nodes.shape[1] != 3:
+        raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this kind cannot be refined")
+    if block.shape.cell != "tetrahedron":
+        return [(cells, pieces(block.shape.cell))]
+    shortest = shortest_diagonal(mesh.points[block.nodes[cells, :4]])
+    along = [(cells[shortest == diagonal], pieces("tetrahedron", diagonal)) for diagonal in range(3)]
+    return [cut for cut in along if len(cut[0])]
+
+
+def _condition_cuts(block: Block, cut: Keys) -> list[Cut]:
+    """Return likewise the conditions on edges and faces that are cut."""
+    shape = block.shape
+    if shape is None or shape.cell == "point" or not len(block):
+        return []
+    cells = np.flatnonzero(np.isin(keys_of(block.nodes[:, : shape.corners]), cut))
+    return [(cells, pieces(shape.cell))] if len(cells) else []
+
+
+# ---- one level between neighbors ---------------------------------------------------------------------
+
+
+def _closed(mesh: Mesh, centers: Centers, marked: Mask) -> Mask:
+    """Return the marked elements and those that must be cut with them.
+
+    An edge or face that is split already must not be split once more by a marked neighbor.
+    """
+    parts, owners = _parts_of_split(mesh, centers)
+    keys, element = _keys_by_element(mesh)
+    marked = marked.copy()
+    while True:
+        hot = np.unique(keys[marked[element]])
+        need = owners[np.isin(parts, hot) & ~marked[owners]]
+        if not len(need):
+            return marked
+        marked[need] = True
+
+
+def _parts_of_split(mesh: Mesh, centers: Centers) -> tuple[Keys, Ints]:
+    """Return the keys of the halves and quarters of split edges and faces, and whose these are."""
+    corner = is_corner(mesh.blocks, mesh.n_nodes)
+    parts, owners = [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int64)]
+    for found in (split_edges, split_faces):
+        for split in found(mesh.blocks, centers, corner):
+            inside = split.parts()
+            parts += [keys_of(part) for part in inside]
+            owners += [split.rows] * len(inside)
+    return np.concatenate(parts), np.concatenate(owners)
+
+
+def _keys_by_element(mesh: Mesh) -> tuple[Keys, Ints]:
+    """Return the keys of the edges and faces of all elements, and the element of each."""
+    keys, element = [], []
+    for block, at in with_rows(mesh.blocks):
+        if block.shape is not None and len(block):
+            mine = entity_keys(block)
+            keys.append(mine.ravel())
+            element.append(np.repeat(np.arange(at.start, at.stop), mine.shape[1]))
+    return np.concatenate(keys), np.concatenate(element)
+
+
+def _cut_entities(mesh: Mesh, marked: Mask) -> Keys:
+    """Return the keys of the edges and faces of the elements that are cut."""
+    keys = [
+        entity_keys(block.take(marked[at])).ravel()
+        for block, at in with_rows(mesh.blocks)
+        if block.shape is not None and marked[at].any()
+    ]
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.uint64), *keys]))
