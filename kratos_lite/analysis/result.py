@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
+from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError, energy_error
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
@@ -368,10 +368,8 @@ class Result:
 
     @cached_property
     def _error(self) -> ErrorEstimate:
-        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)[0]
-        total = float(squares.sum())
-        size = 2 * self.energy() + total
-        return ErrorEstimate(total**0.5, (total / size) ** 0.5 if size else 0.0, np.sqrt(squares))
+        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
+        return energy_error(*squares, 2 * self.energy())
 
     # ---- out -----------------------------------------------------------------------------------
 

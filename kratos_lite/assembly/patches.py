@@ -14,11 +14,11 @@ import numpy as np
 
 from kratos_lite.assembly.polynomial_fit import Lists, lists
 from kratos_lite.mesh import Block
-from kratos_lite.mesh.topology import Faces
-from kratos_lite.typing import Array, Ints, Mask, Rows
-
-FAR = 0.5
-"""Weight of the elements of a patch that do not contain its node."""
+from kratos_lite.mesh.blocks import NO_ROWS
+from kratos_lite.mesh.cells import Cells
+from kratos_lite.mesh.topology import corners as corners_of
+from kratos_lite.mesh.topology import faces_of
+from kratos_lite.typing import Ints, Mask, Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,44 +28,58 @@ class Patches:
     Attributes
     ----------
     elements : those of each patch.
-    weights : of each of these.
+    own : whether each of these contains the node.
     of : the patches whose mean counts at each node; none at nodes without elements.
     """
 
     elements: Lists
-    weights: Array
+    own: Mask
     of: Lists
 
 
-def patches(n: int, blocks: Sequence[Block], hanging: Ints, masters: Lists) -> Patches:
+def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists) -> Patches:
     """Return the patches of blocks of elements.
 
     Parameters
     ----------
-    n : how many nodes there are.
     blocks : the elements, numbered through the blocks.
+    outer : (n,) whether a node is a corner of a face on the surface.
     hanging : nodes that others interpolate.
     masters : those of each.
     """
     corners = _corners(blocks)
-    is_corner = np.zeros(n, dtype=bool)
+    is_corner = np.zeros(len(outer), dtype=bool)
     is_corner[corners[corners >= 0]] = True
     is_corner[hanging] = False
-    around = _around(blocks, corners, is_corner)
-    outer = _outer(n, blocks) & is_corner
-    number = np.cumsum(is_corner) - 1
-    nodes = np.flatnonzero(is_corner)
-    owner, element = around.owner, around.entries
-    inside = ~outer[owner]
-    far_owner, far = _neighborhoods(around, corners, outer, is_corner)
-    near = np.ones(int(inside.sum()))
-    far_weights = _weights(far_owner, far, corners)
-    rows = np.concatenate([owner[inside], far_owner])
-    order = np.argsort(rows, kind="stable")
-    found = lists(number[rows], np.concatenate([element[inside], far]), len(nodes))
-    weights = np.concatenate([near, far_weights])[order]
-    of = _patches_of_nodes(blocks, is_corner, number, hanging, masters)
-    return Patches(found, weights, of)
+    held = np.bincount(masters.owner, weights=is_corner[masters.entries], minlength=len(masters)) > 0
+    is_corner[hanging[~held]] = True
+    hanging, masters = hanging[held], masters.take(np.flatnonzero(held))
+    around, outer = _around(blocks, corners, is_corner), outer & is_corner
+    inside = ~outer[around.owner]
+    wide_owner, wide = _neighborhoods(around, corners, outer, is_corner)
+    rows = np.concatenate([around.owner[inside], wide_owner])
+    own = np.concatenate([inside[inside], _contain(wide_owner, wide, corners)])
+    number, order = np.cumsum(is_corner) - 1, np.argsort(rows, kind="stable")
+    entries = np.concatenate([around.entries[inside], wide])[order]
+    elements = lists(number[rows[order]], entries, int(is_corner.sum()))
+    return Patches(elements, own[order], _patches_of_nodes(blocks, is_corner, number, hanging, masters))
+
+
+def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
+    """Return kind and corner node of the faces that no element of the same kind (m,) shares."""
+    faces = cells.all_faces
+    alone, kinds = np.ones(len(faces.element), dtype=bool), kind[faces.element]
+    same = kinds[faces.one] == kinds[faces.other]
+    alone[faces.one[same]] = alone[faces.other[same]] = False
+    found, nodes, start = [NO_ROWS], [NO_ROWS], 0
+    for block in cells.blocks:
+        for face in faces_of(block):
+            chosen = np.flatnonzero(alone[start : start + len(block)])
+            picked = block.nodes[chosen][:, list(corners_of(face))]
+            found.append(np.repeat(kinds[start + chosen], picked.shape[1]))
+            nodes.append(picked.ravel())
+            start += len(block)
+    return np.concatenate(found), np.concatenate(nodes)
 
 
 def _corners(blocks: Sequence[Block]) -> Rows:
@@ -93,14 +107,6 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
     node, element = np.concatenate(nodes), np.concatenate(elements)
     known = is_corner[node]
     return lists(node[known], element[known], len(is_corner))
-
-
-def _outer(n: int, blocks: Sequence[Block]) -> Mask:
-    """Return a mask of the corner nodes on the surface of the elements."""
-    outer = np.zeros(n, dtype=bool)
-    for face in Faces(blocks).boundary:
-        outer[face.nodes[:, : face.shape.corners if face.shape else None]] = True
-    return outer
 
 
 def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
@@ -142,9 +148,9 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
     return count == best[owner]
 
 
-def _weights(owner: Ints, element: Ints, corners: Rows) -> Array:
-    """Return 1 for elements that have the node as a corner, `FAR` for others."""
-    return np.where((corners[element] == owner[:, None]).any(axis=1), 1.0, FAR)
+def _contain(owner: Ints, element: Ints, corners: Rows) -> Mask:
+    """Return a mask of the elements that have the node as a corner."""
+    return (corners[element] == owner[:, None]).any(axis=1)
 
 
 def _patches_of_nodes(

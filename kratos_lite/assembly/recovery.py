@@ -7,19 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
 from kratos_lite.assembly.nodal_values import extrapolation
-from kratos_lite.assembly.patches import Patches, patches
-from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit
+from kratos_lite.assembly.patches import Patches, outer_corners, patches
+from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
 from kratos_lite.registry import remembered
@@ -36,12 +38,14 @@ class Sampling:
     from_gauss : (s, g) values there from those at the Gauss points; None where they are the Gauss points.
     degree : of the polynomials.
     means : whether means of elements are better than the samples, where there are enough of them.
+    far : weight of elements in the patch of a node on the surface that do not contain this node.
     """
 
     N: Array
     from_gauss: Array | None
     degree: int
     means: bool
+    far: float
 
     @property
     def count(self) -> int:
@@ -69,7 +73,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
         T = at_samples @ np.linalg.solve(weighted @ at_gauss, weighted)
     N = np.array([shape.N(xi) for xi in points])
     degree = shape.degree + (0 if simple or shape.cell == "tetrahedron" else 1)
-    return Sampling(N, T, min(degree, 3), simple)
+    near = shape.degree > 1 and shape.cell in ("hexahedron", "tetrahedron")
+    return Sampling(N, T, min(degree, 3), simple, 0.05 if near else 0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +102,9 @@ class Region:
             places.append((way.N @ points[group.nodes]).reshape(-1, 3))
             sampled.append((value if way.from_gauss is None else way.from_gauss @ value).reshape(-1, 6))
         sizes = [len(group) for group in self.groups]
-        counts, degrees, means = (
-            np.repeat([getattr(way, name) for way in ways], sizes) for name in ("count", "degree", "means")
+        names = ("count", "degree", "means", "far")
+        counts, degrees, means, far = (
+            np.repeat([getattr(way, name) for way in ways], sizes) for name in names
         )
         samples = Samples(
             np.concatenate(places), np.concatenate(sampled), np.concatenate([[0], np.cumsum(counts)])
@@ -106,7 +112,8 @@ class Region:
         elements = self.patches.elements
         degree = np.minimum.reduceat(degrees[elements.entries], elements.start[:-1])
         simple = np.maximum.reduceat(means[elements.entries], elements.start[:-1])
-        fitted = fit(samples, elements, self.patches.weights, degree, simple)
+        weights = np.where(self.patches.own, 1.0, far[elements.entries])
+        fitted = fit(samples, elements, weights, degree, simple)
         return fitted.at(points[self.nodes], self.patches.of)
 
     def averaged(self, values: Sequence[Array]) -> Array:
@@ -123,24 +130,37 @@ def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
     by_material: dict[int, list[ElementGroup]] = {}
     for group in groups:
         by_material.setdefault(id(group.material), []).append(group)
-    return [_region(mesh, mine) for mine in by_material.values()]
+    kind = np.full(mesh.n_elements, -1)
+    for i, mine in enumerate(by_material.values()):
+        for group in mine:
+            kind[group.rows] = i
+    kinds, outer = outer_corners(mesh, kind)
+    order = np.argsort(kinds, kind="stable")
+    cuts = np.searchsorted(kinds[order], np.arange(len(by_material) + 1))
+    parts = [outer[order[a:b]] for a, b in pairwise(cuts)]
+    return [_region(mesh, mine, part) for mine, part in zip(by_material.values(), parts, strict=True)]
 
 
-def _region(mesh: Mesh, groups: list[ElementGroup]) -> Region:
-    used = np.zeros(mesh.n_nodes, dtype=bool)
+def _region(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> Region:
+    """Return groups as a region; `outer` are the corners of the faces on its surface."""
+    used, on_surface = np.zeros(mesh.n_nodes, dtype=bool), np.zeros(mesh.n_nodes, dtype=bool)
     for group in groups:
         used[group.nodes] = True
+    on_surface[outer] = True
     nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
     cells = [number[group.nodes] for group in groups]
     blocks = [
-        Block("", nodes, group.rows, 0 * group.rows, group.element.shape)
-        for nodes, group in zip(cells, groups, strict=True)
+        Block("", of, group.rows, 0 * group.rows, group.element.shape)
+        for of, group in zip(cells, groups, strict=True)
     ]
-    hanging, masters = (
-        np.zeros(0, dtype=np.int64),
-        Lists(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)),
-    )
-    return Region(groups, nodes, cells, patches(len(nodes), blocks, hanging, masters))
+    hanging, masters = NO_ROWS, Lists(np.zeros(1, dtype=np.int64), NO_ROWS)
+    if mesh.hanging is not None:
+        here = used[mesh.hanging.nodes]
+        hanging = number[mesh.hanging.nodes[here]]
+        every = Lists(mesh.hanging.start, mesh.hanging.masters).take(np.flatnonzero(here))
+        kept = used[every.entries]
+        masters = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
+    return Region(groups, nodes, cells, patches(blocks, on_surface[nodes], hanging, masters))
 
 
 class Recovery:
@@ -194,7 +214,7 @@ class Recovery:
         return found[0], found[1]
 
     def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array, Array]]:
-        """Yield each group, its nodes in the region, C ε at its points, and recovered and averaged at nodes."""
+        """Yield each group, its nodes in the region, C ε at its points, and this recovered and averaged."""
         for region in self.regions:
             plain = [replace(group, prestress=None) for group in region.groups]
             values = [at_gauss(self.points, group, u) for group in plain]
