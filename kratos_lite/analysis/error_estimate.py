@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
+from kratos_lite.model.loads import Load
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
+
+
+class Origin(Protocol):
+    """What a result is the solution of."""
+
+    @property
+    def model(self) -> Structure:
+        """The structure, as it was solved."""
+
+    @property
+    def loads(self) -> Sequence[Load]:
+        """Its loads."""
+
+    def adjoint(self, load: Array, motion: Array) -> Array:
+        """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,23 +42,24 @@ class ErrorEstimate:
     absolute : ‖e‖ of the whole model in √J.
     relative : ‖e‖ / ‖u‖, with ‖u‖ of the exact solution as the estimate has it.
     per_element : (m,) ‖e‖ of each element in √J; the root of the sum of their squares is `absolute`.
-    method : which stresses took the place of the exact ones: ``"recovered"`` or ``"averaged"``.
-    safety : factor in all these; without it they are the best guess.
+    method : how it was found: ``"recovery"`` or ``"averaging"`` of stresses, whichever is smaller, or
+        ``"equilibrated"``.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
+    safety : factor in all these; without it they are the best guess.
     """
 
     absolute: float
     relative: float
     per_element: Array
     method: str
-    safety: float
     warnings: list[str] = field(default_factory=list)
+    safety: float = 1.0
 
     def __str__(self) -> str:
         return f"{self.relative:.2%} ({self.absolute:.4e} √J, {self.method})"
 
 
-SAFETY = {"recovered": 1.6, "averaged": 1.8}
+SAFETY = {"recovery": 1.6, "averaging": 1.8}
 """Factors by which the differences of the elements' stresses to smooth ones are raised to errors."""
 
 
@@ -55,14 +75,13 @@ def energy_error(recovered: Array, averaged: Array, energy: float) -> ErrorEstim
     recovered, averaged : (m,) squared energy norms of the differences in each element, J.
     energy : ‖u_h‖² of the solution in J, twice its strain energy.
     """
-    squares = {"recovered": recovered, "averaged": averaged}
+    squares = {"recovery": recovered, "averaging": averaged}
     method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * float(squares[name].sum()))
     per_element = SAFETY[method] * np.sqrt(squares[method])
     absolute = float(np.linalg.norm(per_element))
     size = energy + float(squares[method].sum())
-    return ErrorEstimate(
-        absolute, absolute / size**0.5 if size > 0 else 0.0, per_element, method, SAFETY[method]
-    )
+    relative = absolute / size**0.5 if size > 0 else 0.0
+    return ErrorEstimate(absolute, relative, per_element, method, safety=SAFETY[method])
 
 
 @dataclass(frozen=True, eq=False)

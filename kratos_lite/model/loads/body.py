@@ -12,7 +12,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import Load, vectors
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 
 class BodyForce(Load):
@@ -41,6 +41,21 @@ class BodyForce(Load):
         """
         return self.force
 
+    def carriers(self, mesh: Mesh) -> Mask:
+        """Return which elements carry it.
+
+        Parameters
+        ----------
+        mesh : elements and named parts.
+
+        Returns
+        -------
+        (m,) bool
+        """
+        chosen = np.zeros(mesh.n_elements, dtype=bool)
+        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
+        return chosen
+
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N.
 
@@ -53,8 +68,7 @@ class BodyForce(Load):
             name = type(self).__name__
             raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
         total = np.zeros_like(mesh.points)
-        chosen = np.zeros(mesh.n_elements, dtype=bool)
-        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
+        chosen = self.carriers(mesh)
         for group in groups:
             b, part = self.per_volume(group), group.take(chosen[group.rows])
             if b.any() and len(part):
