@@ -32,7 +32,7 @@ class Solved(Protocol):
     reactions: Array
 
     def stress(self, at: Any) -> Any:
-        """Return stresses (..., 6) in Pa at points or in elements."""
+        """Return stresses (..., 6) in Pa at points, of elements or recovered at nodes."""
 
 
 class Quantity(ABC):
@@ -91,13 +91,12 @@ class Quantity(ABC):
         """
         return np.zeros_like(result.u)
 
-    def local(self, result: Solved, recovered: Array) -> Array:
+    def local(self, result: Solved) -> Array:
         """Return what the error of Q has beyond that of the mean that `load` is of; 0 if the class has none.
 
         Parameters
         ----------
         result : of any analysis.
-        recovered : (n, 6) Pa, nodal stresses that are better than those of the elements.
 
         Returns
         -------
@@ -302,9 +301,10 @@ class StressAt(Quantity):
         add_nodal(load, group.nodes, internal_load_of(placed, stress, C))
         return load
 
-    def local(self, result: Solved, recovered: Array) -> Array:
+    def local(self, result: Solved) -> Array:
         """Return the difference of the error at the point, by recovered stresses, from its mean around."""
         c, group = COMPONENTS.index(self.component), self._around(result)
+        recovered = result.stress(at="node")
         located = _located(result, self.point)
         at_point = float(located.interpolate(recovered)[c]) - self.value(result)
         N, _ = tabulate(group.element.shape, group.rule)
@@ -319,7 +319,7 @@ class StressAt(Quantity):
         row = _located(result, self.point).rows
         group = next(group for group in result.groups if (group.rows == row).any())
         corners = group.nodes[:, : group.element.shape.corners]
-        return group.take(np.isin(corners, corners[group.rows == row]).any(axis=1))
+        return group.take(np.asarray(np.isin(corners, corners[group.rows == row]).any(axis=1)))
 
     def __repr__(self) -> str:
         return f"StressAt({self.point.tolist()}, {self.component!r})"
