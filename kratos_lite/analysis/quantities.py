@@ -66,7 +66,7 @@ class Quantity(ABC):
     def load(self, result: Solved) -> Array:
         """Return the load of the adjoint solution; 0 if the class has none.
 
-        It is ∂Q/∂u; for a stress at a point, whose adjoint is too singular, that of the mean around the point.
+        It is ∂Q/∂u; for a stress at a point, whose adjoint is too singular, that of the mean around it.
 
         Parameters
         ----------
