@@ -9,6 +9,7 @@ import numpy as np
 from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.centers import Keys, corners_around, keys_of
 from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.selection import Where, WhereElements, elements_among
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -83,6 +84,36 @@ class Finer:
         """
         return _descendants(self.elements, rows, self.coarse.n_elements)
 
+    def where(self, where: Where) -> Where:
+        """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one.
+
+        Parameters
+        ----------
+        where : part name or predicate, which stay; mask or rows, which grow.
+
+        Returns
+        -------
+        Where
+        """
+        if isinstance(where, str) or callable(where):
+            return where
+        return self.grown(self.coarse.nodes(where))
+
+    def where_elements(self, where: WhereElements) -> WhereElements:
+        """Return likewise a choice of elements.
+
+        Parameters
+        ----------
+        where : part name, property id or None, which stay; or rows.
+
+        Returns
+        -------
+        WhereElements
+        """
+        if where is None or isinstance(where, (str, int)):
+            return where
+        return self.children(self.coarse.elements(where))
+
     def part(self, part: Part) -> Part:
         """Return a part of the coarse mesh as one of the finer mesh.
 
@@ -95,8 +126,9 @@ class Finer:
         Part
         """
         conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
+        elements = part.elements if len(part.elements) else elements_among(part.nodes, self.coarse)
         return replace(
-            part, nodes=self.grown(part.nodes), elements=self.children(part.elements), conditions=conditions
+            part, nodes=self.grown(part.nodes), elements=self.children(elements), conditions=conditions
         )
 
 
