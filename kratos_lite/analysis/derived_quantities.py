@@ -130,6 +130,7 @@ def result_of(
         seconds={},
         warnings=list(e.warnings),
         notes=list(model.notes),
+        formulation=model.chosen(e.groups),
     )
     u0 = model.initial_displacement
     result = Result(model.mesh, e.groups, at.u.copy(), at.reactions.copy(), loads, report, u0)

@@ -25,11 +25,13 @@ class Model(Structure):
     ----------
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
+    formulation : of the elements, in place of what their names in the mesh say: ``standard``, ``enhanced``,
+        ``b_bar``, ``reduced``, or ``non_locking``: that of each shape which does not lock with its material.
 
     Raises
     ------
     InputError
-        `mesh` is no Mesh, or `material` no material.
+        `mesh` is no Mesh, `material` no material, or an element of the mesh has no such formulation.
     MeshError
         A part or property of `material` does not exist.
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
 from kratos_lite.typing import Array
 
@@ -40,6 +43,7 @@ class Report:
     warnings, notes : what the checks and the reader found.
     skipped : what this solution did without, as it would have changed nothing.
     kernels : what computed, compiled kernels and their threads or NumPy.
+    formulation : which one of the elements was chosen and why; "" where their names say it.
     motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
     """
 
@@ -58,11 +62,13 @@ class Report:
     notes: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
     kernels: str = field(default_factory=described)
+    formulation: str = ""
     motion: dict[str, Any] = field(default_factory=dict)
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
-        """Return the rows of the summary about unknowns and loads, forces of `size` N in all."""
+        """Return the rows of the summary about formulation, unknowns and loads, forces of `size` N in all."""
         return [
+            *([("formulation", self.formulation)] if self.formulation else []),
             ("unknowns", f"{self.unknowns}"),
             ("total load", f"{vector(self.total_load, size)} N"),
             ("total reaction", f"{vector(self.total_reaction, size)} N"),
@@ -109,6 +115,15 @@ class Report:
             ("force of supports", f"{force} N"),
             ("moment of supports", f"{moment} N m"),
         ]
+
+
+def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str) -> dict[str, int]:
+    """Return the number of elements by names in the mesh, or by class where a formulation was chosen."""
+    counts: dict[str, int] = {}
+    named = [(group.element.__name__, len(group)) for group in groups]
+    for name, count in named if formulation else [(block.name, len(block)) for block in mesh.blocks]:
+        counts[name] = counts.get(name, 0) + count
+    return {name: count for name, count in counts.items() if count}
 
 
 def vector(v: Array, size: float = 0.0) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from kratos_lite import voigt
 from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
-from kratos_lite.analysis.report import Report, vector
+from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.energy_error import squared_differences
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
@@ -384,12 +384,12 @@ class Result:
         length = np.linalg.norm(self.u, axis=1)
         top = int(length.argmax())
         energy, mises, row = self._totals
-        kinds = ", ".join(f"{len(block)} {block.name}" for block in mesh.blocks if len(block))
+        kinds = element_counts(mesh, self.groups, report.formulation)
         largest = f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m"
         forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
         return [
             ("nodes", f"{mesh.n_nodes}"),
-            ("elements", kinds),
+            ("elements", ", ".join(f"{count} {name}" for name, count in kinds.items())),
             *report.load_rows(forces),
             ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),

@@ -303,6 +303,7 @@ class StaticAnalysis:
             warnings=warnings,
             notes=list(self.model.notes),
             skipped=self._skipped(case.moving),
+            formulation=self.model.chosen(self.groups),
         )
 
     def _at_rest(self) -> Array:

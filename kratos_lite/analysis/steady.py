@@ -67,6 +67,7 @@ def solve_steady(
         seconds=phase.seconds,
         warnings=warnings,
         notes=[*model.notes, *changing],
+        formulation=model.chosen(e.groups),
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
     )
     u0 = model.initial_displacement

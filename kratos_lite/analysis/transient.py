@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import logging
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import result_of
-from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import INTEGRATORS, ModelIntegrator, check_stable
 from kratos_lite.analysis.integrators.generalized_alpha import Newmark
 from kratos_lite.analysis.material_derivatives import acceleration_of_material, velocity_of_material
-from kratos_lite.analysis.modal import critical_rates
 from kratos_lite.analysis.prescribed_motion import at_start, prescribed_part, with_prescribed
+from kratos_lite.analysis.rate_watch import RateWatch
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.state import MODEL_FIELDS, State, check_state
 from kratos_lite.errors import InputError, ModelError
@@ -24,7 +22,6 @@ from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none
 
-_log = logging.getLogger("kratos_lite")
 DIVERGED = 1e9
 """Displacements by the size of the model beyond which a motion has lost its stability."""
 OFF_SUPPORT = 1e-6
@@ -98,9 +95,8 @@ class TransientAnalysis:
         self.equations = e
         self.integrator.check(e)
         self._version = _version(model)
-        self._critical, self._of_mesh = self._critical_rate()
-        self._watching = self._critical < np.inf
-        self._watch_rate(0.0)
+        self._rate = RateWatch(e)
+        self._rate.look(0.0)
         self.time, self.step, self.parts = 0.0, 0, 1
         rest = np.zeros((e.system.n_nodes, 3))
         self.u = self._nodal(rest if displacement is None else displacement, "the initial displacement")
@@ -202,7 +198,7 @@ class TransientAnalysis:
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 for k in range(self.parts):
                     now = self.integrator.step(self.equations, now, self.time + k * part, part)
-            self._watch_rate(self.time + h)
+            self._rate.look(self.time + h)
             self.u, self.v, self.a = now
             self.time += h  # one after the other, so that a restart comes to the same times
             self.step += 1
@@ -222,27 +218,6 @@ class TransientAnalysis:
         bool : displacements are beyond the divergence limit, or no numbers.
         """
         return not np.abs(self.u).max(initial=0.0) < self._limit
-
-    def _critical_rate(self) -> tuple[float, bool]:
-        """Return the lowest critical rate, and whether it is that of the mesh; infinite without a motion."""
-        e = self.equations
-        moves = e.terms is not None and len(e.system.reduced.free)
-        if e.terms is None or not moves or (e.terms.motion.steady and not e.rates(0.0)[0]):
-            return np.inf, False
-        if len(e.system.reduced.free) <= DIRECT_MAX and not e.free_motions:
-            return float(critical_rates(e, 1)[0]), True
-        return critical_rate_estimate(e.terms), False
-
-    def _watch_rate(self, time: float) -> None:
-        """Warn once, when the rate comes near the critical one."""
-        e = self.equations
-        if not self._watching or e.terms is None:
-            return
-        for text in near_critical(e.terms.motion, time, self._critical, self._of_mesh):
-            self._watching = False
-            e.warnings.append(f"at t = {time:g} s {text}" if time else text)
-            if time:
-                _log.warning("%s", e.warnings[-1])
 
     # ---- what is known at the time ---------------------------------------------------------------
 
@@ -339,16 +314,11 @@ class TransientAnalysis:
             With the loads of that time.  The backward error of its report is what M a + C v + K u - f leaves
             on free nodes, relative; None for integrators that do not take the balance at the end of a step.
         """
-        at, local, left = (
-            self.state() if state is None else self.check_state(state),
-            self.equations.system.gather,
-            None,
-        )
+        at, left = self.state() if state is None else self.check_state(state), None
         if self.integrator.balanced:
-            free, largest = self._imbalance(local(at.u), local(at.v), local(at.a), at.time)
+            free, largest = self._imbalance(*self._at(at))
             left = free / largest if largest else 0.0
-        critical = self._critical if self._of_mesh else None
-        return result_of(self.equations, at, str(self.integrator), left, critical)
+        return result_of(self.equations, at, str(self.integrator), left, self._rate.of_mesh)
 
     def reactions(self) -> Array:
         """Return the forces of supports and constraints on the model, M a + C v + K u - f.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.elements import ELEMENTS, KinematicLinear
+from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.exact_rules import (
     AFFINE,
     CURVED,
@@ -18,6 +18,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
+from kratos_lite.elements.formulations import NON_LOCKING, element_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -148,6 +149,8 @@ def element_groups_of(
     rules: Mapping[int, Rule | int] | None = None,
     rule_of: Ints | None = None,
     prestress: Array | None = None,
+    formulation: str | None = None,
+    unnamed: str = NON_LOCKING,
 ) -> list[ElementGroup]:
     """Return the elements of a mesh grouped by kind, rule and material.
 
@@ -159,6 +162,7 @@ def element_groups_of(
     rules : rules or orders of integration 1 … 5 that replace those of the elements, by number.
     rule_of : (m,) number of the rule of each element, -1 for its own; its own for all if not given.
     prestress : (m, 6) Pa.
+    formulation, unnamed : see `elements.formulations.element_of`.
 
     Raises
     ------
@@ -179,9 +183,10 @@ def element_groups_of(
     for block, at in with_rows(mesh.blocks):
         if not len(block):
             continue
-        element = element_class(mesh, block)
+        element_class(mesh, block)
         for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
             materials[material].check_stress()
+            element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + mine
             chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
@@ -233,11 +238,9 @@ def _rule(element: type[KinematicLinear], chosen: Rule | int) -> Rule:
     return rule
 
 
-def element_class(mesh: Mesh, block: Block) -> Any:
-    """Return the element class of a block; raise InputError for unknown kinds."""
-    if block.name not in ELEMENTS:
-        try:
-            ELEMENTS[block.name]
-        except InputError as error:
-            raise InputError(f"{mesh.place(block, 0)}: {error}") from None
-    return ELEMENTS[block.name]
+def element_class(mesh: Mesh, block: Block, formulation: str | None = None) -> type[KinematicLinear]:
+    """Return the element class of a block, whatever its material; raise InputError for unknown kinds."""
+    try:
+        return element_of(block.name, formulation, None)
+    except InputError as error:
+        raise InputError(f"{mesh.place(block, 0)}: {error}") from None

@@ -83,7 +83,8 @@ class FiniteElementBody(Deformable):
         damping: float = 0.0,
         tolerance: float = 1e-16,
     ) -> None:
-        self.groups = elements_of(mesh, material)
+        kind = FORMULATIONS[formulation]
+        self.groups = elements_of(mesh, material, kind.unnamed)
         lost = mesh.node_ids[~mesh.used_nodes()]
         if len(lost):
             raise ModelError(
@@ -94,7 +95,7 @@ class FiniteElementBody(Deformable):
         pattern = Pattern(mesh.n_nodes, [group.nodes for group in self.groups])
         self.lumped = lumped
         self._mass = Mass(mesh.points, self.groups, pattern, lumped)
-        self.formulation = FORMULATIONS[formulation](self.points, self.groups, self._mass, modes)
+        self.formulation = kind(self.points, self.groups, self._mass, modes)
         self._modes = modes
         self.integrators = {  # type: ignore[misc]
             word: alias for word, alias in self.integrators.items() if word not in self.formulation.without

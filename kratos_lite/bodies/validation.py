@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements.formulations import NON_LOCKING
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
@@ -21,8 +22,10 @@ from kratos_lite.validation import finite
 Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 
 
-def elements_of(mesh: Mesh, material: Material) -> list[ElementGroup]:
+def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
     """Return the elements of a mesh with their material, after checks of its geometry.
+
+    `unnamed` is the formulation of elements whose names say none.
 
     Raises
     ------
@@ -31,7 +34,7 @@ def elements_of(mesh: Mesh, material: Material) -> list[ElementGroup]:
     """
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
     structure.check_geometry()
-    return structure.element_groups()
+    return structure.element_groups(unnamed)
 
 
 def mass_properties_of(mesh: Mesh, material: Material) -> MassProperties:

@@ -23,7 +23,18 @@ if TYPE_CHECKING:
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
 OF_MODELS = (
-    *("material", "fix", "gravity", "traction", "pressure", "point_load", "modes", "solver", "tolerance"),
+    *(
+        "material",
+        "formulation",
+        "fix",
+        "gravity",
+        "traction",
+        "pressure",
+        "point_load",
+        "modes",
+        "solver",
+        "tolerance",
+    ),
     *("rotation", "translation", "center", "center_velocity", "center_acceleration", "stiffening"),
     *("boundaries", "damping", "moving_part"),
     *("integrator", "rayleigh", "lumped"),
@@ -271,6 +282,11 @@ def _rates(text: str, option: str) -> tuple[str | list[float], float, float]:
 
 def apply(model: Model, options: Namespace, materials: list[tuple[str | None, LinearMaterial]]) -> None:
     """Add the materials, supports, loads and motion of the command line to a model."""
+    if options.formulation is not None:
+        try:
+            model.formulation = options.formulation
+        except InputError as error:
+            raise InputError(f"--formulation: {error}") from None
     # the special wins over the general
     for part, law in sorted(materials, key=lambda pair: pair[0] is not None):
         model.assign(law, _where(model, part))

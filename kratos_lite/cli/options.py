@@ -198,6 +198,12 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         default=[],
     )
     given.add_argument(
+        "--formulation",
+        metavar="WORD",
+        help="of the elements, in place of what their names in the file say: standard, enhanced, b_bar, "
+        "reduced, or non_locking, that of each shape which does not lock (docs/elements.md)",
+    )
+    given.add_argument(
         "--ignore-initial-displacement",
         action="store_true",
         help="do not take the DISPLACEMENT of free nodes in the file for the state without stress",

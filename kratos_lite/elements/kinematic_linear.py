@@ -45,6 +45,8 @@ SAME_ELEMENT = (
     "Element",
 )
 """Prefixes of element names in files that are solved as KinematicLinear."""
+UNNAMED = "Element3D"
+"""Start of the names that say the number of nodes alone; see `elements.formulations`."""
 
 
 class KinematicLinear(CellMass):

@@ -37,6 +37,8 @@ def kratos_name(name: str) -> str:
     family = name[: name.rfind("3D")]
     if family in ("KinematicLinear", "TotalLagrangian", "Element") and nodes in SOLIDS:
         return f"SmallDisplacementElement3D{nodes}N"
+    if name == "BBar3D8N":
+        return "SmallDisplacementBbarElement3D8N"
     if family in ("Face", "FacePressure") and nodes in FACE_SHAPES:
         return f"SmallDisplacementSurfaceLoadCondition3D{nodes}N"
     return name

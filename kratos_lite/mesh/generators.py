@@ -8,6 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import SIDES, Mesh, Part
 from kratos_lite.mesh.order import raise_order
@@ -87,7 +88,7 @@ def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Int
     split = np.array(SPLITS[shape.cell])
     corners = bricks[:, split].reshape(-1, split.shape[1])
     points, nodes = raise_order(points, corners, shape)
-    return points, {kind.__name__: nodes}
+    return points, {element if is_unnamed(element) else kind.__name__: nodes}
 
 
 def _sides(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
@@ -107,7 +108,7 @@ def box(
     ----------
     size : edge lengths in m, > 0.
     cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
-    element : name of the element.
+    element : name of the element; ``Element3D8N`` and its kin are computed by one that does not lock.
     origin : the corner with the smallest coordinates, m.
 
     Returns
@@ -146,7 +147,7 @@ def annulus(
     inner, outer : radii in m, 0 < inner < outer.
     width : length along z in m; z runs from 0 to `width`.
     cells : bricks along the radius, around (≥ 3) and along z.
-    element : name of the element; mid-edge nodes lie on the circles.
+    element : name of the element, as for `box`; mid-edge nodes lie on the circles.
 
     Returns
     -------

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.assembly.element_groups import ElementGroup, element_groups_of
+from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import (
+    NON_LOCKING,
+    checked_formulation,
+    is_nearly_incompressible,
+    is_unnamed,
+)
 from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh, WhereElements
@@ -25,19 +32,24 @@ class Solid:
     ----------
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
+    formulation : of the elements, in place of what their names in the mesh say; see `formulation`.
 
     Raises
     ------
     InputError
-        `mesh` is not a Mesh, or `material` not a material.
+        `mesh` is not a Mesh, `material` not a material, or an element of the mesh has no such formulation.
     MeshError
         A part or property of `material` does not exist.
     """
 
     def __init__(
-        self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
+        self,
+        mesh: Mesh,
+        material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
+        formulation: str | None = None,
     ) -> None:
         self._mesh = checks.checked_mesh(mesh)
+        self._formulation: str | None = None
         self._materials: list[LinearMaterial] = []
         self._material_of = np.full(mesh.n_elements, -1)
         self._rules: dict[int, Rule | int] = {}
@@ -45,6 +57,7 @@ class Solid:
         self._initial_displacement: Array | None = None
         self._prestress: Array | None = None
         self._changes = 0
+        self.formulation = formulation
         if isinstance(material, Mapping):
             for where, one in material.items():
                 self.assign(one, where)
@@ -55,6 +68,26 @@ class Solid:
     def mesh(self) -> Mesh:
         """Points, elements and named parts, which do not change."""
         return self._mesh
+
+    @property
+    def formulation(self) -> str | None:
+        """Formulation of the elements, or None: their names in the mesh say it.
+
+        ``standard``, ``enhanced``, ``b_bar``, ``reduced``, or ``non_locking``: that of each shape which does
+        not lock with its material.  Elements have the last whose names say only the number of nodes, such as
+        ``Element3D8N``.  Elements of users keep theirs.
+        """
+        return self._formulation
+
+    @formulation.setter
+    def formulation(self, word: str | None) -> None:
+        if word is not None:
+            checked_formulation(word)
+            for block in self.mesh.blocks:
+                if len(block) and block.name in ELEMENTS:
+                    element_class(self.mesh, block, word)
+        self._formulation = word
+        self._changes += 1
 
     def assign(self, material: LinearMaterial, where: WhereElements = None) -> None:
         """Give elements a material.
@@ -99,8 +132,12 @@ class Solid:
         self._rule_of[self.mesh.elements(where)] = number
         self._changes += 1
 
-    def element_groups(self) -> list[ElementGroup]:
+    def element_groups(self, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
         """Return the elements grouped by kind, rule and material.
+
+        Parameters
+        ----------
+        unnamed : formulation of elements whose names in the mesh say none.
 
         Returns
         -------
@@ -114,8 +151,34 @@ class Solid:
             An element has an unknown kind, or a rule does not fit it.
         """
         return element_groups_of(
-            self.mesh, self._materials, self._material_of, self._rules, self._rule_of, self.prestress
+            self.mesh,
+            self._materials,
+            self._material_of,
+            self._rules,
+            self._rule_of,
+            self.prestress,
+            self.formulation,
+            unnamed,
         )
+
+    def chosen(self, groups: Sequence[ElementGroup] = ()) -> str:
+        """Return which formulation was chosen and why, in one line; "" where names of elements say it.
+
+        Parameters
+        ----------
+        groups : of `element_groups`.
+
+        Returns
+        -------
+        Such as ``non_locking, as the mesh names none: EnhancedStrain3D8N``.
+        """
+        found = dict.fromkeys(_kind(group) for group in groups)
+        unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
+        if self.formulation is None and not unnamed:
+            return ""
+        why = "as the mesh names none" if self.formulation is None else "as asked for"
+        kinds = f": {', '.join(found)}" if found else ""
+        return f"{self.formulation or NON_LOCKING}, {why}{kinds}"
 
     # ---- initial stress -----------------------------------------------------------------------
 
@@ -187,4 +250,10 @@ class Solid:
         MeshError, InputError
             With every element that is wrong.
         """
-        return checks.check_geometry(self.mesh)
+        return checks.check_geometry(self.mesh, self.formulation)
+
+
+def _kind(group: ElementGroup) -> str:
+    """Return the name of the element of a group, with its material where that decides about it."""
+    name = group.element.__name__
+    return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name

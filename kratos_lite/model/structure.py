@@ -17,7 +17,9 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.model.locking import check_locking
 from kratos_lite.model.solid import Solid
+from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.supports import AXES, Fixing, Supports
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
@@ -50,6 +52,7 @@ class Structure(Solid):
     ----------
     mesh : points, elements and named parts.
     material : one material for all elements, or materials by part name or property id.
+    formulation : of the elements, in place of what their names in the mesh say; see `Solid.formulation`.
 
     Attributes
     ----------
@@ -60,15 +63,18 @@ class Structure(Solid):
     Raises
     ------
     InputError
-        `mesh` is not a Mesh, or `material` not a material.
+        `mesh` is not a Mesh, `material` not a material, or an element of the mesh has no such formulation.
     MeshError
         A part or property of `material` does not exist.
     """
 
     def __init__(
-        self, mesh: Mesh, material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None
+        self,
+        mesh: Mesh,
+        material: LinearMaterial | Mapping[Any, LinearMaterial] | None = None,
+        formulation: str | None = None,
     ) -> None:
-        super().__init__(mesh, material)
+        super().__init__(mesh, material, formulation)
         self.supports = Supports(mesh)
         self.loads: list[Load] = []
         self._motion: Attachment | None = None
@@ -252,6 +258,8 @@ class Structure(Solid):
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
+        warnings += check_locking(mesh, groups, self.supports, faces)
+        check_spurious_modes(mesh, groups, self.supports, faces)
         if not used.all():
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
@@ -277,6 +285,7 @@ class Structure(Solid):
         without = int((self._material_of < 0).sum())
         rows = [("nodes", str(mesh.n_nodes))]
         rows += [("elements", f"{len(block)} {block.name}") for block in mesh.blocks if len(block)]
+        rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in used]
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))

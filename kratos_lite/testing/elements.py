@@ -193,7 +193,7 @@ def _zeros(K: Array) -> int:
 
 
 def stretched(element: Element) -> Measured:
-    """Check cells flattened to a hundredth: as many modes without energy, and u·K u = Σ σ·ε dV of linear u."""
+    """Check cells flattened to a hundredth: as many modes without energy; u·K u = Σ σ·ε dV of linear u."""
     errors, zeros = {}, _zeros(element(distorted(element)).stiffness(C_ISOTROPIC))
     for axis, C in product(range(3), (C_ISOTROPIC, anisotropic())):
         X = distorted(element)

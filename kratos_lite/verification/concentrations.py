@@ -57,10 +57,15 @@ def _cook_middle(result: Result) -> float:
 
 
 COOK = Isotropic3D(E=1.0, nu=1 / 3)
+SOFT = Isotropic3D(E=240.565, nu=0.4999)
 
 
 def _hole(kind: str) -> tuple[Model, ...]:
     return (hole(kind).model,)
+
+
+def _soft_hole(kind: str) -> tuple[Model, ...]:
+    return (hole(kind, nu=SOFT.nu).model,)
 
 
 def _cavity(kind: str) -> tuple[Model, ...]:
@@ -86,6 +91,22 @@ PROBLEMS: list[Problem] = [
         measure=error_of(fields.hole(1.0, NU, 1.0, 1.0)),
         tolerance=1e-3,
         exact=is_quadratic,
+    ),
+    StaticProblem(
+        name="concentration/kirsch_incompressible",
+        quantity="σ_xx at the edge of the hole, ν = 0.4999",
+        source="Kirsch, closed form",
+        reference=3.0,
+        models=_soft_hole,
+        measure=_hole_stress,
+    ),
+    StaticProblem(
+        name="concentration/kirsch_incompressible_field",
+        quantity="relative error of u over the plate with a hole (L2), ν = 0.4999",
+        source="Kirsch, closed form",
+        reference=0.0,
+        models=_soft_hole,
+        measure=error_of(fields.hole(1.0, SOFT.nu, 1.0, 1.0)),
     ),
     StaticProblem(
         name="concentration/goodier",
@@ -120,6 +141,14 @@ PROBLEMS: list[Problem] = [
         source="Cook, limit 23.96",
         reference=23.96,
         models=lambda kind: (scenes.cook(kind, 8, COOK, plane_stress=True).model,),
+        measure=_cook_middle,
+    ),
+    StaticProblem(
+        name="concentration/cook_incompressible",
+        quantity="the same in plane strain, E = 240.565, ν = 0.4999, load 100",
+        source="Cook, with E and ν of Simo and Rifai; limit 7.695 of refined meshes of 20N and 27N",
+        reference=0.07695,
+        models=lambda kind: (scenes.cook(kind, 8, SOFT).model,),
         measure=_cook_middle,
     ),
 ]

@@ -35,8 +35,33 @@ def kind_of(name: str) -> type[KinematicLinear]:
 
 
 def is_quadratic(kind: str) -> bool:
-    """Return whether an element spans all quadratic polynomials."""
-    return kind_of(kind).shape.degree >= 2
+    """Return whether an element spans all quadratic polynomials, and leaves their strain as it is."""
+    return kind_of(kind).shape.degree >= 2 and keeps_linear_strains(kind)
+
+
+def keeps_linear_strains(kind: str) -> bool:
+    """Return False for quadratic elements with the mean dilatation of each cell alone."""
+    return kind_of(kind).shape.degree < 2 or getattr(kind_of(kind), "dilatation", 1) > 0
+
+
+def is_stable(kind: str) -> bool:
+    """Return whether one element alone has no spurious modes."""
+    return kind_of(kind).spurious_modes == 0
+
+
+def short(name: str) -> str:
+    """Return a short name of an element for tables.
+
+    >>> short("KinematicLinear3D8N"), short("EnhancedStrain3D8N"), short("BBar3D27N")
+    ('8N', '8N enhanced', '27N b_bar')
+    """
+    if (
+        name.startswith("KinematicLinear3D")
+        or name not in ELEMENTS
+        or ELEMENTS[name].formulation == "standard"
+    ):
+        return name.removeprefix("KinematicLinear3D")
+    return f"{len(ELEMENTS[name].nodes)}N {ELEMENTS[name].formulation}"
 
 
 def split(points: Array, bricks: Ints | Rows, kind: str) -> Mesh:

@@ -50,9 +50,14 @@ def two_meshes(distortion: float) -> Callable[[str], tuple[Model, ...]]:
 MESHES = {"cubic": two_meshes(0.0), "distorted": two_meshes(0.1)}
 
 
+def _is_plain_quadratic(kind: str) -> bool:
+    """Return whether an element is a plain quadratic one: the orders of others may be higher."""
+    return is_quadratic(kind) and kind_of(kind).formulation == "standard"
+
+
 def _problem(word: str, norm: int, degree: int) -> Problem:
     linear = degree == 1
-    takes: Of = (lambda kind: not is_quadratic(kind)) if linear else is_quadratic
+    takes: Of = (lambda kind: kind_of(kind).shape.degree < 2) if linear else _is_plain_quadratic
     what, order = ("displacement", degree + 1) if norm == DISPLACEMENT else ("energy", degree)
     return StaticProblem(
         name=f"order/{word}_{what}_{'linear' if linear else 'quadratic'}",

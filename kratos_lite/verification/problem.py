@@ -10,10 +10,14 @@ from math import inf, isfinite
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.verification.meshes import kind_of
+from kratos_lite.verification.meshes import kind_of, short
 from kratos_lite.verification.sources import SOURCES
 
-ELEMENTS = tuple(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27))
+ELEMENTS = (
+    *(f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8)), "EnhancedStrain3D8N", "BBar3D8N",
+    *(f"KinematicLinear3D{n}N" for n in (10, 13, 15, 20, 27)), "Reduced3D20N",
+    *(f"BBar3D{n}N" for n in (10, 13, 15, 20, 27)),
+)  # fmt: skip
 """The elements of the library, in the order of the table."""
 GRADES = ((0.02, "A"), (0.1, "B"), (0.2, "C"), (0.5, "D"))
 """Largest relative error of each grade, after MacNeal & Harder 1985; beyond the last it is F."""
@@ -175,7 +179,7 @@ class Row:
     @property
     def kind(self) -> str:
         """Short name of the element, such as ``8N``."""
-        return self.element.removeprefix("KinematicLinear3D")
+        return short(self.element)
 
 
 def cell_is(*cells: str) -> Of:

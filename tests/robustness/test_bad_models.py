@@ -323,11 +323,16 @@ def test_a_square_that_meets_two_triangles_is_reported():
 
 
 @pytest.mark.parametrize("nodes", KINDS)
-def test_sound_meshes_of_every_kind_give_no_warning(nodes):
-    assert model_of(kl.box(cells=(2, 2, 2), element=kind(nodes))).check() == []
+def test_sound_meshes_of_every_kind_give_no_warning_but_of_locking(nodes):
+    assert others(model_of(kl.box(cells=(2, 2, 2), element=kind(nodes)))) == []
     wheel = kl.Model(kl.annulus(1.0, 2.0, 0.5, (1, 5, 1), kind(nodes)), STEEL)
     wheel.fix("inner")
-    assert wheel.check() == []
+    assert others(wheel) == []
+
+
+def others(model):
+    """Return the warnings that are not about locking in bending."""
+    return [text for text in model.check() if "bending" not in text]
 
 
 @pytest.mark.parametrize(

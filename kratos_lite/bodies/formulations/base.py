@@ -21,6 +21,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.linear_algebra import Solve
+from kratos_lite.elements.formulations import NON_LOCKING
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.registry import Registry
 from kratos_lite.solvers import LinearSolver
@@ -55,6 +56,8 @@ class Formulation(ABC):
     aliases: ClassVar[tuple[str, ...]] = ()
     without: ClassVar[tuple[str, ...]] = ()
     """Integrators of deformable bodies that it does not have."""
+    unnamed: ClassVar[str] = NON_LOCKING
+    """Formulation of elements whose names in the mesh say none."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -18,6 +18,7 @@ class TotalLagrangian(Formulation):
 
     name = "total_lagrangian"
     aliases = ("TL",)
+    unnamed = "standard"
 
     def __init__(
         self, points: Array, groups: Sequence[ElementGroup], mass: Mass, modes: int | None = None

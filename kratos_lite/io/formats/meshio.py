@@ -45,8 +45,8 @@ _OPTIONS = {
 def read_meshio(path: str | Path) -> Document:
     """Read the mesh of any format that meshio knows; the ending says which.
 
-    Solid cells become elements ``KinematicLinear3D…N``, triangles and quadrilaterals conditions
-    ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  Named groups,
+    Solid cells become elements ``Element3D…N``, which say no formulation, triangles and quadrilaterals
+    conditions ``SurfaceCondition3D…N``.  Lines and points are kept when a named group holds them.  Groups,
     cell sets and node sets become parts.  The number of the physical group (or material) of a solid cell
     is its property id, or 1; the properties are empty.  Lengths are taken to be m.  meshio tells no ids:
     nodes and elements are counted from 1, unless the data NODE_ID and ELEMENT_ID of our own files name them.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields as constants_of
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def document_from(model: Model) -> Document:
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
-    blocks = [replace(block, properties=numbers[rows], lines=None) for block, rows in with_rows(mesh.blocks)]
+    blocks = _blocks(model, numbers)
     forces = sum((load.forces(mesh, model.element_groups()) for load in others), np.zeros_like(mesh.points))
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
     written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
@@ -47,6 +48,24 @@ def document_from(model: Model) -> Document:
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
+
+
+def _blocks(model: Model, numbers: Ints) -> list[Block]:
+    """Return the elements with these properties, by the names of the classes that compute them."""
+    mesh, groups = model.mesh, model.element_groups()
+    names = np.concatenate([np.full(len(block), block.name, dtype=object) for block in mesh.blocks])
+    if model.chosen():
+        for group in groups:
+            names[group.rows] = group.element.__name__
+    found = []
+    for block, rows in with_rows(mesh.blocks):
+        mine = names[rows]
+        ends = [0, *(np.flatnonzero(mine[1:] != mine[:-1]) + 1).tolist(), len(mine)]
+        for first, last in pairwise(ends):
+            if last > first:
+                part = replace(block, properties=numbers[rows], lines=None).take(np.arange(first, last))
+                found.append(replace(part, name=str(mine[first])))
+    return found
 
 
 def _split_loads(model: Model) -> tuple[Array, list[Any]]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import Problems, naming, nearest
 from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import apply_properties
@@ -83,7 +84,7 @@ def _renamed(blocks: Sequence[Block]) -> list[str]:
     notes = {}
     for block in blocks:
         name = ELEMENTS[block.name].__name__ if block.name in ELEMENTS else block.name
-        if len(block) and name != block.name:
+        if len(block) and name != block.name and not is_unnamed(block.name):
             large = " with small displacements" if "Lagrangian" in block.name else ""
             notes[block.name] = f"{block.name} is solved as {name}{large}"
     return list(notes.values())

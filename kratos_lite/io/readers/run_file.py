@@ -26,7 +26,19 @@ LOADS: dict[str, Callable[[str, Any], Load]] = {
     "pressure": Pressure,
     "point_load": PointLoad,
 }
-KEYS = ("model", "material", "fix", "gravity", *LOADS, "ale", "time", "solver", "tolerance", *OUTPUTS)
+KEYS = (
+    "model",
+    "formulation",
+    "material",
+    "fix",
+    "gravity",
+    *LOADS,
+    "ale",
+    "time",
+    "solver",
+    "tolerance",
+    *OUTPUTS,
+)
 
 
 def read_run_file(
@@ -38,12 +50,12 @@ def read_run_file(
 ) -> Case:
     """Return the case of a run file of kratos_lite.
 
-    It has the keys `model` (a mesh file), `material` (``{"law", "E", "nu", "density"}``, or one
-    for each part), `fix` (``{part: "xyz"}`` or ``{part: {"x": 0.001}}``, m), `gravity` (m/s²),
-    `traction` and `pressure` by part (Pa), `point_load` by part (N on each node), `ale` (a motion of the
-    material, see `add_motion`), `time` (see `read_time`), `solver` (``{"type", "tolerance"}``),
-    `tolerance`, and the files to write: `output`, `json`, `picture`.  A prescribed displacement may be
-    ``{"times": […], "values": […]}``, a load ``{"value": …, "amplitude": …}``.
+    It has the keys `model` (a mesh file), `formulation` (of its elements, as of `Model`), `material`
+    (``{"law", "E", "nu", "density"}``, or one for each part), `fix` (``{part: "xyz"}`` or
+    ``{part: {"x": 0.001}}``, m), `gravity` (m/s²), `traction` and `pressure` by part (Pa), `point_load` by
+    part (N on each node), `ale` (a motion of the material, see `add_motion`), `time` (see `read_time`),
+    `solver` (``{"type", "tolerance"}``), `tolerance`, and the files to write: `output`, `json`, `picture`.  A
+    prescribed displacement may be ``{"times": […], "values": […]}``, a load ``{"value": …, "amplitude": …}``.
 
     Parameters
     ----------
@@ -70,6 +82,7 @@ def read_run_file(
     document = read_document(path, strict=strict)
     by_file = not given.values or is_by_part(given)
     model = model_from(document, materials=by_file, initial_displacement=initial_displacement)
+    problems.of(_choose_formulation, model, settings)
     _assign(model, given, problems)
     for part in sections["fix"].values:
         problems.of(_fix, model, sections["fix"], part)
@@ -84,6 +97,12 @@ def read_run_file(
         model.notes.append("loads and supports that change in time are taken at t = 0")
     time = time and time.starting_from(model.supports, model.initial_displacement)
     return Case(model, time, 0, solver, tolerance, outputs, files=settings.files)
+
+
+def _choose_formulation(model: Model, settings: Settings) -> None:
+    if "formulation" in settings:
+        word = settings.text("formulation")
+        settings.placed("formulation", setattr, model, "formulation", word)
 
 
 def _changes(model: Model) -> bool:

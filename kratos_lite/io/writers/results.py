@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite import voigt
+from kratos_lite.analysis.report import element_counts
 from kratos_lite.errors import SolveError
 from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.writers.endings import check_result
@@ -67,7 +68,8 @@ def summary(result: Result) -> dict[str, Any]:
     energy, mises, row = result.totals()
     return {
         "nodes": mesh.n_nodes,
-        "elements": {block.name: len(block) for block in mesh.blocks if len(block)},
+        "elements": element_counts(mesh, result.groups, report.formulation),
+        **({"formulation": report.formulation} if report.formulation else {}),
         "unknowns": report.unknowns,
         "total_load": report.total_load.tolist(),
         "total_reaction": report.total_reaction.tolist(),

@@ -30,7 +30,10 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
     Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
     ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
-    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``; elements keep theirs where a prestress
+    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``, ``BBar3D8N`` becomes
+    ``SmallDisplacementBbarElement3D8N``; ``EnhancedStrain3D8N`` and others that Kratos does not have are
+    written by their own names.  ``Element3D8N``, which names no formulation, becomes the plain element of
+    Kratos, whose ``Element3D8N`` is empty.  Elements keep theirs where a prestress
     or the displacement of free nodes is their initial state, which the present elements of Kratos ignore.
     A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
     variable of each master from the word before in the header, so it reads such a constraint differently.
@@ -81,7 +84,7 @@ def _unknown_to_kratos(document: Document) -> list[Note]:
     blocks = [(block, keep) for block in document.mesh.blocks]
     for block, kept in [*blocks, *((block, False) for block in document.mesh.conditions)]:
         name = block.name if kept else kratos_name(block.name)
-        own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith("KinematicLinear3D")
+        own = name in ELEMENTS and not ELEMENTS[name].__name__.startswith(("KinematicLinear3D", "BBar3D8N"))
         old = name.startswith(("KinematicLinear", "TotalLagrangian3D"))
         if own or old or "ContactFace" in name or re.search(r"3D\d+$", name):
             counts[name] += len(block)

@@ -1,0 +1,104 @@
+"""`Model(mesh, material, formulation)`: which element classes compute a model."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+STEEL, RUBBER = kl.Isotropic3D(E=210e9, nu=0.3), kl.Isotropic3D(E=1e6, nu=0.499)
+
+
+def kinds(model):
+    return [group.element.__name__ for group in model.element_groups()]
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        (None, "KinematicLinear3D8N"),
+        ("standard", "KinematicLinear3D8N"),
+        ("enhanced", "EnhancedStrain3D8N"),
+        ("b_bar", "BBar3D8N"),
+        ("non_locking", "EnhancedStrain3D8N"),
+    ],
+)
+def test_a_word_chooses_the_element_class(word, name):
+    mesh = kl.box(element="KinematicLinear3D8N")
+    model = kl.Model(mesh, STEEL, formulation=word)
+    assert kinds(model) == [name]
+    assert model.mesh is mesh  # whose names stay
+
+    named = kl.Model(kl.box(element=name), STEEL)
+    for one in (model, named):
+        one.fix("z-")
+        one.add(kl.Traction("z+", (1e6, 0, 0)))
+    assert np.abs(model.solve().u - named.solve().u).max() == 0
+
+
+def test_the_word_can_be_changed_and_counts_as_a_change():
+    model = kl.Model(kl.box((1, 1, 4), (2, 2, 4), element="KinematicLinear3D8N"), STEEL)
+    model.fix("z-")
+    model.add(kl.Traction("z+", (1e6, 0, 0)))
+    analysis = model.static()
+    plain = analysis.solve().u
+    model.formulation = "enhanced"
+    enhanced = analysis.solve().u
+    assert np.abs(enhanced).max() > 1.02 * np.abs(plain).max()
+    model.formulation = None
+    assert np.abs(analysis.solve().u - plain).max() < 1e-12 * np.abs(plain).max()
+
+
+def test_each_material_has_the_element_that_does_not_lock_with_it():
+    mesh = kl.box((1, 1, 2), (2, 2, 2), element="KinematicLinear3D20N")
+    mesh.add_part("low", lambda X: X[:, 2] <= 1)
+    model = kl.Model(mesh, STEEL, formulation="non_locking")
+    model.assign(RUBBER, "low")
+    found = {group.element.__name__: group.material for group in model.element_groups()}
+    assert found == {"KinematicLinear3D20N": STEEL, "BBar3D20N": RUBBER}
+    model.fix("z-")
+    model.add(kl.Gravity((0, 0, -1.0)))
+    model.add(kl.Traction("z+", (0, 0, 1e3)))
+    text = dict(model.solve().table())["formulation"]
+    assert text.startswith("non_locking, as asked for: ")
+    assert "BBar3D20N for Isotropic3D(E=1000000.0, nu=0.499" in text
+
+
+def test_the_report_says_what_was_chosen_where_the_mesh_names_no_formulation():
+    model = kl.Model(kl.box(cells=(2, 2, 2), element="Element3D8N"), STEEL)
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, 1e6)))
+    result = model.solve()
+    assert result.report.formulation == "non_locking, as the mesh names none: EnhancedStrain3D8N"
+    rows = dict(result.table())
+    assert (rows["elements"], rows["formulation"]) == ("8 EnhancedStrain3D8N", result.report.formulation)
+    assert "non_locking, as the mesh names none" in str(model)
+
+
+def test_a_model_whose_mesh_names_its_elements_says_nothing_about_formulations():
+    model = kl.Model(kl.box(element="EnhancedStrain3D8N"), STEEL)
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, 1e6)))
+    result = model.solve()
+    assert result.report.formulation == ""
+    assert "formulation" not in dict(result.table())
+    assert dict(result.table())["elements"] == "1 EnhancedStrain3D8N"
+
+
+@pytest.mark.parametrize(
+    ("element", "word", "message"),
+    [
+        ("KinematicLinear3D4N", "enhanced", r"element 1 \(KinematicLinear3D4N\): there is no formulation 'en"),
+        ("KinematicLinear3D4N", "b_bar", "of elements with 4 nodes .* there is standard, non_locking"),
+        ("KinematicLinear3D20N", "enhanced", "there is standard, reduced, b_bar, non_locking"),
+        ("KinematicLinear3D8N", "reduced", "there is standard, enhanced, b_bar, non_locking"),
+        ("KinematicLinear3D8N", "enhnced", "must be one of b_bar, enhanced, .*Did you mean enhanced"),
+        ("KinematicLinear3D8N", 3, "formulation must be one of .*; got 3"),
+    ],
+)  # fmt: skip
+def test_a_formulation_that_an_element_does_not_have_is_refused(element, word, message):
+    with pytest.raises(kl.InputError, match=message):
+        kl.Model(kl.box(element=element), STEEL, formulation=word)
+    model = kl.Model(kl.box(element=element), STEEL)
+    with pytest.raises(kl.InputError, match=message):
+        model.formulation = word
+    assert model.formulation is None
