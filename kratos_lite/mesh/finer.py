@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.validation import finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,35 @@ class Finer:
         (n', ...) float
         """
         return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
+
+    def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> Finer:
+        """Return the same with the new nodes of parts moved onto the true surfaces.
+
+        Hanging nodes stay on the edges and faces of their masters.
+
+        Parameters
+        ----------
+        geometry : by part, a function of places (k, 3) in m near the surface that returns places on it.
+
+        Returns
+        -------
+        Finer
+
+        Raises
+        ------
+        InputError
+            A function does not return finite places.
+        MeshError
+            There is no such part.
+        """
+        points, old = self.mesh.points.copy(), self.coarse.n_nodes
+        for part, function in geometry.items():
+            rows = self.mesh.nodes(part)
+            rows = rows[rows >= old]
+            points[rows] = finite(function(points[rows]), f"the places on {part!r}", (len(rows), 3))
+        if self.mesh.hanging is not None:
+            points = self.mesh.hanging.interpolate(points)
+        return replace(self, mesh=self.mesh.replace(points=points))
 
     def grown(self, rows: Ints) -> Ints:
         """Return the nodes of the finer mesh that belong to a set of nodes of the coarse one.

@@ -51,7 +51,7 @@ def refined(structure: S, finer: Finer) -> S:
     """
     if structure.motion is not None:
         raise ModelError("a model whose material moves through the mesh cannot be carried over to a finer one")
-    new = type(structure)(finer.mesh)
+    new = type(structure)(finer.mesh, formulation=structure.formulation)
     new._materials = list(structure._materials)
     new._material_of = structure._material_of[finer.elements]
     _carry_rules(structure, new, finer)
