@@ -19,7 +19,7 @@ from typing import Any
 from benchmarks import cases, curves, report, scenes, sets
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
-from benchmarks.tables import ADAPTIVE, Row
+from benchmarks.tables import Row
 
 RESULTS = Path(__file__).with_name("results")
 PAGE, PICTURES = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "benchmarks"
@@ -50,11 +50,8 @@ def kratos(options: argparse.Namespace, folder: Path) -> list[Run]:
 def error(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return run time against error."""
     sizes = {kind: tuple(options.cells) for kind in scenes.KINDS} if options.cells else None
-    runs = sets.error_runs(options.programs, options.scenes or sets.ERROR_SCENES, sizes)
-    if not options.decisive:
-        return runs
-    wanted = curves.decisive(report.of(kept(options.out).get("rows", []), "error"))
-    return [run for run in runs if (run.program, *run.place) in wanted or run.program == ADAPTIVE]
+    scenes_ = options.scenes or sets.ERROR_SCENES
+    return sets.error_runs(options.programs, scenes_, sizes, options.elements or ())
 
 
 def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
@@ -105,6 +102,7 @@ def main(words: Sequence[str] | None = None) -> int:
         runs = COMMANDS[options.command](options, Path(name))
         if options.out is not None:
             driver.save = saver(driver, options)
+            driver.known = kept(options.out).get("rows", []) if options.missing else []
         rows = driver.measure([r for r in runs if not options.elements or r.kind in (*options.elements, "")])
     print("\n" + report.text(rows))
     return 0 if any("failed" not in row for row in rows) else 1
@@ -164,7 +162,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         help="for error: that a run may take, as expected",
     )
     add("--budget", type=float, default=float("inf"), metavar="SECONDS", help="after which no scene is begun")
-    add("--decisive", action="store_true", help="for error: only points of --out that its summary rests on")
+    add("--missing", action="store_true", help="measure only what --out does not hold")
     add("--memory", type=float, default=20.0, metavar="GB", help="that one run may take")
     add(
         "--out",
@@ -213,7 +211,7 @@ def references(sizes: Sequence[int]) -> int:
     for name in scenes.ENERGIES:
         found = []
         for n in sizes:
-            scene = scenes.make(name, "27N", sets.scaled(n, name))
+            scene = scenes.make(name, "27N", n)
             u = scene.model.solve(tolerance=1e-11).displacement()
             found.append(float((scene.forces() * u).sum()) / 2)
         a, b, c = found[-3:]

@@ -10,30 +10,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.programs import PEERS, PROGRAMS
+from benchmarks.scenes import ENERGIES
 from benchmarks.tables import ADAPTIVE, OURS, Row, ratio, seconds, table
 
 LEVELS = (1e-2, 1e-3, 1e-4)
 CLOCKS = {"warm": "warm", "cold": "process"}
 """Second time in one process, from reading to the solution; and the whole process."""
-CLOSE = 1.3
-"""Times within this factor of the best may change places in the next run."""
 
 
 class Curve(NamedTuple):
     """Points of one program and element on a scene, from coarse to fine."""
 
-    sizes: np.ndarray
     times: np.ndarray
     errors: np.ndarray
 
 
 class Reached(NamedTuple):
-    """An error reached: seconds, whether the first point reaches it already, element, and sizes used."""
+    """An error reached: seconds, whether the first point reaches it already, and the element."""
 
     seconds: float
     bound: bool
     kind: str
-    sizes: tuple[int, ...]
 
     def __str__(self) -> str:
         return f"{'≤ ' * self.bound}{seconds(self.seconds)} {self.kind}"
@@ -48,8 +45,8 @@ def curves(rows: Iterable[Row], clock: str = "warm") -> dict[tuple[str, str, str
             points[row["scene"], row["program"], row["kind"]].append((row["n"], -error, time))
     made = {}
     for key, found in points.items():
-        sizes, error, times = np.array(sorted(found)).T
-        made[key] = Curve(sizes.astype(int), times, np.maximum(-error, 1e-16))
+        _, error, times = np.array(sorted(found)).T
+        made[key] = Curve(times, np.maximum(-error, 1e-16))
     return made
 
 
@@ -74,47 +71,25 @@ def time_to(level: float, times: np.ndarray, found: np.ndarray) -> tuple[float, 
     return float(np.exp(t[0] + share * (t[1] - t[0]))), False
 
 
-def reached(level: float, kind: str, curve: Curve) -> Reached | None:
-    """Return how a curve reaches an error, or None."""
-    time = time_to(level, curve.times, curve.errors)
-    if time is None:
-        return None
-    i = int(np.flatnonzero(curve.errors <= level)[0])
-    return Reached(*time, kind, tuple(curve.sizes[max(i - 1, 0) : i + 1].tolist()))
-
-
-def by_level(rows: Iterable[Row], clock: str) -> dict[tuple[str, float], dict[str, list[Reached]]]:
-    """Return for each scene and error by program the elements that reach it, the fastest first."""
-    found: dict[tuple[str, float], dict[str, list[Reached]]] = defaultdict(lambda: defaultdict(list))
+def fastest(rows: Iterable[Row], clock: str) -> dict[tuple[str, float, str], Reached]:
+    """Return for each scene, error and program the element that reaches it first."""
+    found: dict[tuple[str, float, str], Reached] = {}
     for (scene, program, kind), curve in curves(rows, clock).items():
         for level in LEVELS:
-            if how := reached(level, kind, curve):
-                found[scene, level][program].append(how)
-    for programs in found.values():
-        for ways in programs.values():
-            ways.sort()
+            if time := time_to(level, *curve):
+                how, place = Reached(*time, kind), (scene, level, program)
+                found[place] = min(how, found.get(place, how))
     return found
-
-
-def decisive(rows: Sequence[Row]) -> set[tuple[str, str, str, int]]:
-    """Return program, scene, kind and n of the points that the summary rests on, or may in the next run."""
-    wanted = set()
-    for clock in CLOCKS:
-        for (scene, _), programs in by_level(rows, clock).items():
-            for program, ways in programs.items():
-                close = [way for way in ways if way.seconds <= CLOSE * ways[0].seconds]
-                wanted |= {(program, scene, way.kind, n) for way in close for n in way.sizes}
-    return wanted
 
 
 def summary(rows: Sequence[Row], clock: str) -> str:
     """Return the seconds to each error with each program's best element, and ours over the best peer's."""
     programs = [name for name in PROGRAMS if any(row["program"] == name for row in rows)]
-    found = by_level(rows, clock)
+    found = fastest(rows, clock)
     body = []
     for scene in dict.fromkeys(row["scene"] for row in rows):
-        for level in LEVELS:
-            ways = {name: how[0] for name, how in found.get((scene, level), {}).items()}
+        for level in LEVELS if ENERGIES.get(scene) is None else LEVELS[:2]:
+            ways = {name: found[scene, level, name] for name in programs if (scene, level, name) in found}
             ours, theirs = (min((ways[p] for p in names if p in ways), default=None) for names in SIDES)
             both = ratio(ours.seconds, theirs.seconds) if ours and theirs else ""
             cells = [str(ways.get(name, "—")) for name in programs]
@@ -136,7 +111,7 @@ def cheapest(rows: Iterable[Row], program: str = OURS) -> list[str]:
 
 def _sentence(scene: str, kinds: Mapping[str, Curve]) -> str:
     for level in reversed(LEVELS):
-        found = {kind: time_to(level, curve.times, curve.errors) for kind, curve in kinds.items()}
+        found = {kind: time_to(level, *curve) for kind, curve in kinds.items()}
         times = {kind: time[0] for kind, time in found.items() if time is not None}
         if len(times) >= 2 or (times and level == LEVELS[0]):
             break
@@ -158,7 +133,7 @@ def _sentence(scene: str, kinds: Mapping[str, Curve]) -> str:
 def best_kind(kinds: Mapping[str, Curve]) -> str:
     """Return the element that reaches the smallest error that any reaches, in the least time."""
     for level in (*reversed(LEVELS), 1e-1):
-        found = [(time[0], kind) for kind, c in kinds.items() if (time := time_to(level, c.times, c.errors))]
+        found = [(time[0], kind) for kind, c in kinds.items() if (time := time_to(level, *c))]
         if found:
             return min(found)[1]
     return min(kinds, key=lambda kind: kinds[kind].errors.min())

@@ -62,7 +62,8 @@ class Run:
     @property
     def turns(self) -> tuple[Any, ...]:
         """What has the same value takes turns: one scene, or a whole group that is compared with itself."""
-        return (self.group,) if self.group in ("skips", "cube1") else (self.group, *self.place)
+        whole = self.group in ("skips", "cube1")
+        return (self.group,) if whole else (self.group, *self.place, self.variant)
 
     @property
     def series(self) -> tuple[str, str, str, str]:
@@ -84,6 +85,7 @@ class Driver:
     budget : seconds after which no further scene is begun.
     tell : called with each line of progress.
     save : called with all rows so far after each scene.
+    known : rows that need not be measured again.
     """
 
     folder: Path
@@ -95,14 +97,17 @@ class Driver:
     budget: float = float("inf")
     tell: Callable[[str], None] = print
     save: Callable[[list[dict[str, Any]]], None] = list
+    known: list[dict[str, Any]] = field(default_factory=list)
     absent: dict[str, str] = field(default_factory=dict)
     stems: dict[tuple[str, str, int], Path] = field(default_factory=dict)
+    made: dict[tuple[str, str, int], scenes.Scene] = field(default_factory=dict)
     reference: dict[tuple[str, str, int], tuple[np.ndarray, dict[str, float]]] = field(default_factory=dict)
 
     def measure(self, runs: Sequence[Run]) -> list[dict[str, Any]]:
         """Make all runs and return one row each; programs on the same scene take turns."""
         rows: list[dict[str, Any]] = []
-        beyond: set[tuple[str, str, str, str]] = set()  # what is not asked for a larger size
+        runs = self._unknown(runs)
+        beyond = {series(row) for row in self.known if self._is_last(row, runs)}
         end = perf_counter() + self.budget
         for turns in dict.fromkeys(run.turns for run in runs):
             if perf_counter() > end:
@@ -110,26 +115,30 @@ class Driver:
                 break
             here = [run for run in runs if run.turns == turns and run.series not in beyond]
             made = self._interleaved(here)
-            finished = {row["program"] for row in made if self._is_last(row, runs)}
-            beyond |= {run.series for run in here if run.program in finished}
+            beyond |= {series(row) for row in made if self._is_last(row, runs)}
             rows += made
             for place in {run.place for run in here}:
                 self._forget(place)
             self.save(rows)
         return rows
 
+    def _unknown(self, runs: Sequence[Run]) -> list[Run]:
+        """Return the runs of which no row is known."""
+        known = {identity(row) for row in self.known}
+        return [run for run in runs if (*run.series, run.n, run.variant) not in known]
+
     def _is_last(self, row: dict[str, Any], runs: Sequence[Run]) -> bool:
         """Return whether a curve ends here: it failed, is exact enough, or would take too long."""
-        if "failed" in row or row["group"] != "error" or "variant" in row:
-            return "failed" in row and "variant" not in row
-        series = tuple(row[word] for word in ("group", "program", "scene", "kind"))
-        larger = [run.n for run in runs if run.series == series and run.n > row["n"]]
-        expected = row["work"] * (min(larger, default=row["n"]) / row["n"]) ** 3
-        return row["errors"].get("displacement", 1.0) < ENOUGH or expected > self.point
+        if "failed" in row or row["group"] != "error":
+            return "failed" in row
+        larger = [run.n for run in runs if run.series == series(row) and run.n > row["n"]]
+        growth = 3.0 if "variant" in row else (min(larger, default=row["n"]) / row["n"]) ** 3
+        return row["errors"].get("displacement", 1.0) < ENOUGH or row["warm"] * growth > self.point
 
     def _forget(self, place: tuple[str, str, int]) -> None:
         """Remove the files and the solution of a scene."""
         self.reference.pop(place, None)
+        self.made.pop(place, None)
         if (stem := self.stems.pop(place, None)) is not None:
             for old in stem.parent.glob(f"{stem.name}.*"):
                 old.unlink()
@@ -183,7 +192,8 @@ class Driver:
             if run.task == "ale":
                 self.stems[run.place] = ale.write(self.folder, run.kind, run.n)
             elif run.n < LARGE:
-                self.stems[run.place] = scenes.write(scenes.make(*run.place), self.folder)
+                self.made[run.place] = scenes.make(*run.place)
+                self.stems[run.place] = scenes.write(self.made[run.place], self.folder)
             else:
                 words = [*map(str, run.place), str(self.folder)]
                 command = [sys.executable, "-m", "benchmarks.scenes", *words]
@@ -255,7 +265,8 @@ class Driver:
         if not dict(run.options).get("errors"):
             return {"difference": difference}
         if not exact or difference > 0.01 * exact["displacement"]:  # else its error is the same within 1 %
-            exact = exact | errors.errors(scenes.make(run.scene, run.kind.split()[0], run.n), u)
+            plain = run.scene, run.kind.split()[0], run.n
+            exact = exact | errors.errors(self.made.get(plain) or scenes.make(*plain), u)
             self.reference[run.place] = (known, self.reference[run.place][1] or exact)
         return {"difference": difference} | exact
 
@@ -322,9 +333,14 @@ def results(
     }
 
 
+def series(row: dict[str, Any]) -> tuple[str, ...]:
+    """Return what rows of one curve have in common, as `Run.series`."""
+    return tuple(row[word] for word in ("group", "program", "scene", "kind"))
+
+
 def identity(row: dict[str, Any]) -> tuple[Any, ...]:
     """Return what two rows have in common if they measure the same."""
-    return tuple(row.get(word, "") for word in ("group", "program", "scene", "kind", "n", "variant"))
+    return (*series(row), row["n"], row.get("variant", ""))
 
 
 def kept(row: dict[str, Any]) -> dict[str, Any]:

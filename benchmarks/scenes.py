@@ -41,6 +41,7 @@ def write(scene: Scene, folder: Path) -> Path:
         f"{path}.npz",
         points=scene.model.mesh.points,
         nodes=block.nodes,
+        element=block.name,
         vtk_order=np.array(block.shape.to_vtk),
         fixed=supports.fixed,
         values=supports.values,

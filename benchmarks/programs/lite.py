@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.programs.common import Array, Job, run
 
 WORDS = {"tolerance", "solver"}
+ARRAYS = ("points", "nodes", "fixed", "values", "forces", "elasticity", "element")
 
 
 def work(job: Job) -> Array | None:
@@ -29,7 +30,7 @@ def work(job: Job) -> Array | None:
 
         return ale.work(job, kl)
     with job.phase("read"):
-        model = kl.read(f"{job.stem}.mdpa")
+        model = from_arrays(job, kl) if job.given.get("arrays") else kl.read(f"{job.stem}.mdpa")
     if job.task == "parse":
         return None
     if job.task == "assembly":
@@ -57,6 +58,18 @@ def work(job: Job) -> Array | None:
             ending = ".vtu" if job.given["write"] is True else job.given["write"]
             kl.write(f"{job.given['folder']}/result{ending}", result, job.given.get("mode"))
     return np.asarray(result.displacement())
+
+
+def from_arrays(job: Job, kl: Any) -> Any:
+    """Return the model made of the arrays that the other Python libraries read, too."""
+    with np.load(f"{job.stem}.npz") as file:
+        points, nodes, fixed, values, forces, elasticity, element = (file[name] for name in ARRAYS)
+    E, nu = elasticity.tolist()
+    model = kl.Model(kl.Mesh(points, [kl.Block(str(element), nodes)]), kl.Isotropic3D(E=E, nu=nu))
+    for axis, held in enumerate(fixed.T):
+        model.fix(held, "xyz"[axis], values[held, axis, None])
+    model.add(kl.NodalForces(forces))
+    return model
 
 
 def adaptive(job: Job, model: Any) -> Array:

@@ -26,18 +26,18 @@ from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_own
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Finer, Mesh
+from kratos_lite.mesh import Finer
 from kratos_lite.mesh.order import quadratic, raised
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
-from kratos_lite.typing import Array, Ints, Progress
+from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import number
 
 S = TypeVar("S", bound=Structure)
 ALONE = {1: 1.5, 2: 1.3}
 """Safety of an estimate that no coarser mesh corrects, by the order of the elements."""
-SAFETY = 1.15
+SAFETY = 1.2
 """Safety of an estimate that one corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
@@ -87,8 +87,10 @@ def solve_to(
     if not 0 < aim < 1:
         raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
     if model.motion is not None:
-        raise ModelError("a model whose material moves through its mesh is not refined; solve it without error")
-    levels: list[_Level[S]] = []
+        raise ModelError(
+            "a model whose material moves through its mesh is not refined; solve it without error"
+        )
+    levels: list[_Level] = []
     steps: list[Finer] = []
     history: list[RefinementStep] = []
     missed = ""
@@ -160,10 +162,13 @@ class _Level:
     def bound(self) -> float:
         """The error in √J that is reported."""
         alone = ALONE[self.order] * self.estimate
-        if self.before is None or not self.estimate < SETTLED * self.before.estimate:
-            return alone if self.before is None else max(alone, self.change)
+        if self.before is None:
+            return alone
         ratio = self.estimate / self.before.estimate
-        return SAFETY * self.change * ratio / float(np.sqrt(1 - ratio**2))
+        if not ratio < SETTLED:
+            return max(alone, self.change)
+        corrected = self.change * ratio / float(np.sqrt(1 - ratio**2))
+        return SAFETY * max(corrected, self.estimate)
 
     @property
     def reported(self) -> float:
@@ -223,13 +228,13 @@ def _can_be_raised(model: Structure) -> bool:
     kinds = [ELEMENTS[block.name] for block in mesh.blocks if len(block)]
     return (
         mesh.hanging is None
-        and (model._rule_of < 0).all()
+        and bool((model._rule_of < 0).all())
         and all(map(is_own, kinds))
         and any(kind.shape.degree == 1 for kind in kinds)
     )
 
 
-def _marked(squares: Array, kept: Array, aim: float) -> Array:
+def _marked(squares: Array, kept: Array, aim: float) -> Mask:
     """Return which elements (m,) are cut now, on the way to a mesh with the error `aim`.
 
     On it all elements have the same error τ.  An element cut k times has 8^k children, or 8 k around a

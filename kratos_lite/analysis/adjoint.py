@@ -13,11 +13,10 @@ Finite Element Analysis (2000), chapter 8.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
-from kratos_lite.analysis.error_estimate import QuantityError
+from kratos_lite.analysis.error_estimate import Origin, QuantityError
 from kratos_lite.analysis.quantities import Quantity, Solved
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
@@ -31,34 +30,23 @@ SAME = 1e-6
 """Relative difference up to which a reaction is the virtual work of a unit displacement of its part."""
 
 
-class Adjoint(Protocol):
-    """What solves with the matrix of a result again."""
-
-    @property
-    def held(self) -> Mask:
-        """Which degrees of freedom (n, 3) are prescribed."""
-
-    def solve(self, load: Array, motion: Array) -> Array:
-        """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
-
-
 def error_of(
-    result: Solved, adjoint: Adjoint, quantity: Quantity, strained: Array, nodal: Array
+    result: Solved, origin: Origin, quantity: Quantity, strained: Array, nodal: Array
 ) -> QuantityError:
     """Return the estimated error of a quantity of a result.
 
     Parameters
     ----------
     result : with the quantity.
-    adjoint : solves with its matrix.
+    origin : what was solved.
     quantity : its number.
     strained, nodal : displacements (n, 3) in m that strain, and recovered stresses (n, 6) in Pa.
     """
     load, motion, value = quantity.load(result), quantity.motion(result), quantity.value(result)
-    z = adjoint.solve(load, motion)
+    z = origin.adjoint(load, motion)
     warnings = []
     if motion.any():
-        warnings = _shared(result, adjoint.held, motion != 0)
+        warnings = _shared(result, origin.model.supports.fixed, motion != 0)
         work, size = -float((result.reactions * z).sum()), float(np.abs(result.reactions).sum())
         if abs(work - value) > SAME * size:
             raise ModelError(

@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
+from kratos_lite.model.loads import Load
+from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
+
+
+class Origin(Protocol):
+    """What a result is the solution of."""
+
+    @property
+    def model(self) -> Structure:
+        """The structure, as it was solved."""
+
+    @property
+    def loads(self) -> Sequence[Load]:
+        """Its loads."""
+
+    def adjoint(self, load: Array, motion: Array) -> Array:
+        """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +37,7 @@ class ErrorEstimate:
     absolute : ‖e‖ of the whole model in √J.
     relative : ‖e‖ / ‖u‖, with ‖u‖ of the exact solution as the estimate has it.
     per_element : (m,) ‖e‖ of each element in √J; the root of the sum of their squares is `absolute`.
-    method : how it was found: ``"recovery"``.
+    method : how it was found: ``"recovery"`` or ``"equilibrated"``.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
     """
 

@@ -68,8 +68,8 @@ class Model(Structure):
             elements quadratic where needed; the result is on the final mesh, the model stays as it is.
         most_unknowns : with `error`: no mesh with more of them is solved (400 000); a warning says what was
             reached.
-        geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto it;
-            without, edges that are straight stay straight.
+        geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto
+            it; without, edges that are straight stay straight.
 
         Returns
         -------

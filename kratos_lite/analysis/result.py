@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
+from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
@@ -24,12 +24,12 @@ from kratos_lite.typing import Array
 from kratos_lite.validation import choice, instance
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.adjoint import Adjoint
     from kratos_lite.analysis.quantities import Quantity
 
 At: TypeAlias = "str | ArrayLike | Located"
 """Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
 PLACES = ("gauss", "element", "node")
+METHODS = ("recovery", "equilibrated")
 
 
 class Result:
@@ -45,7 +45,7 @@ class Result:
     reactions, loads : (n, 3) nodal forces in N.
     report : what was solved, how, and how well.
     u0 : (n, 3) displacements in m without stress; none if not given.
-    adjoint : solves with the same matrix again, for the errors of quantities.
+    origin : what was solved, for bounds of the error and the errors of quantities.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Result:
         loads: Array,
         report: Report,
         u0: Array | None = None,
-        adjoint: Adjoint | None = None,
+        origin: Origin | None = None,
     ) -> None:
         self.mesh = mesh
         self.groups = list(groups)
@@ -68,7 +68,7 @@ class Result:
             array.setflags(write=False)  # strains and stresses are made of them later
         self.report = report
         self._strained = u if u0 is None else u - u0
-        self._adjoint = adjoint
+        self._origin = origin
 
     # ---- nodal values --------------------------------------------------------------------------
 
@@ -313,22 +313,30 @@ class Result:
     # ---- error ---------------------------------------------------------------------------------
 
     @overload
-    def error(self, of: None = None) -> ErrorEstimate: ...
+    def error(self, of: None = None, *, method: str = "recovery") -> ErrorEstimate: ...
 
     @overload
     def error(self, of: Quantity) -> QuantityError: ...
 
-    def error(self, of: Quantity | None = None) -> ErrorEstimate | QuantityError:
+    def error(self, of: Quantity | None = None, *, method: str = "recovery") -> ErrorEstimate | QuantityError:
         """Return an estimate of the error in the energy norm, or of the error of a quantity.
 
-        The recovered nodal stresses take the place of the exact ones.  The error of a quantity takes another
-        solution, of the adjoint; an analysis that is kept has its matrix ready: ``model.static()``.
+        By recovery, the recovered nodal stresses take the place of the exact ones.  The error of a quantity
+        takes another solution, of the adjoint; an analysis that is kept has its matrix ready:
+        ``model.static()``.
+
+        Stresses in equilibrium with the loads give an upper bound, up to what prescribed displacements and
+        curved faces differ from those of the mesh.  They are sought in polynomials three degrees above
+        those of the elements, which is enough in practice, but no proof.  It takes longer than a solution.
+
         Sources: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24 (1987) 337-357; Becker & Rannacher, Acta
-        Numerica 10 (2001) 1-102.
+        Numerica 10 (2001) 1-102; Ladevèze & Pelle, Mastering Calculations in Linear and Nonlinear Mechanics
+        (2005).
 
         Parameters
         ----------
         of : a quantity such as `DisplacementAt`, `ReactionOf` or `StressAt`; the energy norm if not given.
+        method : ``"recovery"``, or ``"equilibrated"`` for an upper bound in the energy norm.
 
         Returns
         -------
@@ -338,9 +346,10 @@ class Result:
         Raises
         ------
         InputError
-            `of` is no quantity, or the result is not that of a static analysis.
+            `of` is no quantity, there is no such method for it, or the result is not that of a static
+            analysis.
         MeshError, ModelError
-            The quantity does not fit, or the model has changed since.
+            The quantity does not fit, the model has changed since, or it has no bound by equilibrium.
 
         Examples
         --------
@@ -349,19 +358,31 @@ class Result:
         >>> bar = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
         >>> bar.fix("x-")
         >>> bar.add(kl.Traction("x+", (0, 0, 1.0)))
-        >>> error = bar.solve().error(of=kl.MeanDisplacement("x+", "z"))
-        >>> 0 < error.relative < 0.01
+        >>> result = bar.solve()
+        >>> 0 < result.error(of=kl.MeanDisplacement("x+", "z")).relative < 0.01
+        True
+        >>> result.error().relative < result.error(method="equilibrated").relative < 0.3
         True
         """
-        if of is None:
+        choice(method, "method", METHODS)
+        if of is None and method == "recovery":
             return self._error
-        from kratos_lite.analysis.adjoint import error_of  # a quick start for results
+        if self._origin is None:
+            raise InputError(
+                "the error of a quantity and the bound of an error need the model and the matrix of a static "
+                "analysis; this result has none"
+            )
+        if of is None:
+            from kratos_lite.analysis.error_bound import error_bound  # a quick start for results
+
+            return error_bound(self._origin, self.groups, self._strained, self.energy())
+        from kratos_lite.analysis.adjoint import error_of
         from kratos_lite.analysis.quantities import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
-        if self._adjoint is None:
-            raise InputError("the error of a quantity needs the matrix of a static analysis: model.solve()")
-        return error_of(self, self._adjoint, quantity, self._strained, self._nodal_stress)
+        if method != "recovery":
+            raise InputError(f"the error of a quantity is estimated by recovery; got method={method!r}")
+        return error_of(self, self._origin, quantity, self._strained, self._nodal_stress)
 
     @cached_property
     def _error(self) -> ErrorEstimate:

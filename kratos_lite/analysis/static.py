@@ -24,6 +24,9 @@ from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
 
+ADJOINT_TOLERANCE = 1e-5
+"""Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
+
 
 class Phases:
     """Seconds spent in each named phase."""
@@ -242,8 +245,8 @@ class StaticAnalysis:
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        adjoint = _Adjoint(self, model.version)
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, adjoint)
+        origin = _Origin(self, case.loads, model.version)
+        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin)
 
     def release(self) -> None:
         """Let go of the matrix and what is made of it; another solution makes them anew."""
@@ -277,7 +280,7 @@ class StaticAnalysis:
             return np.zeros_like(load)
         system = self._system_of(moving)
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
-        return system.solve(load, displaced - at_rest)[0]
+        return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
     def _initial_noise(self) -> float:
         """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
@@ -342,20 +345,25 @@ class StaticAnalysis:
 
 
 @dataclass(frozen=True, eq=False)
-class _Adjoint:
-    """An analysis with the version of its model that a result is of."""
+class _Origin:
+    """An analysis with its loads, and the version of its model, when it was solved."""
 
     analysis: StaticAnalysis
+    loads: list[Load]
     version: tuple[int, int]
 
     @property
-    def held(self) -> Mask:
-        return self.analysis.model.supports.fixed
+    def model(self) -> Structure:
+        return self._unchanged().model
 
-    def solve(self, load: Array, motion: Array) -> Array:
+    def adjoint(self, load: Array, motion: Array) -> Array:
+        return self._unchanged().adjoint(load, motion)
+
+    def _unchanged(self) -> StaticAnalysis:
+        """Return the analysis of the model as it was."""
         if self.version != self.analysis.model.version:
             raise ModelError("the model has changed since this solution; solve it again")
-        return self.analysis.adjoint(load, motion)
+        return self.analysis
 
 
 def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from kratos_lite.elements.exact_rules import (
     interpolations,
 )
 from kratos_lite.elements.formulations import NON_LOCKING, element_of
-from kratos_lite.elements.tables import tabulate
+from kratos_lite.elements.tables import StrainTables, tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
@@ -35,9 +35,9 @@ CHUNK_BYTES = 4_000_000
 def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
     """Return the kernels of a name, or None where they do not stand for these methods of an element class.
 
-    They stand for those of `KinematicLinear`; a class that overrides one is computed by its own, in NumPy.
+    A class that overrides one that they stand for is computed by its own, in NumPy.
     """
-    return kernels(name) if element.inherits(*methods) else None
+    return kernels(name) if element.has_kernels(*methods) else None
 
 
 def floats(values: Any) -> Array:
@@ -78,6 +78,10 @@ class ElementGroup:
     def law(self) -> tuple[Array, Array | None]:
         """Return C (6, 6) and the prestress, as kernels take them."""
         return floats(self.material.C), None if self.prestress is None else floats(self.prestress)
+
+    def strain_tables(self) -> StrainTables | None:
+        """Return what the element adds to the strain of the displacements, as kernels take it."""
+        return self.element.strain_tables(self.rule, floats(self.material.C))
 
     def at(self, points: Array, chunk: slice = slice(None)) -> KinematicLinear:
         """Return the elements of a chunk, placed at `points` (n, 3)."""

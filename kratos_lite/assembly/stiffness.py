@@ -15,7 +15,6 @@ from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
-from kratos_lite.elements.tables import lame_constants
 from kratos_lite.typing import Array, Progress
 
 SCATTER_BYTES = 64_000_000
@@ -60,9 +59,9 @@ def _add_compiled(
 ) -> Iterator[tuple[int, bool]]:
     """Add the stiffness of a group; yield the number of elements and whether J was constant in some."""
     nodes, _, dN, weights = group.tables()
-    C = floats(lame_constants(group.material.C) or group.material.C)
+    law = group.law()[0], group.strain_tables()
     module = compiled("stiffness", group.element)
-    constant = module.add_stiffness(points, nodes, dN, weights, C, pattern.indptr, pattern.indices, data)
+    constant = module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
     yield len(group), constant > 0
 
 

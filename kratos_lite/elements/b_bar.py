@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.elements.stiffness import strain_rows
-from kratos_lite.elements.tables import cofactors, determinant
+from kratos_lite.elements.tables import StrainTables, cofactors, determinant
+from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 
 
@@ -35,6 +36,26 @@ class BBar(KinematicLinear):
     formulation = "b_bar"
     batched: ClassVar[bool] = True
     dilatation: ClassVar[int] = 0
+
+    @classmethod
+    def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
+        """Return the polynomials of the dilatation for kernels; see `KinematicLinear.strain_tables`.
+
+        Parameters
+        ----------
+        rule : quadrature rule.
+        C : (6, 6) float, Pa; for `kept`.
+
+        Returns
+        -------
+        StrainTables
+        """
+        center = cls._center()
+        functions = np.zeros((len(rule), len(cls.nodes) if cls.dilatation else 0))
+        if cls.dilatation:
+            functions += cls.N(rule.points) - cls.N(center)
+        share = 1 - float(cls(cls.nodes, rule).kept(C))
+        return StrainTables(cls.dN(center), functions, None, share)
 
     def B_at_gauss_points(self, C: ArrayLike | None = None) -> Array:
         """Return B̄ at the Gauss points.
@@ -99,12 +120,16 @@ class BBar(KinematicLinear):
         dilatation = _trace(strain_rows(self._gauss[1]))
         return self._polynomials(xi) @ np.linalg.solve(weighted @ P, weighted @ dilatation)
 
+    @classmethod
+    def _center(cls) -> Array:
+        return cls.shape.nodes[: cls.shape.corners].mean(axis=0)
+
     def _polynomials(self, xi: Array) -> Array:
         """Return 1, or 1 and coordinates that are linear in x, y, z, (..., g, 1 or 4) at points (g, 3)."""
         one = np.ones((*self.X.shape[:-2], len(xi), 1))
         if not self.dilatation:
             return one
-        center = self.shape.nodes[: self.shape.corners].mean(axis=0)[None]
+        center = self._center()[None]
         J0 = self._jacobian(self.dN(center))
         base = (cofactors(J0) / determinant(J0)[..., None, None])[..., 0, :, :]
         away = self.N(xi) @ self.X - self.N(center) @ self.X

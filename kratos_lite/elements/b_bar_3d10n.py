@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.b_bar import BBar
+from kratos_lite.elements.tables import StrainTables
 from kratos_lite.errors import InputError
-from kratos_lite.quadrature import tetrahedron
+from kratos_lite.quadrature import Rule, tetrahedron
 from kratos_lite.shapes import Tetrahedron10
 from kratos_lite.typing import Array
 
@@ -23,6 +24,21 @@ class BBar3D10N(BBar):
 
     shape = Tetrahedron10
     rule = tetrahedron(degree=2)
+
+    @classmethod
+    def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
+        """Return the share for kernels, which `kept` gives; see `BBar.strain_tables`.
+
+        Parameters
+        ----------
+        rule : quadrature rule.
+        C : (6, 6) float, Pa.
+
+        Returns
+        -------
+        StrainTables
+        """
+        return super().strain_tables(rule, C)
 
     def kept(self, C: ArrayLike | None) -> Array:
         """Return √min(1, μ / κ); see `BBar.kept`.

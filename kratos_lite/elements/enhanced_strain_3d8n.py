@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.elements.stiffness import strain_rows
-from kratos_lite.elements.tables import cofactors, determinant
+from kratos_lite.elements.tables import StrainTables, cofactors, determinant
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, hexahedron
 from kratos_lite.registry import remembered
@@ -59,6 +59,29 @@ class EnhancedStrain3D8N(KinematicLinear):
     rule = hexahedron(degree=3)
     formulation = "enhanced"
     batched: ClassVar[bool] = True
+
+    @classmethod
+    def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
+        """Return the monomials of the modes for kernels; see `KinematicLinear.strain_tables`.
+
+        Parameters
+        ----------
+        rule : quadrature rule.
+        C : (6, 6) float, Pa.
+
+        Returns
+        -------
+        StrainTables
+
+        Raises
+        ------
+        InputError, MaterialError
+            As by `B_at_gauss_points`.
+        """
+        _check_rule(rule)
+        if not np.linalg.eigvalsh(C).min() > 0:
+            raise _not_definite(cls, C)
+        return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, share=0.0)
 
     def B_at_gauss_points(self, C: ArrayLike | None = None) -> Array:
         """Return the operator of the enhanced strain at the Gauss points, B - G D⁻¹ L.
@@ -135,23 +158,31 @@ class EnhancedStrain3D8N(KinematicLinear):
                 raise np.linalg.LinAlgError
             return np.linalg.solve(D / (size * np.swapaxes(size, -1, -2)), L / size) / size
         except np.linalg.LinAlgError:
-            raise MaterialError(
-                f"{type(self).__name__} needs a C that is positive definite; got C with the eigenvalues "
-                f"{np.linalg.eigvalsh(C).min():.3g} … {np.linalg.eigvalsh(C).max():.3g} Pa"
-            ) from None
+            raise _not_definite(type(self), C) from None
+
+
+def _not_definite(cls: type[EnhancedStrain3D8N], C: Array) -> MaterialError:
+    found = np.linalg.eigvalsh(C)
+    return MaterialError(
+        f"{cls.__name__} needs a C that is positive definite; got C with the eigenvalues "
+        f"{found.min():.3g} … {found.max():.3g} Pa"
+    )
 
 
 def _column(u: Array) -> Array:
     return u.reshape(*u.shape[:-2], -1, 1)
 
 
+def _monomials(xi: Array) -> Array:
+    """Return ξ, η, ζ, ξη, ηζ, ζξ (g, 6) at points (g, 3)."""
+    return np.stack([xi[:, list(factors)].prod(axis=1) for factors in MONOMIALS], axis=1)
+
+
 @remembered
 def _reference_modes(points: bytes) -> tuple[Array, Array]:
     """Return the strain component of each mode (21,), and its monomial at points (g, 21)."""
-    xi = np.frombuffer(points).reshape(-1, 3)
-    values = np.stack([xi[:, list(factors)].prod(axis=1) for factors in MONOMIALS], axis=1)
     components, numbers = np.array(MODES).T
-    return components, values[:, numbers]
+    return components, _monomials(np.frombuffer(points).reshape(-1, 3))[:, numbers]
 
 
 @remembered

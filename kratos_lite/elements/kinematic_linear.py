@@ -22,14 +22,16 @@ from kratos_lite.elements.mass import CellMass
 from kratos_lite.elements.overridden_steps import (
     STRAIN,
     STRESS,
+    brought,
     columns,
     internal_load_of,
     run_step,
     strain_of,
     stress_of,
 )
-from kratos_lite.elements.tables import lame_constants, reference_products, tabulate
+from kratos_lite.elements.tables import StrainTables, lame_constants, reference_products, tabulate
 from kratos_lite.errors import InputError
+from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
@@ -122,6 +124,41 @@ class KinematicLinear(CellMass):
         if unknown := [name for name in methods if not isinstance(name, str) or not hasattr(cls, name)]:
             raise InputError(f"{cls.__name__} has no method {short(unknown[0])}")
         return same_methods(cls, KinematicLinear, *methods)
+
+    @classmethod
+    def strain_tables(cls, rule: Rule, C: Array) -> StrainTables | None:
+        """Return what kernels add to the strain of the displacements.
+
+        A class that overrides it says that kernels with these tables give the same as its methods.
+
+        Parameters
+        ----------
+        rule : quadrature rule.
+        C : (6, 6) float, Pa.
+
+        Returns
+        -------
+        StrainTables, or None for nothing
+        """
+        return None
+
+    @classmethod
+    def has_kernels(cls, *methods: str) -> bool:
+        """Return whether kernels give the same as these methods of a class.
+
+        Parameters
+        ----------
+        methods : names of methods.
+
+        Returns
+        -------
+        bool
+            False if the class overrides one of them, or one that its `strain_tables` stand for.
+        """
+        owner = next(base for base in cls.__mro__ if "strain_tables" in vars(base))
+        if getattr(owner, "shape", cls.shape) is not cls.shape:
+            return False
+        return same_methods(cls, owner, *methods, *brought(owner, KinematicLinear))
 
     # ---- strain --------------------------------------------------------------------------------
 

@@ -42,6 +42,16 @@ def takes_many(cls: type[Any]) -> bool:
     )
 
 
+def brought(cls: type[Any], base: type[Any]) -> list[str]:
+    """Return the names of the methods that a class and its bases up to `base` bring."""
+    return [
+        name
+        for one in cls.__mro__[: cls.__mro__.index(base)]
+        for name, value in vars(one).items()
+        if isinstance(value, METHODS) and name != "__annotate_func__"
+    ]
+
+
 def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Array:
     """Return a step that a class overrides, (..., *tail) for elements (..., n, 3).
 

@@ -50,7 +50,9 @@ def refined(structure: S, finer: Finer) -> S:
     (9, [0.0, 0.0, 1000.0])
     """
     if structure.motion is not None:
-        raise ModelError("a model whose material moves through the mesh cannot be carried over to a finer one")
+        raise ModelError(
+            "a model whose material moves through the mesh cannot be carried over to a finer one"
+        )
     new = type(structure)(finer.mesh, formulation=structure.formulation)
     new._materials = list(structure._materials)
     new._material_of = structure._material_of[finer.elements]
@@ -79,7 +81,9 @@ def _carry_rules(structure: Structure, new: Structure, finer: Finer) -> None:
     ]
     fixed = [number for number, rule in structure._rules.items() if isinstance(rule, Rule)]
     if (np.isin(rule_of, fixed) & (kinds[0][finer.elements] != kinds[1])).any():
-        raise ModelError("a quadrature rule that replaces that of elements does not fit those of another shape")
+        raise ModelError(
+            "a quadrature rule that replaces that of elements does not fit those of another shape"
+        )
 
 
 def _refixed(fixing: Fixing, finer: Finer) -> Fixing:
@@ -105,7 +109,7 @@ def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> No
     tied = np.unique([c.slave // 3 for c in own])
     if len(finer.grown(tied)) > len(tied):
         raise ModelError(
-            f"{len(own)} constraints tie nodes of edges that are cut, whose new nodes they do not tie; constrain "
+            f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "
             "a finer mesh instead"
         )
     new.supports.constraints = (*new.supports.constraints, *own)

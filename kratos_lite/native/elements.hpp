@@ -7,6 +7,8 @@
 
 #pragma once
 #include <algorithm>
+#include <optional>
+#include <tuple>
 #include <vector>
 
 #include "arrays.hpp"
@@ -52,13 +54,49 @@ inline void add_field(Elements& w, Numbers field) {
     w.field = field.data();
 }
 
-// Elements with displacements u (n, 3), C (6, 6) and a prestress (m, 6) or None.
-inline Elements strained(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
-                         MaybeNumbers prestress) {
-    Elements w = elements(points, nodes, dN, weights);
-    add_field(w, u);
+// What elements add to their strain: dN at the center (k, 3); monomials (g, 6) of enhanced modes, or functions
+// (g, k or 0) of the dilatation; C (6, 6) of the modes, or None; share of the dilatation that is projected.
+using Tables = std::tuple<Array<double>, Array<double>, std::optional<Array<double>>, double>;
+using MaybeTables = std::optional<Tables>;
+
+inline Addition added(const Elements& w, const Tables& tables) {
+    const auto& [center, functions, C, share] = tables;
+    Addition found;
+    require(has_shape(center, w.k, 3), "dN at the center must be (k, 3)");
+    found.center = center.data();
+    found.functions = functions.data();
+    found.share = share;
+    if (!C) {
+        found.kind = Addition::dilatation;
+        found.terms = functions.size() ? 4 : 1;
+        require(has_shape(functions, w.g, found.terms == 1 ? 0 : w.k), "functions must be (g, k) or (g, 0)");
+        return found;
+    }
+    found.kind = Addition::modes;
+    require(w.k == 8 && has_shape(functions, w.g, 6), "modes need eight nodes and monomials (g, 6)");
+    require(has_shape(*C, 6, 6), "C of the modes must be (6, 6)");
+    found.law = Law(C->data());
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < i; ++j) {
+            double sum = 0;
+            for (int q = 0; q < w.g; ++q) sum += w.weights[q] * functions.at(q, i) * functions.at(q, j);
+            found.orthogonal &= std::fabs(sum) < 1e-12;
+        }
+    return found;
+}
+
+inline void set_law(Elements& w, Numbers C, const MaybeTables& addition) {
     require(has_shape(C, 6, 6), "C must be (6, 6)");
     w.law = Law(C.data());
+    if (addition) w.addition = added(w, *addition);
+}
+
+// Elements with displacements u (n, 3), C (6, 6) and a prestress (m, 6) or None.
+inline Elements strained(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
+                         MaybeNumbers prestress, const MaybeTables& addition = {}) {
+    Elements w = elements(points, nodes, dN, weights);
+    add_field(w, u);
+    set_law(w, C, addition);
     w.prestress = optional(prestress, w.last, 6, "prestress must be (m, 6)");
     return w;
 }

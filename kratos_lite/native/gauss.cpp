@@ -25,7 +25,9 @@ auto of_weighted(F f) {
 template <class F>
 auto of_strained(F f) {
     return [f](Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
-               MaybeNumbers prestress) { return f(strained(points, nodes, dN, weights, u, C, prestress)); };
+               MaybeNumbers prestress, const MaybeTables& addition) {
+        return f(strained(points, nodes, dN, weights, u, C, prestress, addition));
+    };
 }
 
 py::tuple mass_sums(Elements w) {
@@ -52,8 +54,8 @@ Array<double> interpolated_nodes(Numbers points, Indices nodes, Indices base, Nu
 }
 
 py::tuple nodal_stress(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers u, Numbers C,
-                       MaybeNumbers prestress, Numbers to_nodes) {
-    Elements w = strained(points, nodes, dN, weights, u, C, prestress);
+                       MaybeNumbers prestress, const MaybeTables& addition, Numbers to_nodes) {
+    Elements w = strained(points, nodes, dN, weights, u, C, prestress, addition);
     require(has_shape(to_nodes, w.k, w.g), "to_nodes must be (k, g)");
     w.to_nodes = to_nodes.data();
     Array<double> means({w.last, int64_t{6}});
@@ -77,7 +79,8 @@ PYBIND11_MODULE(_gauss, m) {
         define(m, name, of_weighted(f), doc, "points", "nodes", "N", "dN", "weights");
     };
     const auto strains = [&](const char* name, auto f, const char* doc) {
-        define(m, name, of_strained(f), doc, "points", "nodes", "dN", "weights", "u", "C", "prestress");
+        define(m, name, of_strained(f), doc, "points", "nodes", "dN", "weights", "u", "C", "prestress",
+               "addition");
     };
     geometry("clearly_positive", [](const Elements& w) { return per_element(clearly_positive, w, {w.last}); },
              "1 for elements with det J clearly > 0 everywhere, else 0: (m,)");
@@ -94,5 +97,5 @@ PYBIND11_MODULE(_gauss, m) {
     define(m, "body_force", nodal_force, "∫ N b dV of a nodal b, (n, 3)", "points", "nodes", "N", "dN", "weights",
            "force");
     define(m, "averages", nodal_stress, "sum of nodal stresses (n, 6), mean of each element (m, 6)", "points",
-           "nodes", "dN", "weights", "u", "C", "prestress", "to_nodes");
+           "nodes", "dN", "weights", "u", "C", "prestress", "addition", "to_nodes");
 }

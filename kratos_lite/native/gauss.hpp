@@ -6,6 +6,7 @@
 
 #pragma once
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <cstdint>
 
@@ -31,6 +32,18 @@ struct Law {
     }
 };
 
+// What a class of elements adds to the strain of the displacements; see condensed.hpp.
+struct Addition {
+    enum Kind { nothing, modes, dilatation };
+    Kind kind = nothing;
+    const double* center = nullptr;     // (k, 3) dN at the center
+    const double* functions = nullptr;  // (g, 6) monomials, or (g, k) N less N at the center
+    Law law;                            // of the material
+    int terms = 0;                      // polynomials of the dilatation, 1 or 4
+    double share = 0;                   // of the dilatation that is projected
+    bool orthogonal = true;             // whether the rule has sum w p p' = 0 of different monomials
+};
+
 // Some elements [first, last), their tables, and what a kernel reads and writes.
 struct Elements {
     const double* points;     // (n, 3)
@@ -44,6 +57,7 @@ struct Elements {
     const double* increment;  // (n, 3) of the displacement in a step, or null
     double damping;           // fraction of the stress increment that is added to the mean stress
     Law law;
+    Addition addition;
     const double* prestress;  // (m, 6) or null
     const double* to_nodes;   // (k, g) extrapolation, or combination of the nodes `base`
     const int32_t* base;      // (g) nodes of an element, or null
@@ -53,8 +67,9 @@ struct Elements {
     double* second;           // second result, rows of all elements, or null
     int64_t origin, first, last;
 
-    // Vectors of working space: coordinates, displacements, prestress, stresses, nodal values.
-    int64_t vectors() const { return 15 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
+    // Vectors of working space: coordinates, displacements, prestress, stresses, nodal values, added strains.
+    int64_t vectors() const { return added_from() + (addition.kind ? 36 + 9 * static_cast<int64_t>(g) : 0); }
+    int64_t added_from() const { return 15 * static_cast<int64_t>(k) + 12 + 6 * static_cast<int64_t>(g); }
     const double* dN_at(int q) const { return dN + 3 * static_cast<int64_t>(k) * q; }
 };
 
@@ -119,6 +134,22 @@ KL_INLINE void largest(const vec<double, V>* values, int count, vec<double, V>& 
         absolute<V>(values[i], size);
         out = size > out ? size : out;
     }
+}
+
+// Whether J differs between Gauss points by no more than the rounding of its sums.
+template <int V>
+KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double, V>* J) {
+    vec<double, V> size, change = {};
+    largest<V>(X, 3 * k, size);
+    for (int q = 1; q < g; ++q)
+        for (int c = 0; c < 9; ++c) {
+            vec<double, V> x;
+            absolute<V>(J[9 * q + c] - J[c], x);
+            change = x > change ? x : change;
+        }
+    for (int l = 0; l < V; ++l)
+        if (!(change[l] <= 8 * DBL_EPSILON * size[l])) return false;
+    return true;
 }
 
 // d field_i / d xi_j

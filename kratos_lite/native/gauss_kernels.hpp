@@ -1,7 +1,7 @@
 // The kernels over Gauss points for small strains, for elements [first, last) and every instruction set.
 
 #pragma once
-#include "gauss.hpp"
+#include "condensed.hpp"
 
 namespace kl {
 
@@ -123,8 +123,15 @@ struct PointState {
     vec<double, V> dV, inverse[3][3], strain[6], elastic[6], stress[6];
 };
 
+// The strains that elements add: of each monomial (6, 6) times det J, or the projected dilatation (g).
 template <int V>
-KL_INLINE void evaluate(const Elements& w, const Local<V>& at, int q, PointState<V>& s) {
+KL_INLINE vec<double, V>* added(const Elements& w) {
+    return reinterpret_cast<vec<double, V>*>(w.space) + w.added_from();
+}
+
+// ε of the displacements, J^-1 and γ det J.
+template <int V>
+KL_INLINE void evaluate_plain(const Elements& w, const Local<V>& at, int q, PointState<V>& s) {
     vec<double, V> H[3][3];
     inverse_jacobian<V>(w, at.X, q, s.inverse, s.dV);
     gradient<V>(w, at.u, q, s.inverse, H);
@@ -132,8 +139,49 @@ KL_INLINE void evaluate(const Elements& w, const Local<V>& at, int q, PointState
         s.strain[i] = H[i][i];
         s.strain[3 + i] = H[i][(i + 1) % 3] + H[(i + 1) % 3][i];
     }
+}
+
+// Replace a share of the trace of a strain or stress.
+template <int V>
+KL_INLINE void deviate(double share, const vec<double, V>& trace, vec<double, V>* tensor) {
+    const vec<double, V> change = share / 3 * (trace - (tensor[0] + tensor[1] + tensor[2]));
+    for (int i = 0; i < 3; ++i) tensor[i] += change;
+}
+
+template <int V>
+KL_INLINE void evaluate(const Elements& w, const Local<V>& at, int q, PointState<V>& s) {
+    evaluate_plain<V>(w, at, q, s);
+    if (w.addition.kind == Addition::modes) {
+        const vec<double, V> scale = w.weights[q] / s.dV;
+        for (int p = 0; p < MONOMIALS; ++p)
+            for (int c = 0; c < 6; ++c)
+                s.strain[c] += w.addition.functions[MONOMIALS * q + p] * scale * added<V>(w)[6 * p + c];
+    } else if (w.addition.kind == Addition::dilatation)
+        deviate<V>(w.addition.share, added<V>(w)[q], s.strain);
     elastic<V>(w.law, s.strain, s.elastic);
     for (int c = 0; c < 6; ++c) s.stress[c] = s.elastic[c] + at.initial[c];
+}
+
+// Coordinates, displacements and prestress of V elements; what they add to the strain is found.
+template <int V>
+KL_INLINE Local<V> gather_strained(const Elements& w, int64_t e) {
+    typedef vec<double, V> Vec;
+    const Local<V> at = gather_all<V>(w, e, w.space);
+    if (w.addition.kind == Addition::modes) {
+        auto* J = reinterpret_cast<Vec(*)[3][3]>(added<V>(w) + 36);
+        for (int q = 0; q < w.g; ++q) reference_gradient<V>(at.X, w.dN_at(q), w.k, J[q]);
+        Enhanced<V> modes;
+        find_modes<V>(w, at.X, J, modes);
+        find_enhanced_strain<V>(modes, at.u, added<V>(w));
+    } else if (w.addition.kind == Addition::dilatation) {
+        PointState<V> s;
+        for (int q = 0; q < w.g; ++q) {
+            evaluate_plain<V>(w, at, q, s);
+            added<V>(w)[q] = s.strain[0] + s.strain[1] + s.strain[2];
+        }
+        project<V>(w, at.X, added<V>(w), added<V>(w) + w.g);
+    }
+    return at;
 }
 
 // out (m, g, 6): C ε + σ0.
@@ -141,7 +189,7 @@ template <int V>
 KL_INLINE void stress_body(const Elements& w) {
     PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_all<V>(w, e, w.space);
+        const Local<V> at = gather_strained<V>(w, e);
         for (int q = 0; q < w.g; ++q) {
             evaluate<V>(w, at, q, s);
             for (int c = 0; c < 6; ++c) at.rest[6 * q + c] = s.stress[c];
@@ -155,11 +203,19 @@ template <int V>
 KL_INLINE void internal_load_body(const Elements& w) {
     typedef vec<double, V> Vec;
     PointState<V> s;
+    const bool projected = w.addition.kind == Addition::dilatation;  // its transpose projects the stress
     for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_all<V>(w, e, w.space);
+        const Local<V> at = gather_strained<V>(w, e);
         for (int a = 0; a < 3 * w.k; ++a) at.rest[a] = Vec{};
+        Vec* trace = at.rest + 3 * w.k;
+        for (int q = 0; projected && q < w.g; ++q) {
+            evaluate<V>(w, at, q, s);
+            trace[q] = s.stress[0] + s.stress[1] + s.stress[2];
+        }
+        if (projected) project<V>(w, at.X, trace, trace + w.g);
         for (int q = 0; q < w.g; ++q) {
             evaluate<V>(w, at, q, s);
+            if (projected) deviate<V>(w.addition.share, trace[q], s.stress);
             for (int c = 0; c < 6; ++c) s.stress[c] *= s.dV;
             Vec T[3][3], R[3][3];
             times_symmetric<V>(s.inverse, s.stress, T);
@@ -177,7 +233,7 @@ KL_INLINE void totals_body(const Elements& w) {
     typedef vec<double, V> Vec;
     PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_all<V>(w, e, w.space);
+        const Local<V> at = gather_strained<V>(w, e);
         Vec found[2] = {};
         for (int q = 0; q < w.g; ++q) {
             evaluate<V>(w, at, q, s);
@@ -200,7 +256,7 @@ KL_INLINE void averages_body(const Elements& w) {
     typedef vec<double, V> Vec;
     PointState<V> s;
     for (int64_t e = w.first; e < w.last; e += V) {
-        const Local<V> at = gather_all<V>(w, e, w.space);
+        const Local<V> at = gather_strained<V>(w, e);
         Vec *stress = at.rest, *nodal = stress + 6 * w.g, mean[6] = {}, volume = {};
         for (int q = 0; q < w.g; ++q) {
             evaluate<V>(w, at, q, s);

@@ -50,31 +50,40 @@ std::vector<double> products(const Stiffness& w) {
     return found;
 }
 
-// Two numbers are Lamé's constants; a (6, 6) matrix in the order xx yy zz xy yz zx becomes C[ik][jl].
-Moduli moduli(Numbers C) {
-    Moduli m{C.size() == 2, 0, 0, {}};
-    if (m.isotropic) {
-        m.lambda = C.data()[0];
-        m.mu = C.data()[1];
-        return m;
-    }
-    require(has_shape(C, 6, 6), "C must be (6, 6), or lambda and mu");
+// C in the order xx yy zz xy yz zx, as C[ik][jl].  With c = share C m / 3, m = (1, 1, 1, 0, 0, 0), and
+// k = share m c / 3 a dilatation that is projected leaves C - c m^T - m c^T + k m m^T at the Gauss points.
+Moduli moduli(const Law& law, double share) {
+    double C[6][6], c[6], k = 0;
+    for (int i = 0; i < 6; ++i) c[i] = share * (law.C[6 * i] + law.C[6 * i + 1] + law.C[6 * i + 2]) / 3;
+    for (int i = 0; i < 3; ++i) k += share * c[i] / 3;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j)
+            C[i][j] = law.C[6 * i + j] - (j < 3) * c[i] - (i < 3) * c[j] + (i < 3 && j < 3) * k;
+    Moduli m{law.isotropic, C[0][1], C[3][3], {}, {}};
     const int voigt[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
     for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m.coupling[i][j] = c[voigt[i][j]] - (i == j) * k / 2;
+    for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-            for (int k = 0; k < 3; ++k)
-                for (int l = 0; l < 3; ++l) m.tensor[3 * i + j][3 * k + l] = C.at(voigt[i][k], voigt[j][l]);
+            for (int n = 0; n < 3; ++n)
+                for (int l = 0; l < 3; ++l) m.tensor[3 * i + j][3 * n + l] = C[voigt[i][n]][voigt[j][l]];
     return m;
 }
 
-int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers C, Indices indptr,
-            Indices indices, Array<double> data, bool affine) {
-    Stiffness w{elements(points, nodes, dN, weights), moduli(C), {}, data.mutable_data()};
+int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers C, const MaybeTables& addition,
+            Indices indptr, Indices indices, Array<double> data, bool affine) {
+    Stiffness w{elements(points, nodes, dN, weights), {}, {}, data.mutable_data()};
+    set_law(w, C, addition);
+    w.moduli = moduli(w.law, w.addition.share);
     const Graph graph = pattern(indptr, indices, w.n);
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     if (affine && w.affine_pays()) w.products = products(w);
     py::gil_scoped_release release;
-    return add_stiffness(w, graph);
+    switch (w.addition.kind) {
+        case Addition::modes: return add_stiffness<ModesAdded>(w, graph);
+        case Addition::dilatation: return add_stiffness<DilatationAdded>(w, graph);
+        default: return add_stiffness<NothingAdded>(w, graph);
+    }
 }
 
 void add_given(Indices nodes, Numbers matrices, Indices indptr, Indices indices, Array<double> data) {
@@ -98,7 +107,7 @@ PYBIND11_MODULE(_stiffness, m) {
     m.def("pattern", mesh_pattern, "Rows (indptr, indices) of the nodes that share an element", py::arg("n_nodes"),
           py::arg("connectivity"));
     define(m, "add_stiffness", add, "Add the stiffness of elements to the blocks of a matrix", "points", "nodes",
-           "dN", "weights", "C", "indptr", "indices", "data", py::arg("affine") = true);
+           "dN", "weights", "C", "addition", "indptr", "indices", "data", py::arg("affine") = true);
     define(m, "add_matrices", add_given, "Add given element matrices to a matrix", "nodes", "matrices", "indptr",
            "indices", "data");
 }

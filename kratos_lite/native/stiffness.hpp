@@ -11,19 +11,19 @@
 #pragma once
 #include <algorithm>
 #include <atomic>
-#include <cfloat>
 #include <cstdint>
 #include <vector>
 
 #include "assembly.hpp"
-#include "gauss.hpp"
+#include "condensed.hpp"
 
 namespace kl {
 
 struct Moduli {
     bool isotropic;
     double lambda, mu;
-    double tensor[9][9];  // [ij][kl]
+    double tensor[9][9];    // [ij][kl]
+    double coupling[3][3];  // stress of the projected dilatation
 };
 
 struct Stiffness : Elements {
@@ -36,7 +36,111 @@ struct Stiffness : Elements {
         return pairs * 54 + 9 * g * k < 0.8 * (pairs * 9 * g + 18 * g * k);
     }
     // Numbers that one chunk needs: coordinates, J, weights, D and one weighted row of D, V of each.
-    int64_t size(int V) const { return V * (3 * k + 9 * g + 3 * g * k + g + 3 * g); }
+    int64_t added_from() const { return 3 * k + 9 * g + 3 * g * k + g + 3 * g; }
+    int64_t size(int V) const { return V * (added_from() + addition.terms * (addition.terms + 3 * k)); }
+};
+
+// ---- what elements add to the blocks of a row a: nothing, enhanced modes, projected dilatation -------
+
+template <int V>
+struct NothingAdded {
+    typedef vec<double, V> Vec;
+    KL_INLINE NothingAdded(const Stiffness&, const Vec*, const Vec (*)[3][3], Vec*) {}
+    KL_INLINE void row(int) {}
+    KL_INLINE void add(int, Vec*) const {}
+};
+
+template <int V>
+struct ModesAdded {
+    typedef vec<double, V> Vec;
+    Enhanced<V> m;
+    Vec Q[12][12] = {}, left[PRODUCTS][9];
+
+    KL_INLINE ModesAdded(const Stiffness& w, const Vec* X, const Vec (*J)[3][3], Vec*) {
+        const int at[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+        find_modes<V>(w, X, J, m);
+        for_independent<V, 12>(m, [&](int first, int n, Vec* rows) KL_INLINE_LAMBDA {
+            for (int i = 0; i < n; ++i) {
+                const Vec *S = m.stress[COMPONENT[first + i]], *L = &m.gradient[MONOMIAL[first + i]][0][0];
+                for (int c = 0; c < 12; ++c) {
+                    const Vec *g = L + c / 3 * 3;
+                    const int *s = at[c % 3];
+                    rows[i * (n + 12) + n + c] = S[s[0]] * g[0] + S[s[1]] * g[1] + S[s[2]] * g[2];
+                }
+            }
+            eliminate<V>(rows, n, n + 12);
+            for (int i = 0; i < n; ++i, rows += n + 12)
+                for (int c = 0; c < 12; ++c) {
+                    const Vec factor = rows[i] * rows[n + c];
+                    for (int d = c; d < 12; ++d) Q[c][d] -= factor * rows[n + d];
+                }
+        });
+        for (int c = 0; c < 12; ++c)
+            for (int d = 0; d < c; ++d) Q[c][d] = Q[d][c];
+    }
+
+    KL_INLINE void row(int a) {
+        for (int h = 0; h < PRODUCTS; ++h)
+            for (int ij = 0; ij < 9; ++ij) {
+                left[h][ij] = Vec{};
+                for (int o = 0; o < PRODUCTS; ++o)
+                    left[h][ij] += m.gamma[a][o] * Q[3 * o + ij / 3][3 * h + ij % 3];
+            }
+    }
+
+    KL_INLINE void add(int b, Vec* K) const {
+        for (int h = 0; h < PRODUCTS; ++h)
+            for (int ij = 0; ij < 9; ++ij) K[ij] += left[h][ij] * m.gamma[b][h];
+    }
+};
+
+template <int V>
+struct DilatationAdded {
+    typedef vec<double, V> Vec;
+    const Moduli& moduli;
+    const int n, width;
+    Vec *rows, left[4][3];  // P^T P and P^T dN/dX, eliminated
+
+    KL_INLINE DilatationAdded(const Stiffness& w, const Vec* X, const Vec (*J)[3][3], Vec* room)
+        : moduli(w.moduli), n(w.addition.terms), width(n + 3 * w.k), rows(room) {
+        for (int i = 0; i < n * width; ++i) rows[i] = Vec{};
+        for (int q = 0; q < w.g; ++q) {
+            Vec c[3][3], det, P[4];
+            invert<V>(J[q], c, det);
+            polynomials<V>(w, X, q, P);
+            for (int r = 0; r < n; ++r) {
+                P[r] *= w.weights[q];
+                for (int o = 0; o <= r; ++o) rows[o * width + r] += P[o] * P[r] * det / w.weights[q];
+            }
+            const double* dN = w.dN_at(q);
+            for (int a = 0; a < w.k; ++a, dN += 3)
+                for (int i = 0; i < 3; ++i) {
+                    const Vec D = dN[0] * c[0][i] + dN[1] * c[1][i] + dN[2] * c[2][i];
+                    for (int r = 0; r < n; ++r) rows[r * width + n + 3 * a + i] += P[r] * D;
+                }
+        }
+        eliminate<V>(rows, n, width);
+    }
+
+    KL_INLINE void row(int a) {
+        for (int r = 0; r < n; ++r)
+            for (int i = 0; i < 3; ++i) left[r][i] = rows[r * width + r] * rows[r * width + n + 3 * a + i];
+    }
+
+    KL_INLINE void add(int b, Vec* K) const {
+        const double(&S)[3][3] = moduli.coupling;
+        Vec Y[3][3] = {};
+        for (int r = 0; r < n; ++r)
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) Y[i][j] += left[r][i] * rows[r * width + n + 3 * b + j];
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                if (moduli.isotropic)
+                    K[3 * i + j] += 2 * S[0][0] * Y[i][j];
+                else
+                    for (int l = 0; l < 3; ++l) K[3 * i + j] += S[i][l] * Y[l][j] + Y[i][l] * S[l][j];
+            }
+    }
 };
 
 template <int V>
@@ -55,25 +159,9 @@ KL_INLINE void contract(const Moduli& m, const vec<double, V>* P, vec<double, V>
     }
 }
 
-// Whether J differs between Gauss points by no more than the rounding of its sums.
-template <int V>
-KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double, V>* J) {
-    vec<double, V> size, change = {};
-    largest<V>(X, 3 * k, size);
-    for (int q = 1; q < g; ++q)
-        for (int c = 0; c < 9; ++c) {
-            vec<double, V> x;
-            absolute<V>(J[9 * q + c] - J[c], x);
-            change = x > change ? x : change;
-        }
-    for (int l = 0; l < V; ++l)
-        if (!(change[l] <= 8 * DBL_EPSILON * size[l])) return false;
-    return true;
-}
-
 // All pairs from the gradients at the Gauss points.
-template <int V>
-KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<double, V> (*J)[3][3]) {
+template <int V, class Added>
+KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<double, V> (*J)[3][3], Added& added) {
     typedef vec<double, V> Vec;
     Vec *D = reinterpret_cast<Vec*>(J + g), *weight = D + 3 * g * k, *row = weight + g;
     for (int q = 0; q < g; ++q) {
@@ -88,6 +176,7 @@ KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<doub
     for (int a = 0; a < k; ++a) {
         for (int q = 0; q < g; ++q)
             for (int i = 0; i < 3; ++i) row[3 * q + i] = weight[q] * D[3 * (a * g + q) + i];
+        added.row(a);
         for (int b = a; b < k; ++b) {
             Vec P[9] = {}, K[9];
             for (int q = 0; q < g; ++q) {
@@ -96,20 +185,22 @@ KL_INLINE void by_points(const Stiffness& w, Chunk chunk, int k, int g, vec<doub
                     for (int j = 0; j < 3; ++j) P[3 * i + j] += row[3 * q + i] * Db[j];
             }
             contract<V>(w.moduli, P, K);
+            added.add(b, K);
             add_pair<V>(w.data, chunk, k, a, b, true, K);
         }
     }
 }
 
 // All pairs from the products of the reference cell.
-template <int V>
-KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<double, V> (&J)[3][3]) {
+template <int V, class Added>
+KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<double, V> (&J)[3][3], Added& added) {
     vec<double, V> c[3][3], scaled[3][3], det;
     invert<V>(J, c, det);
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) scaled[i][j] = c[i][j] / det;
     const double* R = w.products.data();
-    for (int a = 0; a < k; ++a)
+    for (int a = 0; a < k; ++a) {
+        added.row(a);
         for (int b = a; b < k; ++b, R += 9) {
             vec<double, V> T[3][3], P[9], K[9];
             for (int i = 0; i < 3; ++i)
@@ -120,31 +211,35 @@ KL_INLINE void by_products(const Stiffness& w, Chunk chunk, int k, const vec<dou
                 for (int j = 0; j < 3; ++j)
                     P[3 * i + j] = c[0][i] * T[0][j] + c[1][i] * T[1][j] + c[2][i] * T[2][j];
             contract<V>(w.moduli, P, K);
+            added.add(b, K);
             add_pair<V>(w.data, chunk, k, a, b, true, K);
         }
+    }
 }
 
 // Add V elements; return whether J was constant in each.
-template <int V>
+template <int V, class Added>
 KL_INLINE bool add_stiffness(const Stiffness& w, Chunk chunk, int k, int g) {
     vec<double, V>* X = reinterpret_cast<vec<double, V>*>(chunk.work);
     auto* J = reinterpret_cast<vec<double, V>(*)[3][3]>(X + 3 * k);
     gather<V>(w, w.points, chunk.first, X);
     for (int q = 0; q < g; ++q) reference_gradient<V>(X, w.dN_at(q), k, J[q]);
     const bool affine = !w.products.empty() && constant<V>(k, g, X, &J[0][0][0]);
+    Added added(w, X, J, X + w.added_from());
     if (affine)
-        by_products<V>(w, chunk, k, J[0]);
+        by_products<V>(w, chunk, k, J[0], added);
     else
-        by_points<V>(w, chunk, k, g, J);
+        by_points<V>(w, chunk, k, g, J, added);
     return affine;
 }
 
 // Add the stiffness of all elements to data (nnz, 3, 3); return how many chunks had constant J.
-inline int64_t add_stiffness(const Stiffness& w, const Graph& graph) {
+template <template <int> class Added>
+int64_t add_stiffness(const Stiffness& w, const Graph& graph) {
     std::atomic<int64_t> affine{0};
     const int V = vector_width();
     for_chunks({w.nodes, w.last, w.k}, graph, V, w.size(V), [&](const Chunk& chunk) {
-        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { affine += add_stiffness<V>(w, chunk, w.k, w.g); });
+        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { affine += add_stiffness<V, Added<V>>(w, chunk, w.k, w.g); });
     });
     return affine;
 }

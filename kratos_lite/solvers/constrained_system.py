@@ -116,20 +116,24 @@ class ConstrainedSystem:
             lambda: linear_level(self.points, self.groups),
         )
 
-    def solve(self, forces: Array, prescribed: Array | None = None) -> tuple[Array, solvers.Solution]:
+    def solve(
+        self, forces: Array, prescribed: Array | None = None, tolerance: float | None = None
+    ) -> tuple[Array, solvers.Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
 
         Parameters
         ----------
         forces : (n, 3) N.
         prescribed : (3a,) m, in place of c of the constraint map.
+        tolerance : in place of that of the system.
 
         Raises
         ------
         SolveError
             If the matrix is singular or the accuracy asked for cannot be reached.
         """
-        solution = self._equations.solve(self.gather(forces), self.tolerance, self.progress, prescribed)
+        tolerance = self.tolerance if tolerance is None else tolerance
+        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed)
         return self.scatter(solution.x), solution
 
     def internal_load(self, u: Array) -> Array:

@@ -22,6 +22,7 @@ from kratos_lite.native import kernels, threads
 from kratos_lite.quadrature import hexahedron
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
+CONDENSED = ["EnhancedStrain3D8N", *(f"BBar3D{n}N" for n in (8, 10, 13, 15, 20, 27))]
 WOOD = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.7e9, 450.0)
 SOIL = Isotropic3D(210e6, 0.3, 7620.0)
 compiled = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
@@ -92,7 +93,7 @@ def assert_close(found, wanted):
 
 
 @compiled
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NAMES + CONDENSED)
 def test_kernels_give_what_the_elements_own_methods_give(name, numpy_only):
     mesh = distorted(name)
     found = everything(mesh)
@@ -102,7 +103,7 @@ def test_kernels_give_what_the_elements_own_methods_give(name, numpy_only):
 
 @compiled
 def test_mixed_meshes_give_the_same(numpy_only):
-    mesh = joined(*(distorted(name) for name in NAMES))
+    mesh = joined(*(distorted(name) for name in NAMES + CONDENSED))
     found = everything(mesh)
     numpy_only()
     assert_close(found, everything(mesh))

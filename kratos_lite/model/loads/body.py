@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Finer, Mesh, WhereElements
 from kratos_lite.model.loads.base import Load, OfPlace, vectors
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Mask
 
 
 class BodyForce(Load):
@@ -21,30 +21,70 @@ class BodyForce(Load):
 
     Parameters
     ----------
-    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (n, 3) that returns
-        either.
+    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (n, 3) that
+        returns either.
     where : elements that carry it: part name, property id or rows; all if not given.
     """
 
     what: ClassVar[tuple[str, str]] = "a body force", "(3,) or (n, 3) in N/m³"
 
     def __init__(self, force: ArrayLike | OfPlace, where: WhereElements = None) -> None:
-        self.force = force if callable(force) else vectors(force, *self.what, (1, 2))
+        self.force: Any = force if callable(force) else vectors(force, *self.what, (1, 2))
         self.where = where
 
-    def per_volume(self, group: ElementGroup, force: Array) -> Array:
+    def per_volume(self, group: ElementGroup, points: Array) -> Array:
         """Return the force per volume.
 
         Parameters
         ----------
         group : elements of one material.
-        force : (3,) or nodal (n, 3), that of the load.
+        points : (n, 3) m, of the mesh.
 
         Returns
         -------
         (3,) or nodal (n, 3) in N/m³.
         """
+        return self.nodal(points)
+
+    def nodal(self, points: Array) -> Array:
+        """Return the force (3,) or nodal (n, 3) at the nodes of a mesh.
+
+        Parameters
+        ----------
+        points : (n, 3) m, of the mesh.
+
+        Returns
+        -------
+        (3,) or (n, 3), in the unit of the load.
+
+        Raises
+        ------
+        InputError
+            It has another number of nodes, or its function does not return such values.
+        """
+        force: Array = self.force
+        if callable(force):
+            force = vectors(force(points.copy()), *self.what, (1, 2))
+        if force.ndim == 2 and len(force) != len(points):
+            raise InputError(
+                f"a nodal {type(self).__name__} needs shape ({len(points)}, 3); got {force.shape}"
+            )
         return force
+
+    def carriers(self, mesh: Mesh) -> Mask:
+        """Return which elements carry it.
+
+        Parameters
+        ----------
+        mesh : elements and named parts.
+
+        Returns
+        -------
+        (m,) bool
+        """
+        chosen = np.zeros(mesh.n_elements, dtype=bool)
+        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
+        return chosen
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N.
@@ -54,17 +94,10 @@ class BodyForce(Load):
         InputError
             A nodal force has another number of nodes.
         """
-        force = self.force
-        if callable(force):
-            force = vectors(force(mesh.points.copy()), *self.what, (1, 2))
-        if force.ndim == 2 and len(force) != mesh.n_nodes:
-            name = type(self).__name__
-            raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {force.shape}")
         total = np.zeros_like(mesh.points)
-        chosen = np.zeros(mesh.n_elements, dtype=bool)
-        chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
+        chosen = self.carriers(mesh)
         for group in groups:
-            b, part = self.per_volume(group, force), group.take(chosen[group.rows])
+            b, part = self.per_volume(group, mesh.points), group.take(chosen[group.rows])
             if b.any() and len(part):
                 total += gauss_point_fields.body_force(mesh.points, part, b)
         return total
@@ -81,8 +114,8 @@ class Gravity(BodyForce):
 
     Parameters
     ----------
-    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (n, 3) that
-        returns either.
+    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (n, 3)
+        that returns either.
     where : elements that carry it: part name, property id or rows; all if not given.
 
     Examples
@@ -96,6 +129,6 @@ class Gravity(BodyForce):
     def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
         super().__init__(acceleration, where)
 
-    def per_volume(self, group: ElementGroup, force: Array) -> Array:
+    def per_volume(self, group: ElementGroup, points: Array) -> Array:
         """Return density × acceleration."""
-        return group.material.density * force
+        return group.material.density * self.nodal(points)

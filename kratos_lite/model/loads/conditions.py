@@ -52,7 +52,7 @@ class ConditionLoads(Load):
         return total
 
     def refined(self, finer: Finer) -> Load:
-        """Return the loads on a finer mesh: conditions have those they have come from, new nodes interpolate."""
+        """Return the loads on a finer mesh: conditions keep those of their parents, nodes interpolate."""
         return ConditionLoads(
             self.force[finer.conditions],
             {cell: finer.interpolate(force) for cell, force in self.nodal_force.items()},

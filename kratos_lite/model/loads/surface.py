@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -37,14 +37,25 @@ class Traction(Load):
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return ∫ N t dA as nodal forces (n, 3) in N."""
-        total = np.zeros_like(mesh.points)
+        return _summed(mesh, self.on_faces(mesh))
+
+    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face.
+
+        Parameters
+        ----------
+        mesh : points (n, 3), elements, conditions and named parts.
+
+        Yields
+        ------
+        The block, and the forces on the nodes of its faces.
+        """
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
             X, t = mesh.points[block.nodes], self.traction
             at = _at_nodes(t, X, what, (3,)) if callable(t) else t
-            add_nodal(total, block.nodes, surface_load(block.shape, X, at))
-        return total
+            yield block, surface_load(block.shape, X, at)
 
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
@@ -88,15 +99,26 @@ class Pressure(Load):
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return -∫ N p n dA as nodal forces (n, 3) in N."""
-        total = np.zeros_like(mesh.points)
+        return _summed(mesh, self.on_faces(mesh))
+
+    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+        """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face.
+
+        Parameters
+        ----------
+        mesh : points (n, 3), elements, conditions and named parts.
+
+        Yields
+        ------
+        The block, and the forces on the nodes of its faces.
+        """
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
             X, p = mesh.points[block.nodes], self.pressure
             at = _at_nodes(p, X, "a pressure", ()) if callable(p) else np.full(block.nodes.shape, p)
             if self.normal == "outward":
                 at = at * outward(mesh, block)[:, None]
-            add_nodal(total, block.nodes, surface_pressure(block.shape, X, at))
-        return total
+            yield block, surface_pressure(block.shape, X, at)
 
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh: on the faces that have come from those of the old one."""
@@ -112,6 +134,14 @@ def outward(mesh: Mesh, block: Block) -> Array:
             f"face {lost} ({block.name}) is not on the boundary of the body, so it has no outward normal"
         )
     return signs
+
+
+def _summed(mesh: Mesh, faces: Iterable[tuple[Block, Array]]) -> Array:
+    """Return nodal forces (n, 3) of forces on the nodes of faces."""
+    total = np.zeros_like(mesh.points)
+    for block, forces in faces:
+        add_nodal(total, block.nodes, forces)
+    return total
 
 
 def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
