@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
@@ -32,23 +34,54 @@ class ErrorEstimate:
 
     `Result.error` makes it.
 
+    It is meant to be on the safe side: where nothing speaks against it, the true error is smaller, but seldom
+    less than half as large; see the page about accuracy.
+
     Attributes
     ----------
     absolute : ‖e‖ of the whole model in √J.
     relative : ‖e‖ / ‖u‖, with ‖u‖ of the exact solution as the estimate has it.
     per_element : (m,) ‖e‖ of each element in √J; the root of the sum of their squares is `absolute`.
-    method : how it was found: ``"recovery"`` or ``"equilibrated"``.
+    method : how it was found: ``"recovery"`` or ``"averaging"`` of stresses, whichever is smaller, or
+        ``"equilibrated"``.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
+    safety : factor in all these; without it they are the best guess.
     """
 
     absolute: float
     relative: float
     per_element: Array
-    method: str = "recovery"
+    method: str
     warnings: list[str] = field(default_factory=list)
+    safety: float = 1.0
 
     def __str__(self) -> str:
         return f"{self.relative:.2%} ({self.absolute:.4e} √J, {self.method})"
+
+
+SAFETY = {"recovery": 1.6, "averaging": 1.8}
+"""Factors by which the differences of the elements' stresses to smooth ones are raised to errors."""
+
+
+def energy_error(recovered: Array, averaged: Array, energy: float) -> ErrorEstimate:
+    """Return the estimate of squared differences to recovered and to averaged stresses.
+
+    Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
+    patches, may overestimate it many times where a few cells make up a curved body.  So both are raised by
+    factors measured on problems with known solutions, and the smaller counts.
+
+    Parameters
+    ----------
+    recovered, averaged : (m,) squared energy norms of the differences in each element, J.
+    energy : ‖u_h‖² of the solution in J, twice its strain energy.
+    """
+    squares = {"recovery": recovered, "averaging": averaged}
+    method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * float(squares[name].sum()))
+    per_element = SAFETY[method] * np.sqrt(squares[method])
+    absolute = float(np.linalg.norm(per_element))
+    size = energy + float(squares[method].sum())
+    relative = absolute / size**0.5 if size > 0 else 0.0
+    return ErrorEstimate(absolute, relative, per_element, method, safety=SAFETY[method])
 
 
 @dataclass(frozen=True, eq=False)

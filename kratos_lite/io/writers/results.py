@@ -31,7 +31,7 @@ def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
 def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return point data and cell data of a result under their Kratos names."""
     points, cells = mesh_fields(result.mesh)
-    nodal, mean = result.stress_at_nodes_and_elements()
+    nodal, mean = result.stress("node"), result.stress("element")
     points = {
         "DISPLACEMENT": result.displacement(),
         "REACTION": result.reaction(),
