@@ -29,7 +29,7 @@ def work(job: Job) -> Array:
     with job.phase("solve"):
         result = scene.model.solve(error=job.given["goal"], geometry=geometry)
     with job.phase("answer"):
-        job.answer |= {"unknowns": result.report.unknowns}
+        job.answer |= {"unknowns": result.report.unknowns, "reported": result.report.error}
         if scene.exact is not None:
             off = errors.norms(scene.exact, result.mesh.points, result.groups, result.u)
             found = dict(zip(("displacement", "energy"), off, strict=True))
