@@ -73,8 +73,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
         T = at_samples @ np.linalg.solve(weighted @ at_gauss, weighted)
     N = np.array([shape.N(xi) for xi in points])
     degree = shape.degree + (0 if simple or shape.cell == "tetrahedron" else 1)
-    near = shape.degree > 1 and shape.cell in ("hexahedron", "tetrahedron")
-    return Sampling(N, T, min(degree, 3), simple, 0.05 if near else 0.5)
+    far = 1.0 if shape.degree == 1 else 0.05 if shape.cell in ("hexahedron", "tetrahedron") else 0.5
+    return Sampling(N, T, min(degree, 3), simple, far)
 
 
 @dataclass(frozen=True, eq=False)
