@@ -32,24 +32,25 @@ EXACT = 1e-9
 """Relative error below which a solution is exact, and has no effectivity."""
 TEXT = """# How accurate a result is
 
-`result.error()` estimates the error in the energy norm, ‖e‖² = ∫ e : C : e dV: in total (`absolute` in √J,
-`relative`), of each element (`per_element`), with `warnings`. The summary shows it, `.vtu` files have it as
-`ENERGY_NORM_ERROR`, and `kl.draw(path, result, values="ENERGY_NORM_ERROR")` draws it. Stresses of elements jump
-from one to the next; the estimate is their difference to smooth ones.
+`result.error()` estimates the error in the energy norm, ‖e‖² = ∫ e : C : e dV: in total (`absolute` in
+√J, `relative`), of each element (`per_element`), with `warnings`. The summary shows it, `.vtu` files
+have it as `ENERGY_NORM_ERROR`, and `kl.draw(path, result, values="ENERGY_NORM_ERROR")` draws it.
+Stresses of elements jump from one to the next; the estimate is their difference to smooth ones.
 
-**Recovered stress.** `result.stress("node")` fits polynomials to the stresses of the elements around a node, at
-the points where these are most accurate (Zienkiewicz & Zhu 1992). Each material is fitted by itself: nodes between
-materials have the mean of both. `result.stress("averaged")` is extrapolated in each element and averaged over the
-elements at a node, as in Kratos; `result.stress("raw")` is that of each element. With two elements along a side,
-averaged stresses can be closer than recovered ones.
+**Recovered stress.** `result.stress("node")` fits polynomials to the stresses of the elements around a
+node, at the points where these are most accurate (Zienkiewicz & Zhu 1992). Each material is fitted by
+itself: nodes between materials have the mean of both. `result.stress("averaged")` is extrapolated in
+each element and averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of
+each element. With two elements along a side, averaged stresses can be closer than recovered ones.
 
-**Reported error.** The difference to recovered stresses is raised by 1.6, that to averaged ones by 1.8, and the
-smaller counts. The table shows reported over true error, which is to lie between 1 and 2. A star marks a warning:
-plain elements near ν = ½ lock, and their estimate is too small; coarse meshes, few elements and singular corners
-are named, too. A proven bound, larger and more expensive, is `result.error(method="equilibrated")`.
+**Reported error.** The difference to recovered stresses is raised by 1.6, that to averaged ones by 1.8,
+and the smaller counts. The table shows reported over true error, which is to lie between 1 and 2. A
+star marks a warning: plain elements near ν = ½ lock, and their estimate is too small; coarse meshes,
+few elements and singular corners are named, too. A proven bound, larger and more expensive, is
+`result.error(method="equilibrated")`.
 
-Each entry is for two meshes, the second of half the cell size; "exact" where the element has the exact solution,
-"-" where it is refused or the scene is not made for it.
+Each entry is for two meshes, the second of half the cell size; "exact" where the element has the exact
+solution, "-" where it is refused or the scene is not made for it.
 
 """
 
