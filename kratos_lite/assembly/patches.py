@@ -18,7 +18,7 @@ from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
-from kratos_lite.typing import Ints, Mask, Rows
+from kratos_lite.typing import Ints, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +77,12 @@ def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
             chosen = np.flatnonzero(alone[start : start + len(block)])
             picked = block.nodes[chosen][:, list(corners_of(face))]
             found.append(np.repeat(kinds[start + chosen], picked.shape[1]))
-            nodes.append(picked.ravel())
+            nodes.append(picked.ravel().astype(np.int64))
             start += len(block)
     return np.concatenate(found), np.concatenate(nodes)
 
 
-def _corners(blocks: Sequence[Block]) -> Rows:
+def _corners(blocks: Sequence[Block]) -> Ints:
     """Return the corner nodes of all elements (m, c), filled up with -1."""
     counts = [block.shape.corners if block.shape else block.nodes.shape[1] for block in blocks]
     found = np.full((sum(map(len, blocks)), max(counts, default=0)), -1)
@@ -93,7 +93,7 @@ def _corners(blocks: Sequence[Block]) -> Rows:
     return found
 
 
-def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
+def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
     """Return the elements around each corner node, also those that have it in the middle of an edge."""
     element, column = np.nonzero(corners >= 0)
     nodes, elements, first = [corners[element, column]], [element], 0
@@ -101,7 +101,7 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
         c = block.shape.corners if block.shape else block.nodes.shape[1]
         rest = block.nodes[:, c:]
         row, at = np.nonzero(is_corner[rest])
-        nodes.append(rest[row, at])
+        nodes.append(rest[row, at].astype(np.int64))
         elements.append(first + row)
         first += len(block)
     node, element = np.concatenate(nodes), np.concatenate(elements)
@@ -109,7 +109,7 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
     return lists(node[known], element[known], len(is_corner))
 
 
-def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
+def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
     """Return node and element of all pairs of the patches of nodes on the surface."""
     rows = np.flatnonzero(outer)
     if not len(rows):
@@ -155,7 +155,7 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
     return count == best[owner]
 
 
-def _contain(owner: Ints, element: Ints, corners: Rows) -> Mask:
+def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
     """Return a mask of the elements that have the node as a corner."""
     return (corners[element] == owner[:, None]).any(axis=1)
 
