@@ -201,7 +201,7 @@ def highest_frequency(
     for group in groups:
         if not group.material.density > 0:
             raise MaterialError("an angular frequency needs a density > 0; give the material its density")
-        alike = q is None and group.element.inherits(*GEOMETRY, *MECHANICS)  # own steps may depend on X
+        alike = q is None and group.element.has_kernels(*GEOMETRY, *MECHANICS)  # own steps may depend on X
         part = _distinct(points, group) if alike else group
         for chunk in part.chunks():
             largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))
