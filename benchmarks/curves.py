@@ -167,17 +167,18 @@ def picture(rows: Sequence[Row], scene: str, path: Path) -> None:
                           **style(program, kind))  # fmt: skip
         for level in LEVELS:
             ax.axhline(level, color="k", linewidth=0.6, linestyle=":")
-        ax.set(xlabel=what)
+        ax.set(xlabel="seconds", title=what)
         ax.grid(True, which="major", alpha=0.25)
+        ax.xaxis.set_major_formatter("{x:g}")
     axes[0].set(ylabel="relative error of displacement")
-    figure.suptitle(scene.replace("_", " "))
+    figure.suptitle(scene.replace("_", " "), fontweight="bold")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=90)
     plt.close(figure)
 
 
-LABELS = {"warm": "seconds, read … solve, second time", "cold": "seconds, whole process"}
+LABELS = {"warm": "warm: from reading to the solution", "cold": "cold: the whole process"}
 FLOOR = 1e-6
 """Errors below it are drawn there: what is exact would press the rest together."""
 

@@ -26,7 +26,7 @@ from kratos_lite.verification import errors
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCHER = Path(__file__).with_name("launch.py")
-ENOUGH = 5e-5
+ENOUGH = 1e-4
 """Error at which a curve has gone far enough."""
 LARGE = 40
 """Cells along an edge from which a scene is made in a process of its own."""

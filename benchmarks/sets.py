@@ -149,12 +149,13 @@ def chosen(program: str, scene: str, elements: Sequence[str] = ()) -> list[str]:
 
 
 def sizes_of(scene: str, kind: str) -> tuple[int, ...]:
-    """Return the cells along an edge that a curve consists of.
+    """Return the cells along an edge that a curve consists of; one reduced element across is refused.
 
     >>> sizes_of("bending", "8N enhanced"), sizes_of("bending", "20N")
     ((4, 8, 24), (1, 2))
     """
-    return (LINEAR if kind.split(maxsplit=1)[0] in ("4N", "8N") else QUADRATIC)[scene]
+    sizes = (LINEAR if kind.split(maxsplit=1)[0] in ("4N", "8N") else QUADRATIC)[scene]
+    return sizes[sizes[0] == 1 :] if kind == "20N reduced" else sizes
 
 
 def solver_of(program: str, scene: str) -> tuple[tuple[str, Any], ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Any
 
-from kratos_lite.verification.problem import FAIL, GRADES, PASS, Row
+from kratos_lite.verification.problem import FAIL, GRADES, PASS, REFUSED, Row
 from kratos_lite.verification.sources import SOURCES
 
 TITLES = {
@@ -76,7 +76,7 @@ def line(row: Row) -> str:
     text = (
         f"{row.problem.name:<51} {row.kind:<9}{found(row, row.value):>12}{number(row.problem.reference):>12}"
     )
-    return f"{text}{error:>11}  {row.grade:<5}{row.note.splitlines()[0] if row.note else ''}".rstrip()
+    return f"{text}{error:>11}  {row.grade:<8}{row.note.splitlines()[0] if row.note else ''}".rstrip()
 
 
 def summary(rows: Sequence[Row]) -> str:
@@ -85,7 +85,7 @@ def summary(rows: Sequence[Row]) -> str:
     >>> summary([])
     '0 rows'
     """
-    grades = [PASS, FAIL, *(letter for _, letter in GRADES), "F"]
+    grades = [PASS, FAIL, REFUSED, *(letter for _, letter in GRADES), "F"]
     counts = {grade: sum(row.grade == grade for row in rows) for grade in grades}
     told = [f"{count} {grade}" for grade, count in counts.items() if count]
     return f"{len(rows)} rows" + (": " + ", ".join(told) if told else "")
@@ -100,7 +100,7 @@ INTRO = (
     "names. `pass`: the error is at most that of the column *limit* (*exact*: rounding alone). Where an "
     "element need not be exact it has a grade instead, by the relative error, after MacNeal and Harder: "
     "A ≤ 2 %, B ≤ 10 %, C ≤ 20 %, D ≤ 50 %, F beyond. Errors are relative to the reference, or absolute "
-    "where it is 0.",
+    "where it is 0. `refused`: the element has spurious modes that may spoil the answer there.",
     "Meshes are coarse on purpose, so that locking shows: an F is a property of the element, in every "
     "program that has it, and the reason to take another one. Linear elements (4N, 5N, 6N, 8N) lock in "
     "bending and near ν = ½; quadratic ones (10N, 15N, 20N, 27N) are the ones to take.",

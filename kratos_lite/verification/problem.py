@@ -21,7 +21,7 @@ ELEMENTS = (
 """The elements of the library, in the order of the table."""
 GRADES = ((0.02, "A"), (0.1, "B"), (0.2, "C"), (0.5, "D"))
 """Largest relative error of each grade, after MacNeal & Harder 1985; beyond the last it is F."""
-PASS, FAIL = "pass", "FAIL"
+PASS, FAIL, REFUSED = "pass", "FAIL", "refused"
 Of = Callable[[str], bool]
 """Whether something holds for an element, by its name."""
 
@@ -168,8 +168,10 @@ class Row:
 
     @property
     def grade(self) -> str:
-        """``pass``, ``FAIL`` or a letter."""
-        return FAIL if self.note else self.problem.grade(self.value, self.element)
+        """``pass``, ``FAIL`` or a letter; ``refused`` where spurious modes of the element may spoil it."""
+        if self.note:
+            return REFUSED if self.element and kind_of(self.element).spurious_modes else FAIL
+        return self.problem.grade(self.value, self.element)
 
     @property
     def failed(self) -> bool:
