@@ -12,16 +12,12 @@ Finite Element Analysis (2000), chapter 8.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kratos_lite.analysis.error_estimate import Origin, QuantityError
 from kratos_lite.analysis.quantities import Quantity, Solved
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
-from kratos_lite.assembly.nodal_values import averages
-from kratos_lite.elements.tables import tabulate
+from kratos_lite.assembly.gauss_point_fields import volumes
+from kratos_lite.assembly.recovery import Recovery
 from kratos_lite.errors import ModelError
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array, Mask
@@ -31,7 +27,7 @@ SAME = 1e-6
 
 
 def error_of(
-    result: Solved, origin: Origin, quantity: Quantity, strained: Array, nodal: Array
+    result: Solved, origin: Origin, quantity: Quantity, strained: Array, recovery: Recovery
 ) -> QuantityError:
     """Return the estimated error of a quantity of a result.
 
@@ -40,7 +36,8 @@ def error_of(
     result : with the quantity.
     origin : what was solved.
     quantity : its number.
-    strained, nodal : displacements (n, 3) in m that strain, and recovered stresses (n, 6) in Pa.
+    strained : displacements (n, 3) in m that strain.
+    recovery : recovers stresses on its mesh.
     """
     load, motion, value = quantity.load(result), quantity.motion(result), quantity.value(result)
     z = origin.adjoint(load, motion)
@@ -53,24 +50,15 @@ def error_of(
                 f"{quantity}: multi-point constraints tie the part to nodes beside it, so that its reaction "
                 "is that of no support; take the whole of what is tied together"
             )
-    mesh, points = result.mesh, result.mesh.points
-    free = [replace(group, prestress=None) for group in result.groups]
-    recovered = averages(points, free, z, mesh.n_elements)[1]
+    mesh = result.mesh
     shares = np.zeros(mesh.n_elements)
-    for group, plain in zip(result.groups, free, strict=True):
-        first = _difference(points, group, strained, nodal)
-        second = _difference(points, plain, z, recovered)
+    both = zip(recovery.differences(strained), recovery.differences(z), strict=True)
+    for (group, first), (_, second) in both:
         density = ((first @ np.linalg.inv(group.material.C)) * second).sum(axis=-1)
-        shares[group.rows] = (density * volumes(points, group)).sum(axis=1)
+        shares[group.rows] = (density * volumes(mesh.points, group)).sum(axis=1)
     return QuantityError(
         value, float(shares.sum()), float(np.abs(shares).sum()), shares, quantity.unit, warnings
     )
-
-
-def _difference(points: Array, group: ElementGroup, u: Array, nodal: Array) -> Array:
-    """Return the error (m, g, 6) in Pa that recovered stresses show at the Gauss points of a group."""
-    N, _ = tabulate(group.element.shape, group.rule)
-    return N @ nodal[group.nodes] - at_gauss(points, group, u)
 
 
 def _shared(result: Solved, held: Mask, part: Mask) -> list[str]:

@@ -90,7 +90,7 @@ def _spread(
     elif isinstance(load, BodyForce):
         chosen = load.carriers(mesh)
         for group, f in zip(groups, body, strict=True):
-            b, mine = load.per_volume(group), chosen[group.rows]
+            b, mine = load.per_volume(group, mesh.points), chosen[group.rows]
             f[mine] += factor * (b if b.ndim == 1 else b[group.nodes[mine]])
     elif isinstance(load, (Traction, Pressure)) and not isinstance(load, LineLoad):
         for block, forces in load.on_faces(mesh):

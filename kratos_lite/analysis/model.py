@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -48,7 +48,14 @@ class Model(Structure):
     """
 
     def solve(
-        self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+        self,
+        solver: str = "auto",
+        tolerance: float = 1e-10,
+        progress: Progress | None = None,
+        *,
+        error: float | None = None,
+        most_unknowns: int | None = None,
+        geometry: Mapping[str, Callable[[Array], Array]] | None = None,
     ) -> Result:
         """Check the model and solve it: statics, or the steady state of a motion at the time 0.
 
@@ -57,6 +64,12 @@ class Model(Structure):
         solver : ``auto``, ``dense``, ``direct`` or ``amg``.
         tolerance : relative residual at which the iterative solver stops.
         progress : called with the phase and the share done, 0 … 1.
+        error : relative error of the energy norm, such as 0.01, for which the mesh is made finer and linear
+            elements quadratic where needed; the result is on the final mesh, the model stays as it is.
+        most_unknowns : with `error`: no mesh with more of them is solved (400 000); a warning says what was
+            reached.
+        geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto
+            it; without, edges that are straight stay straight.
 
         Returns
         -------
@@ -70,6 +83,10 @@ class Model(Structure):
         SolveError
             If the accuracy asked for cannot be reached.
         """
+        if error is not None:
+            from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
+
+            return solve_to(self, error, solver, tolerance, progress, most_unknowns or UNKNOWNS, geometry)
         if self.motion is not None:
             from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 

@@ -25,6 +25,28 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else peak * 1024)
 
 
+@dataclass(frozen=True)
+class RefinementStep:
+    """One mesh on the way to the accuracy asked for.
+
+    Attributes
+    ----------
+    elements, kinds : number of elements, and their classes.
+    unknowns : free degrees of freedom.
+    error : relative error of the energy norm, as it was known then.
+    seconds : for solution and estimate.
+    """
+
+    elements: int
+    kinds: str
+    unknowns: int
+    error: float
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.error:.2%} with {self.unknowns} unknowns, {self.elements} {self.kinds}"
+
+
 @dataclass
 class Report:
     """What was solved, how, and how well.
@@ -44,6 +66,8 @@ class Report:
     skipped : what this solution did without, as it would have changed nothing.
     kernels : what computed, compiled kernels and their threads or NumPy.
     formulation : which one of the elements was chosen and why; "" where their names say it.
+    error : relative error of the energy norm at most, of a solution to a requested accuracy.
+    history : the meshes that it took, the last one of the result.
     motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
     """
 
@@ -64,6 +88,8 @@ class Report:
     kernels: str = field(default_factory=described)
     formulation: str = ""
     motion: dict[str, Any] = field(default_factory=dict)
+    error: float | None = None
+    history: list[RefinementStep] = field(default_factory=list)
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
         """Return the rows of the summary about formulation, unknowns and loads, forces of `size` N in all."""
@@ -87,6 +113,9 @@ class Report:
             rows.append(("seconds", ", ".join(f"{name} {s:.3f}" for name, s in self.seconds.items())))
         rows += [("peak memory", f"{self.peak_memory / 1e6:.0f} MB"), ("kernels", self.kernels)]
         rows += self.motion_rows()
+        if self.error is not None:
+            rows.append(("error", f"{self.error:.2%} of the energy norm at most"))
+        rows += [("refinement", str(step)) for step in self.history if len(self.history) > 1]
         if self.skipped:
             rows.append(("skipped", "; ".join(self.skipped)))
         rows += [("warning", text) for text in self.warnings]

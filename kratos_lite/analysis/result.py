@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
+from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError, energy_error
 from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
-from kratos_lite.assembly.energy_error import squared_differences
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
-from kratos_lite.assembly.nodal_values import averages
+from kratos_lite.assembly.nodal_values import averages, extrapolated
 from kratos_lite.assembly.point_fields import at_located
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Located, Mesh, Where
@@ -25,10 +24,11 @@ from kratos_lite.validation import choice, instance
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.quantities import Quantity
+    from kratos_lite.assembly.recovery import Recovery
 
 At: TypeAlias = "str | ArrayLike | Located"
 """Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
-PLACES = ("gauss", "element", "node")
+PLACES = ("gauss", "element", "node", "averaged", "raw")
 METHODS = ("recovery", "equilibrated")
 
 
@@ -119,7 +119,18 @@ class Result:
         if place == "gauss":
             points, u = self.mesh.points, self._strained
             return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
-        return self._averages(stress)[PLACES.index(place) - 1]
+        if place == "raw":
+            points, u = self.mesh.points, self._strained
+            return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
+        if place == "node":
+            return self._recovery.nodal(self._strained, stress=stress)
+        return self._averages(stress)[place == "averaged"]
+
+    @cached_property
+    def _recovery(self) -> Recovery:
+        from kratos_lite.assembly.recovery import Recovery  # a quick start for results
+
+        return Recovery(self.mesh, self.groups)
 
     def _located(self, at: ArrayLike | Located) -> Located:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""
@@ -133,33 +144,25 @@ class Result:
         return at.require()
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:
-        """Return the mean over the volume of each element (m, 6) and nodal values (n, 6)."""
+        """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
         m = self.mesh.n_elements
         return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
-
-    def stress_at_nodes_and_elements(self) -> tuple[Array, Array]:
-        """Return both from one pass over the elements.
-
-        Returns
-        -------
-        Nodal stresses (n, 6) and element means (m, 6) in Pa.
-        """
-        means, nodal = self._averages(stress=True)
-        return nodal, means
 
     def strain(self, at: At = "gauss") -> Any:
         """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
 
         Parameters
         ----------
-        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for
-            extrapolated and averaged values; or points (..., 3) in m anywhere in the undeformed mesh, or
-            what ``mesh.locate`` has found of them.
+        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for recovered
+            values, the most accurate at nodes; ``"averaged"`` for values extrapolated to the nodes of each
+            element and averaged there; ``"raw"`` for these of each element; or points (..., 3) in m anywhere
+            in the undeformed mesh, or what ``mesh.locate`` has found of them.
 
         Returns
         -------
-        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6); (n, 6);
-        or (..., 6) at points, B(ξ) u of the element that contains the point.  On a face between elements,
+        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6) of
+        elements; (n, 6) of nodes; raw (m, k, 6) of k nodes each, or a list of (k, 6) where these differ; or
+        (..., 6) at points, B(ξ) u of the element that contains the point.  On a face between elements,
         where strains jump, that is the element in the lowest row.
 
         Raises
@@ -382,15 +385,12 @@ class Result:
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
         if method != "recovery":
             raise InputError(f"the error of a quantity is estimated by recovery; got method={method!r}")
-        return error_of(self, self._origin, quantity, self._strained, self._nodal_stress)
+        return error_of(self, self._origin, quantity, self._strained, self._recovery)
 
     @cached_property
     def _error(self) -> ErrorEstimate:
-        points, u = self.mesh.points, self._strained
-        squares = squared_differences(points, self.groups, u, self._nodal_stress, self.mesh.n_elements)
-        total = float(squares.sum())
-        size = 2 * self.energy() + total
-        return ErrorEstimate(total**0.5, (total / size) ** 0.5 if size else 0.0, np.sqrt(squares))
+        squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
+        return energy_error(*squares, 2 * self.energy(), self.groups)
 
     # ---- out -----------------------------------------------------------------------------------
 
@@ -414,8 +414,10 @@ class Result:
             *report.load_rows(forces),
             ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),
+            ("estimated error", str(self._error)),
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
             *report.solution_rows(),
+            *[("warning", text) for text in self._error.warnings],
         ]
 
     def __str__(self) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
-from kratos_lite.assembly.gauss_point_fields import compiled_law, displaced, value_at
+from kratos_lite.assembly.gauss_point_fields import at_gauss, compiled_law, displaced, value_at
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -28,6 +28,11 @@ def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
     at_nodes = np.array([corner.N(xi) for xi in element.nodes])
     mean = np.full((len(rule), len(rule)), 1 / len(rule))  # apart, so that few points still give constants
     return at_nodes @ np.linalg.pinv(at_points) @ (np.eye(len(rule)) - mean) + mean[:1]
+
+
+def extrapolated(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:
+    """Return stresses, or strains, extrapolated to the nodes of each element, (m, k, 6)."""
+    return extrapolation(group.element, group.rule) @ at_gauss(points, group, u, stress=stress)
 
 
 def averages(

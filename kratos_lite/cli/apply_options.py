@@ -34,6 +34,7 @@ OF_MODELS = (
         "modes",
         "solver",
         "tolerance",
+        "error",
     ),
     *("rotation", "translation", "center", "center_velocity", "center_acceleration", "stiffening"),
     *("boundaries", "damping", "moving_part"),
@@ -64,6 +65,8 @@ def case_of(options: Namespace) -> Case:
             case.solver = options.solver
         if options.tolerance is not None:
             case.tolerance = options.tolerance
+        if options.error is not None:
+            case.error = share(options.error, "--error")
     else:
         _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
@@ -73,6 +76,22 @@ def case_of(options: Namespace) -> Case:
     if options.modes is not None:
         _take_modes(case, options)
     return case
+
+
+def share(text: str, what: str) -> float:
+    """Return a share between 0 and 1, given as one or in percent.
+
+    >>> share("2.5%", "--error"), share("0.01", "--error")
+    (0.025, 0.01)
+    """
+    given = text.strip()
+    try:
+        found = float(given.removesuffix("%")) / (100 if given.endswith("%") else 1)
+    except ValueError:
+        found = 0.0
+    if not 0 < found < 1:
+        raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
+    return found
 
 
 def _refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
@@ -112,7 +131,9 @@ def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration 
     if time is None:
         _refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
         return None
-    _refuse(options, ("solver", "tolerance"), "is for statics; time integration chooses its own solver")
+    _refuse(
+        options, ("solver", "tolerance", "error"), "is for statics; time integration chooses its own solver"
+    )
     changes: dict[str, Any] = {}
     if options.steps is not None:
         changes["steps"] = whole_number(options.steps, "--steps")

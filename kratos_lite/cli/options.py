@@ -130,6 +130,11 @@ def _add_solve(commands: Any) -> None:
     how = solve.add_argument_group("solver")
     how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
+    how.add_argument(
+        "--error",
+        metavar="SHARE",
+        help="relative error of the energy norm, such as 1%% or 0.01: statics, the mesh made finer",
+    )
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
     how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")

@@ -11,6 +11,7 @@ from kratos_lite.mesh.blocks import (
     with_rows,
     without_repeats,
 )
+from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import SIDES, Where, WhereElements
@@ -21,6 +22,7 @@ __all__ = [
     "SIDES",
     "Block",
     "Faces",
+    "Finer",
     "Located",
     "Mesh",
     "Part",

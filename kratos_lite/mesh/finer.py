@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +10,10 @@ import numpy as np
 from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.centers import Keys, corners_around, keys_of
 from kratos_lite.mesh.mesh import Mesh
+from kratos_lite.mesh.selection import Where, WhereElements, elements_among
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.validation import finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +51,35 @@ class Finer:
         """
         return np.concatenate([values, _interpolated(values, self.start, self.nodes, self.weights)])
 
+    def onto(self, geometry: Mapping[str, Callable[[Array], Array]]) -> Finer:
+        """Return the same with the new nodes of parts moved onto the true surfaces.
+
+        Hanging nodes stay on the edges and faces of their masters.
+
+        Parameters
+        ----------
+        geometry : by part, a function of places (k, 3) in m near the surface that returns places on it.
+
+        Returns
+        -------
+        Finer
+
+        Raises
+        ------
+        InputError
+            A function does not return finite places.
+        MeshError
+            There is no such part.
+        """
+        points, old = self.mesh.points.copy(), self.coarse.n_nodes
+        for part, function in geometry.items():
+            rows = self.mesh.nodes(part)
+            rows = rows[rows >= old]
+            points[rows] = finite(function(points[rows]), f"the places on {part!r}", (len(rows), 3))
+        if self.mesh.hanging is not None:
+            points = self.mesh.hanging.interpolate(points)
+        return replace(self, mesh=self.mesh.replace(points=points))
+
     def grown(self, rows: Ints) -> Ints:
         """Return the nodes of the finer mesh that belong to a set of nodes of the coarse one.
 
@@ -83,6 +115,36 @@ class Finer:
         """
         return _descendants(self.elements, rows, self.coarse.n_elements)
 
+    def where(self, where: Where) -> Where:
+        """Return what nodes of the coarse mesh are chosen by, as a choice of nodes of the finer one.
+
+        Parameters
+        ----------
+        where : part name or predicate, which stay; mask or rows, which grow.
+
+        Returns
+        -------
+        Where
+        """
+        if isinstance(where, str) or callable(where):
+            return where
+        return self.grown(self.coarse.nodes(where))
+
+    def where_elements(self, where: WhereElements) -> WhereElements:
+        """Return likewise a choice of elements.
+
+        Parameters
+        ----------
+        where : part name, property id or None, which stay; or rows.
+
+        Returns
+        -------
+        WhereElements
+        """
+        if where is None or isinstance(where, (str, int)):
+            return where
+        return self.children(self.coarse.elements(where))
+
     def part(self, part: Part) -> Part:
         """Return a part of the coarse mesh as one of the finer mesh.
 
@@ -95,8 +157,9 @@ class Finer:
         Part
         """
         conditions = _descendants(self.conditions, part.conditions, self.coarse.n_conditions)
+        elements = part.elements if len(part.elements) else elements_among(part.nodes, self.coarse)
         return replace(
-            part, nodes=self.grown(part.nodes), elements=self.children(part.elements), conditions=conditions
+            part, nodes=self.grown(part.nodes), elements=self.children(elements), conditions=conditions
         )
 
 

@@ -85,6 +85,7 @@ class Supports:
     ----------
     fixed : (n, 3) bool, read-only, which degrees of freedom are prescribed.
     values : (n, 3) float, read-only, their displacements in m, at the time 0 where they move.
+    hanging : the constraints of hanging nodes, the first of all.
     motions : the prescribed motion.
     fixings : the calls of `Structure.fix` that all this came from, in order.
     version : counts the changes of what is prescribed, but for values and functions of time.
@@ -97,7 +98,7 @@ class Supports:
         self._values: Array = np.zeros(mesh.points.shape)
         self.fixed, self.values = self._fixed.view(), self._values.view()
         self.fixed.flags.writeable = self.values.flags.writeable = False
-        self._constraints = hanging_constraints(mesh)
+        self.hanging = self._constraints = hanging_constraints(mesh)
         self._hangs = np.zeros(mesh.n_nodes, dtype=bool)
         if mesh.hanging is not None:
             self._hangs[mesh.hanging.nodes] = True

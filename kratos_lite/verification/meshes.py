@@ -136,6 +136,11 @@ def on_plane(mesh: Mesh, axis: int, value: float) -> Mask:
     return np.abs(mesh.points[:, axis] - value) < 1e-7 * float(np.ptp(mesh.points[:, axis]))
 
 
+def plane(axis: int, value: float) -> Callable[[Array], Mask]:
+    """Return a predicate: whether places (n, 3) have coordinate `value` along an axis, as those of a mesh."""
+    return lambda X: np.abs(X[:, axis] - value) < 1e-7 * float(np.ptp(X[:, axis]))
+
+
 def on_boundary(mesh: Mesh) -> Mask:
     """Return a mask of the nodes on the surface of the body."""
     rows = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.boundary]))

@@ -16,11 +16,11 @@ from kratos_lite.verification import fields
 from kratos_lite.verification.meshes import (
     body_forces,
     element,
-    face_forces,
     joined,
     octant,
     on_boundary,
     on_plane,
+    plane,
     straight,
 )
 
@@ -75,7 +75,7 @@ def sphere(kind: str, n: int) -> Scene:
     mesh = octant(n, kind, lambda X: 2 * X / np.linalg.norm(X, axis=1, keepdims=True))
     model = Model(mesh, UNIT)
     for axis, letter in enumerate("xyz"):
-        model.fix(on_plane(mesh, axis, 0.0), letter)
+        model.fix(plane(axis, 0.0), letter)
     model.add(Pressure(np.abs(np.linalg.norm(mesh.points, axis=1) - 1) < 1e-9, 1.0))
     return Scene("sphere", kind, n, model, fields.hollow_sphere(UNIT.E, UNIT.nu, 1.0, 2.0, 1.0))
 
@@ -85,9 +85,9 @@ def bending(kind: str, n: int) -> Scene:
     k = 0.01
     mesh = box((4, 1, 1), (4 * n, n, n), element(kind), origin=(0, -0.5, -0.5))
     model = Model(mesh, UNIT)
-    exact, root, end = fields.bending(k, UNIT.nu), on_plane(mesh, 0, 0.0), on_plane(mesh, 0, 4.0)
-    model.fix(root, "xyz", exact(mesh.points[root]))
-    model.add(NodalForces(face_forces(mesh, end, lambda X, _: UNIT.E * k * X[..., 1:2] * np.eye(3)[0])))
+    exact = fields.bending(k, UNIT.nu)
+    model.fix("x-", field=exact)
+    model.add(Traction("x+", lambda X: UNIT.E * k * X[:, 1:2] * np.eye(3)[0]))
     return Scene("bending", kind, n, model, exact)
 
 
@@ -116,9 +116,11 @@ def l_domain(kind: str, n: int) -> Scene:
     mesh = joined([box((1, 1, 0.5), (n, n, 1), element(kind), origin=at) for at in corners])
     model = Model(mesh, UNIT)
     exact = fields.l_domain(UNIT.E, UNIT.nu)
-    outer = (np.abs(np.abs(mesh.points[:, :2]) - 1) < 1e-9).any(axis=1)
-    model.fix(outer, "xy", exact(mesh.points[outer])[:, :2])
-    model.fix(on_plane(mesh, 2, 0.0) | on_plane(mesh, 2, 0.5), "z")
+    model.fix(
+        lambda X: (np.abs(np.abs(X[:, :2]) - 1) < 1e-9).any(axis=1), "xy", field=lambda X: exact(X)[:, :2]
+    )
+    model.fix("z-", "z")
+    model.fix("z+", "z")
     return Scene("l_domain", kind, n, model, exact)
 
 
@@ -127,10 +129,12 @@ def cavity(kind: str, n: int) -> Scene:
     mesh = octant(n, kind, lambda X: 3 * X / np.abs(X).max(axis=1, keepdims=True))
     model = Model(mesh, UNIT)
     exact = fields.cavity(UNIT.E, UNIT.nu, 1.0, 1.0)
-    outer = (np.abs(mesh.points - 3) < 1e-9).any(axis=1)
-    model.fix(outer, "xyz", np.where(np.abs(mesh.points[outer]) < 1e-9, 0.0, exact(mesh.points[outer])))
+    model.fix(
+        lambda X: (np.abs(X - 3) < 1e-9).any(axis=1),
+        field=lambda X: np.where(np.abs(X) < 1e-9, 0.0, exact(X)),
+    )
     for axis, letter in enumerate("xyz"):
-        model.fix(on_plane(mesh, axis, 0.0), letter)
+        model.fix(plane(axis, 0.0), letter)
     return Scene("cavity", kind, n, model, exact)
 
 

@@ -118,7 +118,7 @@ def apply_load(load: BodyLoad | Load, body: FreeBody, amplitude: Factor | None) 
         applied = load.bind(body)
     elif not isinstance(load, Load):
         raise InputError(f"a load such as Gravity or Force is needed; got {type(load).__name__}")
-    elif isinstance(load, Gravity) and load.where is None and load.force.ndim == 1:
+    elif isinstance(load, Gravity) and load.where is None and np.ndim(load.force) == 1:
         applied = _gravity(load.force, body)
     elif isinstance(load, TimeDependentLoad):
         applied = _time_dependent(load, body)

@@ -70,7 +70,7 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
 
 def _split_loads(model: Model) -> tuple[Array, list[Any]]:
     """Return the gravity that acts on the whole body and the other loads."""
-    whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and g.force.ndim == 1]
+    whole = [g for g in model.loads if isinstance(g, Gravity) and g.where is None and np.ndim(g.force) == 1]
     gravity = sum((g.force for g in whole), np.zeros(3))
     return gravity, [load for load in model.loads if load not in whole]
 

@@ -9,4 +9,4 @@ from kratos_lite.typing import Progress
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Solve the model."""
-    return Outcome(case, [], case.model.solve(case.solver, case.tolerance, progress))
+    return Outcome(case, [], case.model.solve(case.solver, case.tolerance, progress, error=case.error))

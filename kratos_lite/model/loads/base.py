@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Finer, Mesh
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, takes
+
+OfPlace: TypeAlias = Callable[[Array], ArrayLike]
+"""A function of places (m, 3) in m."""
 
 
 class Load(ABC):
@@ -37,6 +41,27 @@ class Load(ABC):
         InputError, ModelError
             The load does not fit the mesh.
         """
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the same load on a finer mesh.
+
+        Parameters
+        ----------
+        finer : the mesh, and how it has come from that of the load.
+
+        Returns
+        -------
+        Load
+
+        Raises
+        ------
+        ModelError
+            The load cannot be carried over.
+        """
+        raise ModelError(
+            f"{type(self).__name__} cannot be carried over to a finer mesh: its class defines no "
+            "refined(finer); add the load to a model of the finer mesh instead"
+        )
 
 
 class TimeDependentLoad(Load):
@@ -97,6 +122,15 @@ class TimeDependentLoad(Load):
         """Return the nodal forces (n, 3) in N at the time 0."""
         return self.history(lambda load: load.forces(mesh, groups))(0.0) + np.zeros_like(mesh.points)
 
+    def refined(self, finer: Finer) -> Load:
+        """Return a load whose function gives those of this one on a finer mesh."""
+
+        def function(time: float) -> Load | None:
+            load = self.at(time)
+            return None if load is None else load.refined(finer)
+
+        return TimeDependentLoad(function)
+
     def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
         """Return the nodal forces as a function of time.
 
@@ -139,6 +173,10 @@ class ScaledLoad(TimeDependentLoad):
                 f"an amplitude multiplies a constant load such as Gravity or Traction; got {name}"
             )
         self.load, self.amplitude = load, function_of(amplitude, "the amplitude of a load")
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh, with the same amplitude."""
+        return ScaledLoad(self.load.refined(finer), self.amplitude)
 
     def history(self, forces_of: Callable[[Load], Array]) -> Callable[[float], Array | float]:
         """Return the nodal forces (n, 3) in N as a function of time."""

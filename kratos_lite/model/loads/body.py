@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +11,8 @@ from numpy.typing import ArrayLike
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh, WhereElements
-from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.mesh import Finer, Mesh, WhereElements
+from kratos_lite.model.loads.base import Load, OfPlace, vectors
 from kratos_lite.typing import Array, Mask
 
 
@@ -20,26 +21,55 @@ class BodyForce(Load):
 
     Parameters
     ----------
-    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³.
+    force : (3,) float, or (n, 3) interpolated from the nodes; N/m³; or a function of places (n, 3) that
+        returns either.
     where : elements that carry it: part name, property id or rows; all if not given.
     """
 
-    def __init__(self, force: ArrayLike, where: WhereElements = None) -> None:
-        self.force = vectors(force, "a body force", "(3,) or (n, 3) in N/m³", (1, 2))
+    what: ClassVar[tuple[str, str]] = "a body force", "(3,) or (n, 3) in N/m³"
+
+    def __init__(self, force: ArrayLike | OfPlace, where: WhereElements = None) -> None:
+        self.force: Any = force if callable(force) else vectors(force, *self.what, (1, 2))
         self.where = where
 
-    def per_volume(self, group: ElementGroup) -> Array:
+    def per_volume(self, group: ElementGroup, points: Array) -> Array:
         """Return the force per volume.
 
         Parameters
         ----------
         group : elements of one material.
+        points : (n, 3) m, of the mesh.
 
         Returns
         -------
         (3,) or nodal (n, 3) in N/m³.
         """
-        return self.force
+        return self.nodal(points)
+
+    def nodal(self, points: Array) -> Array:
+        """Return the force (3,) or nodal (n, 3) at the nodes of a mesh.
+
+        Parameters
+        ----------
+        points : (n, 3) m, of the mesh.
+
+        Returns
+        -------
+        (3,) or (n, 3), in the unit of the load.
+
+        Raises
+        ------
+        InputError
+            It has another number of nodes, or its function does not return such values.
+        """
+        force: Array = self.force
+        if callable(force):
+            force = vectors(force(points.copy()), *self.what, (1, 2))
+        if force.ndim == 2 and len(force) != len(points):
+            raise InputError(
+                f"a nodal {type(self).__name__} needs shape ({len(points)}, 3); got {force.shape}"
+            )
+        return force
 
     def carriers(self, mesh: Mesh) -> Mask:
         """Return which elements carry it.
@@ -64,16 +94,19 @@ class BodyForce(Load):
         InputError
             A nodal force has another number of nodes.
         """
-        if self.force.ndim == 2 and len(self.force) != mesh.n_nodes:
-            name = type(self).__name__
-            raise InputError(f"a nodal {name} needs shape ({mesh.n_nodes}, 3); got {self.force.shape}")
         total = np.zeros_like(mesh.points)
         chosen = self.carriers(mesh)
         for group in groups:
-            b, part = self.per_volume(group), group.take(chosen[group.rows])
+            b, part = self.per_volume(group, mesh.points), group.take(chosen[group.rows])
             if b.any() and len(part):
                 total += gauss_point_fields.body_force(mesh.points, part, b)
         return total
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh; nodal values are interpolated."""
+        nodal = not callable(self.force) and self.force.ndim == 2
+        force = finer.interpolate(self.force) if nodal else self.force
+        return type(self)(force, finer.where_elements(self.where))
 
 
 class Gravity(BodyForce):
@@ -81,7 +114,8 @@ class Gravity(BodyForce):
 
     Parameters
     ----------
-    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s².
+    acceleration : (3,) float, or (n, 3) interpolated from the nodes; m/s²; or a function of places (n, 3)
+        that returns either.
     where : elements that carry it: part name, property id or rows; all if not given.
 
     Examples
@@ -90,10 +124,11 @@ class Gravity(BodyForce):
     array([ 0.  ,  0.  , -9.81])
     """
 
-    def __init__(self, acceleration: ArrayLike, where: WhereElements = None) -> None:
-        self.force = vectors(acceleration, "gravity", "(3,) or (n, 3) in m/s²", (1, 2))
-        self.where = where
+    what = "gravity", "(3,) or (n, 3) in m/s²"
 
-    def per_volume(self, group: ElementGroup) -> Array:
+    def __init__(self, acceleration: ArrayLike | OfPlace, where: WhereElements = None) -> None:
+        super().__init__(acceleration, where)
+
+    def per_volume(self, group: ElementGroup, points: Array) -> Array:
         """Return density × acceleration."""
-        return group.material.density * self.force
+        return group.material.density * self.nodal(points)

@@ -9,7 +9,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Block, Mesh, with_rows
+from kratos_lite.mesh import Block, Finer, Mesh, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.surface import SURFACES
 from kratos_lite.typing import Array
@@ -50,6 +50,15 @@ class ConditionLoads(Load):
             if pressure.any() and block.shape.cell in SURFACES:
                 add_nodal(total, block.nodes, surface_pressure(block.shape, X, pressure))
         return total
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the loads on a finer mesh: conditions keep those of their parents, nodes interpolate."""
+        return ConditionLoads(
+            self.force[finer.conditions],
+            {cell: finer.interpolate(force) for cell, force in self.nodal_force.items()},
+            self.pressure[finer.conditions],
+            finer.interpolate(self.nodal_pressure),
+        )
 
 
 def _check_loadable(block: Block, force: bool, pressure: bool) -> None:

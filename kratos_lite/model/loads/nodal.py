@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh import Finer, Mesh, Where
 from kratos_lite.model.loads.base import Load, vectors
 from kratos_lite.typing import Array
 
@@ -42,6 +42,10 @@ class PointLoad(Load):
         total[rows] += self.force
         return total
 
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh: on the same nodes."""
+        return PointLoad(finer.coarse.nodes(self.where), self.force)
+
 
 class NodalForces(Load):
     """Given nodal forces.
@@ -65,3 +69,8 @@ class NodalForces(Load):
         if self.values.shape != mesh.points.shape:
             raise InputError(f"nodal forces need shape {mesh.points.shape}; got {self.values.shape}")
         return self.values.copy()
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh: on the same nodes."""
+        new = np.zeros((finer.mesh.n_nodes - len(self.values), 3))
+        return NodalForces(np.concatenate([self.values, new]))

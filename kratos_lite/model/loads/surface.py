@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import ClassVar, TypeAlias
+from collections.abc import Iterable, Iterator, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +11,12 @@ from numpy.typing import ArrayLike
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.elements import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Mesh, Where, outward_signs
-from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.mesh import Block, Finer, Mesh, Where, outward_signs
+from kratos_lite.model.loads.base import Load, OfPlace, vectors
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number
 
 SURFACES = ("triangle", "quadrilateral")
-OfPlace: TypeAlias = Callable[[Array], ArrayLike]
-"""A function of places (m, 3) in m."""
 
 
 class Traction(Load):
@@ -58,6 +56,10 @@ class Traction(Load):
             X, t = mesh.points[block.nodes], self.traction
             at = _at_nodes(t, X, what, (3,)) if callable(t) else t
             yield block, surface_load(block.shape, X, at)
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh: on the faces or lines that have come from those of the old one."""
+        return type(self)(finer.where(self.where), self.traction)
 
 
 class LineLoad(Traction):
@@ -117,6 +119,10 @@ class Pressure(Load):
             if self.normal == "outward":
                 at = at * outward(mesh, block)[:, None]
             yield block, surface_pressure(block.shape, X, at)
+
+    def refined(self, finer: Finer) -> Load:
+        """Return the load on a finer mesh: on the faces that have come from those of the old one."""
+        return Pressure(finer.where(self.where), self.pressure, self.normal)
 
 
 def outward(mesh: Mesh, block: Block) -> Array:

@@ -1,0 +1,269 @@
+"""Adaptive solution: a static model solved to a requested accuracy, its mesh made finer where that pays.
+
+Linear elements become quadratic first; then the elements that hold most of the error are cut, few steps
+with many elements each.  The estimate of a result is corrected by what the last step has changed: of nested
+meshes ‖u - u_H‖² = ‖u - u_h‖² + ‖u_h - u_H‖², so that, if estimates fall by β = η_h/η_H, the error is
+‖u_h - u_H‖ β/√(1 - β²).
+
+Sources: Dörfler, SIAM J. Numer. Anal. 33 (1996) 1106-1124; Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24
+(1987) 337-357 (density of the mesh); Ainsworth & Oden, A Posteriori Error Estimation (2000), ch. 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from kratos_lite.analysis.report import RefinementStep
+from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.static import StaticAnalysis
+from kratos_lite.assembly.gauss_point_fields import totals
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import is_own
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.mesh import Finer
+from kratos_lite.mesh.order import quadratic, raised
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.model.refined import refined
+from kratos_lite.model.structure import Structure
+from kratos_lite.typing import Array, Ints, Mask, Progress
+from kratos_lite.validation import number
+
+S = TypeVar("S", bound=Structure)
+ALONE = {1: 1.5, 2: 1.3}
+"""Safety of an estimate that no coarser mesh corrects, by the order of the elements."""
+SAFETY = 1.2
+"""Safety of an estimate that one corrects."""
+SETTLED = 0.9
+"""Share to which estimates must fall, so that they can be corrected."""
+AIM = 0.9
+"""Share of the error asked for at which the next mesh aims."""
+SINGULAR = 0.25
+"""Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
+solution counts as singular there."""
+STEPS = 25
+"""Meshes after which the accuracy counts as out of reach."""
+UNKNOWNS = 400_000
+"""Unknowns of the largest mesh that is solved."""
+
+
+def solve_to(
+    model: S,
+    error: float,
+    solver: str = "auto",
+    tolerance: float = 1e-10,
+    progress: Progress | None = None,
+    most_unknowns: int = UNKNOWNS,
+    geometry: Mapping[str, Callable[[Array], Array]] | None = None,
+) -> Result:
+    """Solve a static model on meshes that become finer until the error is as small as asked for.
+
+    Parameters
+    ----------
+    model : the structure; it stays as it is.
+    error : of the energy norm, relative, such as 0.01.
+    solver, tolerance, progress : as for `Model.solve`.
+    most_unknowns : no larger mesh is solved.
+    geometry : by part, a function that takes places (k, 3) in m near its true surface onto it.
+
+    Returns
+    -------
+    Result
+        On the last mesh; ``report.history`` has all of them.
+
+    Raises
+    ------
+    InputError
+        The error is no number between 0 and 1.
+    MeshError, ModelError, SolveError
+        As by `Model.solve`; or what the model has cannot be carried over to a finer mesh.
+    """
+    aim = number(error, "error")
+    if not 0 < aim < 1:
+        raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
+    if model.motion is not None:
+        raise ModelError(
+            "a model whose material moves through its mesh is not refined; solve it without error"
+        )
+    levels: list[_Level] = []
+    steps: list[Finer] = []
+    history: list[RefinementStep] = []
+    missed = ""
+    while True:
+        start = perf_counter()
+        result = StaticAnalysis(model, solver, tolerance, progress).solve()
+        level = _Level(model, result, steps, levels[-1] if levels else None)
+        levels = [*levels[-1:], level]
+        history.append(level.step(perf_counter() - start))
+        if level.reported <= aim or missed:
+            break
+        steps = [step.onto(geometry) if geometry else step for step in _next(level, aim)]
+        model = _carried(model, steps)
+        if 3 * model.mesh.n_nodes > most_unknowns:
+            missed = f"the next mesh has more than {most_unknowns} unknowns"
+        elif len(history) == STEPS:
+            missed = f"{STEPS} meshes did not suffice"
+        if missed:
+            break
+    if missed:
+        result.report.warnings.append(
+            f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
+        )
+    result.report.history, result.report.error = history, level.reported
+    return result
+
+
+@dataclass(eq=False)
+class _Level:
+    """A model solved, and what is known of its error; the level before it, and the steps from there."""
+
+    model: Structure
+    result: Result
+    steps: Sequence[Finer]
+    before: _Level | None
+
+    @cached_property
+    def squares(self) -> Array:
+        """Squared estimate of each element (m,) in J."""
+        return self.result.error().per_element ** 2
+
+    @cached_property
+    def estimate(self) -> float:
+        """Estimate of the error in √J."""
+        return float(np.sqrt(self.squares.sum()))
+
+    @cached_property
+    def norm(self) -> float:
+        """‖u‖ in √J."""
+        return float(np.sqrt(2 * self.result.energy()))
+
+    @cached_property
+    def order(self) -> int:
+        """Order of the elements."""
+        shapes = [block.shape for block in self.model.mesh.blocks if len(block) and block.shape]
+        return min(shape.degree for shape in shapes)
+
+    @cached_property
+    def change(self) -> float:
+        """‖u - u_H‖ in √J from the solution of the level before."""
+        assert self.before is not None
+        old = self.before.result.u
+        for step in self.steps:
+            old = step.interpolate(old)
+        points = self.model.mesh.points
+        return float(np.sqrt(2 * totals(points, self.result.groups, self.result.u - old)[0]))
+
+    @cached_property
+    def bound(self) -> float:
+        """The error in √J that is reported."""
+        alone = ALONE[self.order] * self.estimate
+        if self.before is None:
+            return alone
+        ratio = self.estimate / self.before.estimate
+        if not ratio < SETTLED:
+            return max(alone, self.change)
+        corrected = self.change * ratio / float(np.sqrt(1 - ratio**2))
+        return SAFETY * max(corrected, self.estimate)
+
+    @property
+    def reported(self) -> float:
+        """The same, relative."""
+        return self.bound / self.norm if self.norm > 0 else 0.0
+
+    def step(self, seconds: float) -> RefinementStep:
+        """Return the level as a step of the history."""
+        kinds = dict.fromkeys(group.element.__name__ for group in self.result.groups)
+        return RefinementStep(
+            self.model.mesh.n_elements,
+            ", ".join(kinds),
+            self.result.report.unknowns,
+            self.reported,
+            seconds,
+        )
+
+    @cached_property
+    def parents(self) -> Ints:
+        """(m,) element of the level before of each element."""
+        parents = np.arange(self.before.model.mesh.n_elements) if self.before else np.zeros(0, dtype=np.int64)
+        for step in self.steps:
+            parents = parents[step.elements]
+        return parents
+
+    def kept(self) -> Array:
+        """Return the share of its squared error (m,) that each element keeps if it is cut."""
+        smooth = 4.0**-self.order
+        kept = np.full(len(self.squares), smooth)
+        if self.before is None:
+            return kept
+        parents, old = self.parents, self.before.squares
+        if self.before.order < self.order:
+            left = self.squares / np.maximum(old[parents], np.finfo(float).tiny)
+            kept[left > SINGULAR] = 0.5
+            return kept
+        count, total = np.bincount(parents), np.bincount(parents, weights=self.squares)
+        left = np.clip(total / np.maximum(old, np.finfo(float).tiny), smooth, 0.8)[parents]
+        heavy = (count[parents] > 1) & (self.squares * count[parents] > total[parents])
+        kept[heavy] = left[heavy]
+        return kept
+
+
+def _next(level: _Level, error: float) -> list[Finer]:
+    """Return the steps to the next mesh."""
+    mesh = level.model.mesh
+    if _can_be_raised(level.model):
+        return [raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")]
+    aim = AIM * error / level.reported * level.estimate
+    marked = _marked(level.squares, level.kept(), aim)
+    return [refine(mesh, marked)]
+
+
+def _can_be_raised(model: Structure) -> bool:
+    """Return whether linear elements may become quadratic: those of the library, with their own rules."""
+    mesh = model.mesh
+    kinds = [ELEMENTS[block.name] for block in mesh.blocks if len(block)]
+    return (
+        mesh.hanging is None
+        and bool((model._rule_of < 0).all())
+        and all(map(is_own, kinds))
+        and any(kind.shape.degree == 1 for kind in kinds)
+    )
+
+
+def _marked(squares: Array, kept: Array, aim: float) -> Mask:
+    """Return which elements (m,) are cut now, on the way to a mesh with the error `aim`.
+
+    On it all elements have the same error τ.  An element cut k times has 8^k children, or 8 k around a
+    singular point, that hold kept^k of its squared error.
+    """
+    singular = kept > SINGULAR
+    rate = np.where(singular, -np.log(kept), np.log(8 / kept))
+    logs = np.log(np.maximum(squares, np.finfo(float).tiny))
+
+    def times(tau: float) -> Array:
+        return np.maximum(np.ceil((logs - tau) / rate - 0.5), 0.0)
+
+    low, high = float(logs.max()) - 60.0, float(logs.max())
+    for _ in range(40):
+        middle = (low + high) / 2
+        if (squares * kept ** times(middle)).sum() > aim**2:
+            high = middle
+        else:
+            low = middle
+    marked = times(low) > 0
+    marked[squares.argmax()] = True
+    return marked
+
+
+def _carried(model: S, steps: Sequence[Finer]) -> S:
+    """Return a model after some steps."""
+    for step in steps:
+        finer = refined(model, step)
+        if step.mesh.n_elements == step.coarse.n_elements and model.formulation != "b_bar":
+            finer.formulation = None  # quadratic elements: those that do not lock
+        model = finer
+    return model

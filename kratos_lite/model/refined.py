@@ -1,0 +1,115 @@
+"""Refined: a structure on a finer mesh, with the same materials, supports and loads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from kratos_lite.errors import ModelError
+from kratos_lite.mesh import Finer
+from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import Fixing
+from kratos_lite.quadrature import Rule
+
+S = TypeVar("S", bound=Structure)
+
+
+def refined(structure: S, finer: Finer) -> S:
+    """Return a structure on a finer mesh.
+
+    Parts and predicates choose nodes anew, sets of rows grow as `Finer.grown` says; prescribed values and
+    nodal loads are interpolated unless they are functions of places, forces on nodes stay there.
+
+    Parameters
+    ----------
+    structure : that on the coarse mesh.
+    finer : the finer mesh, and how it has come from that of the structure.
+
+    Returns
+    -------
+    Structure
+        Of the same class.
+
+    Raises
+    ------
+    ModelError
+        It has a motion, a load that cannot be carried over, ties along edges that are cut, or rules of
+        its own for elements of another shape.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> from kratos_lite.mesh.refinement import refine
+    >>> model = kl.Model(kl.box(cells=(2, 1, 1)), kl.Isotropic3D(E=1e9, nu=0.3))
+    >>> model.fix("x-")
+    >>> model.add(kl.Traction("x+", (0.0, 0.0, 1e3)))
+    >>> finer = refined(model, refine(model.mesh, [0]))
+    >>> finer.mesh.n_elements, finer.solve().report.total_load.round(6).tolist()
+    (9, [0.0, 0.0, 1000.0])
+    """
+    if structure.motion is not None:
+        raise ModelError(
+            "a model whose material moves through the mesh cannot be carried over to a finer one"
+        )
+    new = type(structure)(finer.mesh, formulation=structure.formulation)
+    new._materials = list(structure._materials)
+    new._material_of = structure._material_of[finer.elements]
+    _carry_rules(structure, new, finer)
+    if structure.initial_displacement is not None:
+        new.stress_free_at(finer.interpolate(structure.initial_displacement))
+    if structure.prestress is not None:
+        new.add_prestress(structure.prestress[finer.elements])
+    for fixing in structure.supports.fixings:
+        new.supports.apply(_refixed(fixing, finer))
+    _carry_constraints(structure, new, finer)
+    new.loads = [load.refined(finer) for load in structure.loads]
+    new.notes = list(structure.notes)
+    return new
+
+
+def _carry_rules(structure: Structure, new: Structure, finer: Finer) -> None:
+    """Give elements the rules of those that they have come from; refuse those of another shape."""
+    rule_of = structure._rule_of[finer.elements]
+    new._rules, new._rule_of = dict(structure._rules), rule_of
+    if (rule_of < 0).all():
+        return
+    kinds = [
+        np.concatenate([np.full(len(b), hash(b.shape)) for b in mesh.blocks])
+        for mesh in (finer.coarse, finer.mesh)
+    ]
+    fixed = [number for number, rule in structure._rules.items() if isinstance(rule, Rule)]
+    if (np.isin(rule_of, fixed) & (kinds[0][finer.elements] != kinds[1])).any():
+        raise ModelError(
+            "a quadrature rule that replaces that of elements does not fit those of another shape"
+        )
+
+
+def _refixed(fixing: Fixing, finer: Finer) -> Fixing:
+    """Return what a call of `fix` means on the finer mesh."""
+    mesh, old = finer.mesh, finer.coarse.n_nodes
+    rows = mesh.nodes(finer.grown(fixing.rows) if fixing.where is None else fixing.where)
+    value = fixing.value
+    if fixing.field is not None or callable(value) or np.ndim(value) < 2:
+        return replace(fixing, rows=rows, override=True)
+    nodal = np.full((old, np.shape(value)[1]), np.nan)
+    nodal[fixing.rows] = value
+    nodal = finer.interpolate(nodal)
+    known = ~np.isnan(nodal[rows]).any(axis=1)
+    return replace(fixing, rows=rows[known], value=nodal[rows[known]], override=True)
+
+
+def _carry_constraints(structure: Structure, new: Structure, finer: Finer) -> None:
+    """Carry over constraints of nodes; refuse those that tie edges on which new nodes lie."""
+    hanging = set(map(id, structure.supports.hanging))
+    own = [c for c in structure.supports.constraints if id(c) not in hanging]
+    if not own:
+        return
+    tied = np.unique([c.slave // 3 for c in own])
+    if len(finer.grown(tied)) > len(tied):
+        raise ModelError(
+            f"{len(own)} constraints tie nodes of edges that are cut, but not their new nodes; constrain "
+            "a finer mesh instead"
+        )
+    new.supports.constraints = (*new.supports.constraints, *own)

@@ -1,0 +1,90 @@
+"""Solutions to a requested accuracy: the true error is at most the reported one, and the model stays."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.verification import scenes
+from kratos_lite.verification.concentrations import hole
+from kratos_lite.verification.errors import norms
+
+
+def radially(axes):
+    def onto(X):
+        r = np.linalg.norm(X[:, :axes], axis=1, keepdims=True)
+        return np.column_stack([X[:, :axes] / r, X[:, axes:]])
+
+    return onto
+
+
+def true_error(scene, result):
+    return norms(scene.exact, result.mesh.points, result.groups, result.u)[1]
+
+
+CASES = {
+    "corner": (lambda: scenes.l_domain("8N", 2), 0.12, {}),
+    "hole": (lambda: hole("20N", 2), 0.03, {"rim": 2}),
+    "sphere": (lambda: scenes.sphere("20N", 2), 0.04, {"rim": 3}),
+    "bending": (lambda: scenes.bending("8N", 1), 0.01, {}),
+}
+
+
+@pytest.mark.parametrize(("make", "error", "round_"), CASES.values(), ids=CASES)
+def test_the_true_error_is_at_most_the_reported_one(make, error, round_):
+    scene = make()
+    mesh = scene.model.mesh
+    for part, axes in round_.items():
+        r = np.linalg.norm(mesh.points[:, :axes], axis=1)
+        mesh.add_part(part, np.abs(r - 1) < 1e-9)
+    geometry = {part: radially(axes) for part, axes in round_.items()}
+    result = scene.model.solve(error=error, geometry=geometry)
+    assert result.report.error <= error
+    assert not result.report.warnings
+    assert true_error(scene, result) <= result.report.error + 1e-9
+    for part, axes in round_.items():
+        r = np.linalg.norm(result.mesh.points[result.mesh.nodes(part), :axes], axis=1)
+        assert np.abs(r - 1).max() < 1e-3
+
+
+def bar():
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.3))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, 1.0)))
+    return model
+
+
+def test_a_mesh_that_is_fine_enough_stays():
+    model = bar()
+    result = model.solve(error=0.9)
+    assert result.mesh is model.mesh
+    assert len(result.report.history) == 1
+
+
+def test_the_history_is_in_the_report_and_the_model_stays():
+    model = bar()
+    result = model.solve(error=0.15)
+    history = result.report.history
+    assert model.mesh.n_elements == 4
+    assert [step.unknowns for step in history] == sorted(step.unknowns for step in history)
+    assert history[-1].error == result.report.error <= 0.15
+    rows = result.table()
+    assert sum(label == "refinement" for label, _ in rows) == len(history)
+    assert abs(result.report.total_reaction[2] + 1.0) < 1e-9
+
+
+def test_what_is_out_of_reach_is_said_with_what_was_reached():
+    result = bar().solve(error=1e-4, most_unknowns=600)
+    assert any("was not reached" in text and "600 unknowns" in text for text in result.report.warnings)
+
+
+@pytest.mark.parametrize("error", [0, 1.0, -0.1, "1%", np.nan, True])
+def test_errors_that_are_no_share_are_refused(error):
+    with pytest.raises(kl.InputError, match="error"):
+        bar().solve(error=error)
+
+
+def test_a_motion_is_refused():
+    model = kl.Model(kl.annulus(1.0, 2.0, 1.0), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    model.add(kl.ale.Rotation("z", 1.0))
+    with pytest.raises(kl.ModelError, match="is not refined"):
+        model.solve(error=0.1)
