@@ -77,7 +77,7 @@ def internal_load(
     A rotation needs no force.
 
     >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.3))
+    >>> model = kl.Model(kl.box(element="KinematicLinear3D8N"), kl.Isotropic3D(E=1.0, nu=0.3))
     >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
     True
