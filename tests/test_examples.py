@@ -45,7 +45,16 @@ def test_python_of_the_readme_runs(number, tmp_path):
 
 @pytest.mark.parametrize(
     "page",
-    ["users.md", "add-an-element.md", "formats.md", "exercises.md", "bodies.md", "dynamics.md", "ale.md"],
+    [
+        "users.md",
+        "elements.md",
+        "add-an-element.md",
+        "formats.md",
+        "exercises.md",
+        "bodies.md",
+        "dynamics.md",
+        "ale.md",
+    ],
 )
 def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
