@@ -35,10 +35,8 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import number
 
 S = TypeVar("S", bound=Structure)
-ALONE = {1: 1.5, 2: 1.3}
-"""Safety of an estimate that no coarser mesh corrects, by the order of the elements."""
 SAFETY = 1.2
-"""Safety of an estimate that one corrects."""
+"""Safety of an estimate that a coarser mesh corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
 AIM = 0.9
@@ -129,8 +127,9 @@ class _Level:
 
     @cached_property
     def squares(self) -> Array:
-        """Squared estimate of each element (m,) in J."""
-        return self.result.error().per_element ** 2
+        """Squared estimate of each element (m,) in J, the best guess."""
+        found = self.result.error()
+        return (found.per_element / found.safety) ** 2
 
     @cached_property
     def estimate(self) -> float:
@@ -161,7 +160,7 @@ class _Level:
     @cached_property
     def bound(self) -> float:
         """The error in √J that is reported."""
-        alone = ALONE[self.order] * self.estimate
+        alone = self.result.error().absolute
         if self.before is None:
             return alone
         ratio = self.estimate / self.before.estimate
