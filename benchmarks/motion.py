@@ -80,7 +80,7 @@ def bar(formulation: str, integrator: str, lumped: bool = True) -> Callable[[Any
 
     def make(kl: Any) -> Any:
         rubber = kl.Isotropic3D(E=2e6, nu=0.26, density=7800.0)
-        mesh = kl.box((0.1, 0.1, 1.0), (2, 2, 20))
+        mesh = kl.box((0.1, 0.1, 1.0), (2, 2, 20), "KinematicLinear3D8N")
         body = kl.FiniteElementBody(
             mesh, rubber, formulation=formulation, integrator=integrator, lumped=lumped
         )

@@ -87,7 +87,7 @@ def test_elements_of_the_guide_conform(tmp_path):
     script.write_text("\n".join(python_blocks((EXAMPLES.parent / "docs" / "add-an-element.md").read_text())))
     out = run(sys.executable, "-m", "kratos_lite", "check", script)
     assert "MyWedge3D6N: 32 checks passed, 0 failed" in out
-    assert "BBar3D8N: 32 checks passed, 0 failed" in out
+    assert "MeanDilatation3D8N: 32 checks passed, 0 failed" in out
     assert "slate (TransverseIsotropic3D): 6 checks passed, 0 failed" in out
 
 

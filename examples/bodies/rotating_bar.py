@@ -14,7 +14,7 @@ import numpy as np
 
 import kratos_lite as kl
 
-mesh = kl.box((0.1, 0.1, 1.0), cells=(2, 2, 20))
+mesh = kl.box((0.1, 0.1, 1.0), cells=(2, 2, 20), element="KinematicLinear3D8N")
 soft = kl.Isotropic3D(E=2e6, nu=0.26, density=7.8e3)
 ends = np.array([[0.05, 0.05, 0.0], [0.05, 0.05, 1.0]])
 

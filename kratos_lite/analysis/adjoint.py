@@ -4,7 +4,8 @@ The adjoint z of a quantity Q is the displacement under the load ∂Q/∂u, with
 of a solution is orthogonal to all displacements of the mesh, so that Q(e) = a(e, z) = a(e, e_z) with the
 error e_z of the adjoint solution on the same mesh: the product of both errors, element by element, with
 recovered stresses in place of the exact ones.  A reaction is the virtual work of a unit displacement of its
-part; the adjoint has this displacement as its support.
+part; the adjoint has this displacement as its support.  The adjoint of a stress at a point is too singular:
+the error of the mean around the point takes its place, and what recovery shows of the difference is added.
 
 Source: Becker & Rannacher, Acta Numerica 10 (2001) 1-102; Ainsworth & Oden, A Posteriori Error Estimation in
 Finite Element Analysis (2000), chapter 8.
@@ -56,9 +57,10 @@ def error_of(
     for (group, first), (_, second) in both:
         density = ((first @ np.linalg.inv(group.material.C)) * second).sum(axis=-1)
         shares[group.rows] = (density * volumes(mesh.points, group)).sum(axis=1)
-    return QuantityError(
-        value, float(shares.sum()), float(np.abs(shares).sum()), shares, quantity.unit, warnings
-    )
+    local = quantity.local(result)
+    bound = float(np.abs(shares).sum() + np.abs(local).sum())
+    shares += local
+    return QuantityError(value, float(shares.sum()), bound, shares, quantity.unit, warnings)
 
 
 def _shared(result: Solved, held: Mask, part: Mask) -> list[str]:

@@ -8,7 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.model.loads import Load
+from kratos_lite.model.locking import NEAR_HALF
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 
@@ -56,14 +59,22 @@ class ErrorEstimate:
     safety: float = 1.0
 
     def __str__(self) -> str:
-        return f"{self.relative:.2%} ({self.absolute:.4e} √J, {self.method})"
+        return f"{self.relative:.2%} in the energy norm ({self.absolute:.4e} √J, by {self.method})"
 
 
 SAFETY = {"recovery": 1.6, "averaging": 1.8}
 """Factors by which the differences of the elements' stresses to smooth ones are raised to errors."""
 
+NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
+"""Relative error that is rounding; ratio of the differences to recovered and averaged stresses beyond which a
+mesh is coarse; elements that are few; share of the error in the worst hundredth of elements that is much."""
+WORST = 3
+"""Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
 
-def energy_error(recovered: Array, averaged: Array, energy: float) -> ErrorEstimate:
+
+def energy_error(
+    recovered: Array, averaged: Array, energy: float, groups: Sequence[ElementGroup]
+) -> ErrorEstimate:
     """Return the estimate of squared differences to recovered and to averaged stresses.
 
     Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
@@ -74,6 +85,7 @@ def energy_error(recovered: Array, averaged: Array, energy: float) -> ErrorEstim
     ----------
     recovered, averaged : (m,) squared energy norms of the differences in each element, J.
     energy : ‖u_h‖² of the solution in J, twice its strain energy.
+    groups : the elements, whose kind and material may speak against trusting the estimate.
     """
     squares = {"recovery": recovered, "averaging": averaged}
     method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * float(squares[name].sum()))
@@ -81,7 +93,44 @@ def energy_error(recovered: Array, averaged: Array, energy: float) -> ErrorEstim
     absolute = float(np.linalg.norm(per_element))
     size = energy + float(squares[method].sum())
     relative = absolute / size**0.5 if size > 0 else 0.0
-    return ErrorEstimate(absolute, relative, per_element, method, safety=SAFETY[method])
+    warnings = _warnings(recovered, averaged, groups) if relative > NEGLIGIBLE else []
+    return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
+
+
+def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup]) -> list[str]:
+    """Return what speaks against trusting an estimate."""
+    warnings, total = [], float(recovered.sum())
+    locked = sorted({group.element.__name__ for group in groups if _locks(group)})
+    if locked:
+        warnings.append(
+            f"{', '.join(locked)} lock near ν = ½, and the estimated error may be several times too small; "
+            "take formulation='non_locking'"
+        )
+    if total > COARSE**2 * float(averaged.sum()):
+        warnings.append(
+            "recovered stresses are farther from those of the elements than averaged ones: the mesh is too "
+            "coarse for them, and the estimated error may be several times too large"
+        )
+    if len(recovered) < FEW:
+        warnings.append(f"{len(recovered)} elements are too few to estimate their error by one another")
+    elif len(recovered) >= 20 * WORST and _in_the_worst(recovered) > FOCUS * total:
+        warnings.append(
+            f"a large share of the error lies in few elements, most in row {int(recovered.argmax())}: near a "
+            "re-entrant corner, the edge of a support or a concentrated load stresses have no limit"
+        )
+    return warnings
+
+
+def _in_the_worst(squares: Array) -> float:
+    """Return the sum over the hundredth of elements with the largest values."""
+    return float(np.sort(squares)[-max(WORST, len(squares) // 100) :].sum())
+
+
+def _locks(group: ElementGroup) -> bool:
+    """Return whether a plain element has a nearly incompressible material; jumps of pressure show in 10N."""
+    shape = group.element.shape
+    plain = group.element.formulation == "standard" and not (shape.cell == "tetrahedron" and shape.degree > 1)
+    return plain and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import body_force
-from kratos_lite.assembly.point_fields import stress_operator
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
+from kratos_lite.assembly.gauss_point_fields import body_force, volumes
+from kratos_lite.elements.overridden_steps import internal_load_of
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Located, Mesh, Where
 from kratos_lite.model.loads import Traction
@@ -30,8 +31,8 @@ class Solved(Protocol):
     u: Array
     reactions: Array
 
-    def stress(self, at: ArrayLike) -> Any:
-        """Return stresses (..., 6) in Pa at points."""
+    def stress(self, at: Any) -> Any:
+        """Return stresses (..., 6) in Pa at points, of elements or recovered at nodes."""
 
 
 class Quantity(ABC):
@@ -63,7 +64,9 @@ class Quantity(ABC):
         """
 
     def load(self, result: Solved) -> Array:
-        """Return ∂Q/∂u, the load of the adjoint solution; 0 if the class has none.
+        """Return the load of the adjoint solution; 0 if the class has none.
+
+        It is ∂Q/∂u; for a stress at a point, whose adjoint is too singular, that of the mean around it.
 
         Parameters
         ----------
@@ -87,6 +90,19 @@ class Quantity(ABC):
         (n, 3), read where a displacement is prescribed.
         """
         return np.zeros_like(result.u)
+
+    def local(self, result: Solved) -> Array:
+        """Return what the error of Q has beyond that of the mean that `load` is of; 0 if the class has none.
+
+        Parameters
+        ----------
+        result : of any analysis.
+
+        Returns
+        -------
+        (m,) of each element, in the unit of the value.
+        """
+        return np.zeros(result.mesh.n_elements)
 
 
 class DisplacementAt(Quantity):
@@ -122,7 +138,7 @@ class DisplacementAt(Quantity):
 
     def value(self, result: Solved) -> float:
         """Return the displacement in m."""
-        return float((self.load(result) * result.u).sum())
+        return float(_located(result, self.point).interpolate(result.u)[AXES.index(self.axis)])
 
     def load(self, result: Solved) -> Array:
         """Return N (n, 3) of the element that contains the point, along the axis."""
@@ -176,25 +192,23 @@ class MeanDisplacement(Quantity):
         ModelError
             The part has neither a face on the boundary nor an element.
         """
-        unit = np.eye(3)[AXES.index(self.axis)]
-        mesh, groups = result.mesh, result.groups
+        mesh = result.mesh
         if mesh.faces(self.part):
-            load = Traction(self.part, unit).forces(mesh, groups)
-        else:
-            load = np.zeros_like(result.u)
-            inside = np.zeros(mesh.n_nodes, dtype=bool)
-            inside[mesh.nodes(self.part)] = True
-            for group in groups:
-                chosen = np.asarray(inside[group.nodes].all(axis=1))
-                if chosen.any():
-                    load += body_force(mesh.points, group.take(chosen), unit)
-        size = float(load.sum())
-        if not size > 0:
+            load = Traction(self.part, _unit(self.axis)).forces(mesh, result.groups)
+            return load / load.sum()
+        inside = np.zeros(mesh.n_nodes, dtype=bool)
+        inside[mesh.nodes(self.part)] = True
+        load = np.zeros_like(result.u)
+        for group in result.groups:
+            chosen = np.asarray(inside[group.nodes].all(axis=1))
+            if chosen.any():
+                load += body_force(mesh.points, group.take(chosen), _unit(self.axis))
+        if not load.any():
             raise ModelError(
                 f"{self}: the part has neither a face on the boundary nor an element; a mean needs one, "
                 "DisplacementAt takes a point"
             )
-        return load / size
+        return load / load.sum()
 
     def __repr__(self) -> str:
         return f"MeanDisplacement({_name(self.part)}, {self.axis!r})"
@@ -279,11 +293,33 @@ class StressAt(Quantity):
         return float(result.stress(at=self.point)[COMPONENTS.index(self.component)])
 
     def load(self, result: Solved) -> Array:
-        """Return C B (n, 3) of the element that contains the point."""
-        nodes, operator = stress_operator(result.groups, _located(result, self.point))
-        load = np.zeros_like(result.u)
-        load[nodes] = operator[COMPONENTS.index(self.component)]
+        """Return ∫ B^T C dV / V (n, 3) of the component, of the elements around the point."""
+        load, component = np.zeros_like(result.u), COMPONENTS.index(self.component)
+        group = self._around(result)
+        placed, C = group.at(result.mesh.points), group.material.C
+        stress = np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6))
+        add_nodal(load, group.nodes, internal_load_of(placed, stress, C))
         return load
+
+    def local(self, result: Solved) -> Array:
+        """Return the difference of the error at the point, by recovered stresses, from its mean around."""
+        c, group = COMPONENTS.index(self.component), self._around(result)
+        recovered = result.stress(at="node")
+        located = _located(result, self.point)
+        at_point = float(located.interpolate(recovered)[c]) - self.value(result)
+        N, _ = tabulate(group.element.shape, group.rule)
+        volume = volumes(result.mesh.points, group)
+        off = recovered[group.nodes][..., c] @ N.T - result.stress(at="element")[group.rows, None, c]
+        out = np.zeros(result.mesh.n_elements)
+        out[located.rows] = at_point - (off * volume).sum() / volume.sum()
+        return out
+
+    def _around(self, result: Solved) -> ElementGroup:
+        """Return the elements that share a corner with that of the point, of the same group."""
+        row = _located(result, self.point).rows
+        group = next(group for group in result.groups if (group.rows == row).any())
+        corners = group.nodes[:, : group.element.shape.corners]
+        return group.take(np.asarray(np.isin(corners, corners[group.rows == row]).any(axis=1)))
 
     def __repr__(self) -> str:
         return f"StressAt({self.point.tolist()}, {self.component!r})"
@@ -292,6 +328,10 @@ class StressAt(Quantity):
 def _located(result: Solved, point: Array) -> Located:
     """Return where a point lies in the mesh of a result."""
     return result.mesh.locate(point, required=True)
+
+
+def _unit(axis: str) -> Array:
+    return np.eye(3)[AXES.index(axis)]
 
 
 def _name(part: Where) -> str:

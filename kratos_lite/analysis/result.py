@@ -390,7 +390,7 @@ class Result:
     @cached_property
     def _error(self) -> ErrorEstimate:
         squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
-        return energy_error(*squares, 2 * self.energy())
+        return energy_error(*squares, 2 * self.energy(), self.groups)
 
     # ---- out -----------------------------------------------------------------------------------
 
@@ -414,8 +414,10 @@ class Result:
             *report.load_rows(forces),
             ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),
+            ("estimated error", str(self._error)),
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
             *report.solution_rows(),
+            *[("warning", text) for text in self._error.warnings],
         ]
 
     def __str__(self) -> str:

@@ -77,7 +77,7 @@ def internal_load(
     A rotation needs no force.
 
     >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1.0, nu=0.3))
+    >>> model = kl.Model(kl.box(element="KinematicLinear3D8N"), kl.Isotropic3D(E=1.0, nu=0.3))
     >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
     True
@@ -201,7 +201,7 @@ def highest_frequency(
     for group in groups:
         if not group.material.density > 0:
             raise MaterialError("an angular frequency needs a density > 0; give the material its density")
-        alike = q is None and group.element.inherits(*GEOMETRY, *MECHANICS)  # own steps may depend on X
+        alike = q is None and group.element.has_kernels(*GEOMETRY, *MECHANICS)  # own steps may depend on X
         part = _distinct(points, group) if alike else group
         for chunk in part.chunks():
             largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))

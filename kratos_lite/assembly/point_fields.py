@@ -14,7 +14,7 @@ from kratos_lite.elements.overridden_steps import STRAIN, strain_of
 from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located
-from kratos_lite.typing import Array, Rows
+from kratos_lite.typing import Array
 
 
 def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
@@ -36,36 +36,16 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         mine = number[rows[at]]
         X, displaced = (values[group.nodes[mine]] for values in (located.mesh.points, u))
         value = _strain(group, X, xi[at], displaced)
+        if stress and not group.element.inherits("stress"):
+            raise InputError(
+                f"{group.element.__name__} has its own stress, known at Gauss points alone; "
+                "ask for at='gauss'"
+            )
         if stress:
-            value = _stress(group, value)
+            value = group.material.stress(value)
             value = value if group.prestress is None else value + group.prestress[mine]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
-
-
-def stress_operator(groups: Sequence[ElementGroup], located: Located) -> tuple[Rows, Array]:
-    """Return the nodes (k,) of the element that contains one point, and ∂σ/∂u (6, k, 3) in Pa/m there.
-
-    Raises
-    ------
-    InputError
-        As by `at_located`.
-    """
-    group = next(group for group in groups if (group.rows == located.rows).any())
-    nodes = group.nodes[group.rows == located.rows][0]
-    k = len(nodes)
-    X, xi = (np.broadcast_to(one, (3 * k, *one.shape)) for one in (located.mesh.points[nodes], located.xi))
-    stress = _stress(group, _strain(group, X, xi, np.eye(3 * k).reshape(3 * k, k, 3)))
-    return nodes, stress.T.reshape(6, k, 3)
-
-
-def _stress(group: ElementGroup, strain: Array) -> Array:
-    """Return the stress (k, 6) of strains, without prestress."""
-    if not group.element.inherits("stress"):
-        raise InputError(
-            f"{group.element.__name__} has its own stress, known at Gauss points alone; ask for at='gauss'"
-        )
-    return group.material.stress(strain)
 
 
 def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:

@@ -12,7 +12,7 @@ from kratos_lite.typing import Array, Ints, Mask, Rows
 
 TERMS = 20
 """Monomials up to degree 3."""
-DEPENDENT, FLAT, ALIGNED = 1e-3, 1e-12, 1e-6
+DEPENDENT, NOTHING, FLAT, ALIGNED = 1e-3, 1e-6, 1e-12, 1e-6
 """See ``native/recovery.hpp``."""
 
 
@@ -210,7 +210,8 @@ def _solve(M: Rows, b: Array) -> tuple[Array, Mask]:
     diagonal = np.einsum("pii->pi", M).copy()
     used = np.zeros(M.shape[:2], dtype=bool)
     for i in range(n):
-        used[:, i] = M[:, i, i] > DEPENDENT * diagonal[:, i]
+        least = np.maximum(diagonal[:, i], NOTHING * diagonal[:, 0])
+        used[:, i] = M[:, i, i] > DEPENDENT * least
         inverse = np.where(used[:, i], 1 / np.where(used[:, i], M[:, i, i], 1.0), 0.0)
         factor = M[:, i, i + 1 :] * inverse[:, None]
         M[:, i + 1 :, i + 1 :] -= factor[:, :, None] * M[:, i, None, i + 1 :]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -125,34 +125,42 @@ class Region:
         return total / count[:, None]
 
 
+_KNOWN: WeakKeyDictionary[Mesh, tuple[Ints, Ints, list[tuple[Ints, Patches]]]] = WeakKeyDictionary()
+"""Material number and place in its region of each element, and nodes and patches of each region, by mesh."""
+
+
 def _regions(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[Region]:
-    """Return the groups by material, with their patches."""
+    """Return the groups by material, with their patches, which a mesh keeps."""
     by_material: dict[int, list[ElementGroup]] = {}
     for group in groups:
         by_material.setdefault(id(group.material), []).append(group)
-    kind = np.full(mesh.n_elements, -1)
-    for i, mine in enumerate(by_material.values()):
-        for group in mine:
-            kind[group.rows] = i
-    kinds, outer = outer_corners(mesh, kind)
-    order = np.argsort(kinds, kind="stable")
-    cuts = np.searchsorted(kinds[order], np.arange(len(by_material) + 1))
-    parts = [outer[order[a:b]] for a, b in pairwise(cuts)]
-    return [_region(mesh, mine, part) for mine, part in zip(by_material.values(), parts, strict=True)]
+    parts = list(by_material.values())
+    kind, place = np.full(mesh.n_elements, -1), np.zeros(mesh.n_elements, dtype=np.int64)
+    for i, mine in enumerate(parts):
+        rows = np.concatenate([group.rows for group in mine])
+        kind[rows], place[rows] = i, np.arange(len(rows))
+    known = _KNOWN.get(mesh)
+    if known is None or not (np.array_equal(known[0], kind) and np.array_equal(known[1], place)):
+        kinds, outer = outer_corners(mesh, kind)
+        made = [_patches(mesh, mine, outer[kinds == i]) for i, mine in enumerate(parts)]
+        known = _KNOWN[mesh] = kind, place, made
+    return [_region(mesh, mine, *found) for mine, found in zip(parts, known[2], strict=True)]
 
 
-def _region(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> Region:
-    """Return groups as a region; `outer` are the corners of the faces on its surface."""
+def _region(mesh: Mesh, groups: list[ElementGroup], nodes: Ints, around: Patches) -> Region:
+    number = np.zeros(mesh.n_nodes, dtype=np.int64)
+    number[nodes] = np.arange(len(nodes))
+    return Region(groups, nodes, [number[group.nodes] for group in groups], around)
+
+
+def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints, Patches]:
+    """Return nodes and patches of groups; `outer` are the corners of the faces on their surface."""
     used, on_surface = np.zeros(mesh.n_nodes, dtype=bool), np.zeros(mesh.n_nodes, dtype=bool)
     for group in groups:
         used[group.nodes] = True
     on_surface[outer] = True
     nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
-    cells = [number[group.nodes] for group in groups]
-    blocks = [
-        Block("", of, group.rows, 0 * group.rows, group.element.shape)
-        for of, group in zip(cells, groups, strict=True)
-    ]
+    blocks = [Block("", number[g.nodes], g.rows, 0 * g.rows, g.element.shape) for g in groups]
     hanging, masters = NO_ROWS, Lists(np.zeros(1, dtype=np.int64), NO_ROWS)
     if mesh.hanging is not None:
         here = used[mesh.hanging.nodes]
@@ -160,7 +168,7 @@ def _region(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> Region:
         every = Lists(mesh.hanging.start, mesh.hanging.masters).take(np.flatnonzero(here))
         kept = used[every.entries]
         masters = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
-    return Region(groups, nodes, cells, patches(blocks, on_surface[nodes], hanging, masters))
+    return nodes, patches(blocks, on_surface[nodes], hanging, masters)
 
 
 class Recovery:
@@ -175,6 +183,7 @@ class Recovery:
     def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> None:
         self.points, self.groups = mesh.points, list(groups)
         self.regions = _regions(mesh, groups)
+        self._last: tuple[Array, list[Array]] | None = None  # displacements, and C ε at nodes
 
     def nodal(self, u: Array, *, stress: bool = True) -> Array:
         """Return recovered stresses with prestress in Pa, or strains, at nodes (n, 6).
@@ -189,9 +198,17 @@ class Recovery:
 
     def by_region(self, u: Array, *, stress: bool = True) -> Iterator[tuple[Region, Array]]:
         """Yield each region with the values at its nodes (k, 6)."""
+        free = stress and all(group.prestress is None for group in self.groups)
+        if free and self._last is not None and self._last[0] is u:
+            yield from zip(self.regions, self._last[1], strict=True)
+            return
+        found = []
         for region in self.regions:
             values = [at_gauss(self.points, group, u, stress=stress) for group in region.groups]
-            yield region, region.at_nodes(self.points, values)
+            found.append(region.at_nodes(self.points, values))
+            yield region, found[-1]
+        if free:
+            self._last = u, found
 
     def differences(self, u: Array) -> Iterator[tuple[ElementGroup, Array]]:
         """Yield each group with recovered minus own stresses at its points, (m, g, 6) in Pa.
@@ -215,13 +232,18 @@ class Recovery:
 
     def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array, Array]]:
         """Yield each group, its nodes in the region, C ε at its points, and this recovered and averaged."""
-        for region in self.regions:
+        known = self._last[1] if self._last is not None and self._last[0] is u else []
+        found = []
+        for i, region in enumerate(self.regions):
             plain = [replace(group, prestress=None) for group in region.groups]
             values = [at_gauss(self.points, group, u) for group in plain]
-            nodal, averaged = region.at_nodes(self.points, values), region.averaged(values)
+            nodal = known[i] if known else region.at_nodes(self.points, values)
+            averaged = region.averaged(values)
+            found.append(nodal)
             for group, nodes, value in zip(plain, region.cells, values, strict=True):
                 fine = _compared_at(group)
                 yield fine, nodes, value if fine is group else at_gauss(self.points, fine, u), nodal, averaged
+        self._last = u, found
 
 
 def _compared_at(group: ElementGroup) -> ElementGroup:

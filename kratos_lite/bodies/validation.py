@@ -15,6 +15,7 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_material
 from kratos_lite.model.mass_properties import MassProperties
+from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
@@ -34,7 +35,9 @@ def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> l
     """
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
     structure.check_geometry()
-    return structure.element_groups(unnamed)
+    groups = structure.element_groups(unnamed)
+    check_spurious_modes(mesh, groups, None, mesh.all_faces)
+    return groups
 
 
 def mass_properties_of(mesh: Mesh, material: Material) -> MassProperties:

@@ -109,7 +109,7 @@ class BBar(KinematicLinear):
         projected = self._projected(xi.reshape(-1, 3)) @ u.reshape(*u.shape[:-2], -1, 1)
         dilatation = strain[..., :3].sum(axis=-1)
         share = 1 - self.kept(C)
-        share = share.reshape(*share.shape, *[1] * (dilatation.ndim - share.ndim))
+        share = share.reshape(share.shape + (1,) * (dilatation.ndim - share.ndim))
         strain[..., :3] += (share * (projected.reshape(dilatation.shape) - dilatation) / 3)[..., None]
         return strain
 

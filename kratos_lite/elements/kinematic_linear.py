@@ -105,7 +105,7 @@ class KinematicLinear(CellMass):
 
     @classmethod
     def inherits(cls, *methods: str) -> bool:
-        """Return whether a class has these methods from `KinematicLinear`, so that kernels may replace them.
+        """Return whether a class has these methods from `KinematicLinear`, so that short ways may be taken.
 
         Parameters
         ----------

@@ -99,7 +99,7 @@ def _sides(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
 def box(
     size: Sequence[float] = (1.0, 1.0, 1.0),
     cells: Sequence[int] = (1, 1, 1),
-    element: str = "KinematicLinear3D8N",
+    element: str = "Element3D8N",
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Mesh:
     """Return a box with parts ``x- x+ y- y+ z- z+``, the nodes of its six sides.
@@ -138,7 +138,7 @@ def annulus(
     outer: float,
     width: float,
     cells: Sequence[int] = (2, 16, 1),
-    element: str = "KinematicLinear3D20N",
+    element: str = "Element3D20N",
 ) -> Mesh:
     """Return a hollow cylinder about z with parts ``inner outer z- z+``.
 

@@ -82,7 +82,7 @@ def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Finer:
     --------
     >>> from kratos_lite import box
     >>> raised(box()).mesh.blocks[0].name
-    'KinematicLinear3D20N'
+    'Element3D20N'
     """
     if mesh.hanging is not None:
         raise MeshError("a mesh with hanging nodes keeps its order: raise the order first, then refine")

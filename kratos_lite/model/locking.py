@@ -18,7 +18,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.formulations import bulk_over_shear, formulations_of, is_own
 from kratos_lite.elements.overridden_steps import MECHANICS
-from kratos_lite.mesh import Faces, Mesh, with_rows
+from kratos_lite.mesh import Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Ints, Mask
@@ -170,7 +170,7 @@ def _walls(across: OppositeFaces, groups: Sequence[ElementGroup], fixed: Mask) -
     start = np.flatnonzero((across.mate < 0) & (across.opposite >= 0) & looked_at[element])
     start = start[~_held(mesh, across.corners(start), fixed)]
     length, taper = _extents(across, start)
-    most = float(np.ptp(mesh.points, axis=0).max()) / SLENDER
+    most = _sizes(across)[element[start]] / SLENDER
     most_shear = max(_shear_over_young(group.material.C) for group in groups)
     limit = np.minimum(most, length.max(axis=1, initial=0.0) * np.sqrt(max(most_shear / STIFF, 1.0)))
     thickness, layers, end = _thickness(across, start, limit)
@@ -181,6 +181,22 @@ def _walls(across: OppositeFaces, groups: Sequence[ElementGroup], fixed: Mask) -
     rows, longest = np.arange(len(start)), length.argmax(axis=1)
     walls = Walls(element[start], thickness, layers, length[rows, longest], taper[rows, longest])
     return walls.take(kept & (walls.length > 0))
+
+
+def _sizes(across: OppositeFaces) -> Array:
+    """Return the extent in m of the body, joined by faces, that each element belongs to."""
+    faces, points = across.faces, across.mesh.points
+    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
+    body = components(across.mesh.n_elements, joined)
+    if not body.any():
+        return np.full(len(body), np.ptp(points, axis=0).max())
+    low, high = np.full((len(body), 3), np.inf), np.full((len(body), 3), -np.inf)
+    for block, rows in with_rows(across.mesh.blocks):
+        X = points[block.nodes]
+        np.minimum.at(low, body[rows], X.min(axis=1))
+        np.maximum.at(high, body[rows], X.max(axis=1))
+    size: Array = (high - low).max(axis=1)[body]
+    return size
 
 
 def _thickness(across: OppositeFaces, start: Ints, limit: Array) -> tuple[Array, Ints, Ints]:

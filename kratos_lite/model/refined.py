@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from kratos_lite.errors import ModelError
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Fixing
@@ -53,7 +53,11 @@ def refined(structure: S, finer: Finer) -> S:
         raise ModelError(
             "a model whose material moves through the mesh cannot be carried over to a finer one"
         )
-    new = type(structure)(finer.mesh, formulation=structure.formulation)
+    new = type(structure)(finer.mesh)
+    try:
+        new.formulation = structure.formulation
+    except InputError:
+        new.formulation = None  # of linear elements, which have become quadratic ones
     new._materials = list(structure._materials)
     new._material_of = structure._material_of[finer.elements]
     _carry_rules(structure, new, finer)

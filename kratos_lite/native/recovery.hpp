@@ -15,6 +15,7 @@ namespace kl {
 
 constexpr int TERMS = 20, ROW = 32;  // monomials up to degree 3; these and six values, padded
 constexpr double DEPENDENT = 1e-3;   // share of a monomial that those before it leave
+constexpr double NOTHING = 1e-6;      // sum of squares of a monomial / that of 1, below which it is rounding
 constexpr double FLAT = 1e-12;       // least spread along an axis / largest, squared
 constexpr double ALIGNED = 1e-6;     // share of a product of inertia that counts as rounding
 
@@ -142,7 +143,7 @@ inline bool solve(double (&M)[TERMS][ROW], int n, double* terms) {
     double diagonal[TERMS];
     for (int i = 0; i < n; ++i) diagonal[i] = M[i][i];
     for (int i = 0; i < n; ++i) {  // M = L D L^T, from the left; rows below are reduced at once
-        used[i] = M[i][i] > DEPENDENT * diagonal[i];
+        used[i] = M[i][i] > DEPENDENT * std::fmax(diagonal[i], NOTHING * diagonal[0]);
         all &= used[i];
         if (!used[i]) continue;
         for (int k = i + 1; k < n; ++k) {

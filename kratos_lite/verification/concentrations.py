@@ -44,11 +44,11 @@ def hole(kind: str, n: int = 6, nu: float = scenes.UNIT.nu) -> Scene:
 
 
 def _hole_stress(result: Result) -> float:
-    return float(result.stress("node")[nearest(result.mesh, (0, 1, 0)), 0])
+    return float(result.stress("averaged")[nearest(result.mesh, (0, 1, 0)), 0])
 
 
 def _cavity_stress(result: Result) -> float:
-    return float(result.stress("node")[nearest(result.mesh, (1, 0, 0)), 2])
+    return float(result.stress("averaged")[nearest(result.mesh, (1, 0, 0)), 2])
 
 
 def _cook_middle(result: Result) -> float:

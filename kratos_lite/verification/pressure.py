@@ -81,7 +81,7 @@ def sphere(kind: str) -> tuple[Model, ...]:
 
 def _hoop(result: Result) -> float:
     """Return the hoop stress at (1, 0, 0), a mean over the elements around the node."""
-    return float(result.stress("node")[nearest(result.mesh, (1, 0, 0)), 1])
+    return float(result.stress("averaged")[nearest(result.mesh, (1, 0, 0)), 1])
 
 
 def _sphere_radial(result: Result) -> float:

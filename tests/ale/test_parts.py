@@ -77,7 +77,8 @@ def test_two_bodies_with_one_in_motion_are_two_models(element):
     results = [model.solve() for model in (both, wheel, rail)]
     same(results[0].u, results[1].u, results[2].u, tolerance=1e-11)
     same(results[0].reactions, results[1].reactions, results[2].reactions, tolerance=1e-10)
-    assert results[0].report.warnings == results[1].report.warnings
+    warnings = [[w for w in r.report.warnings if "in bending" not in w] for r in results]
+    assert warnings[0] == warnings[1]
     for key in ("critical_rate", "critical_rate_of_waves"):
         assert results[0].report.motion[key] == pytest.approx(results[1].report.motion[key], rel=1e-6)
     for key in ("support_force", "support_moment"):

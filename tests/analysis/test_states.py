@@ -12,7 +12,7 @@ RUBBER = kl.Isotropic3D(E=1e6, nu=0.3, density=1000.0)
 
 
 def shaken_bar():
-    model = kl.Model(kl.box((0.2, 0.2, 1.0), cells=(1, 1, 4)), RUBBER)
+    model = kl.Model(kl.box((0.2, 0.2, 1.0), cells=(1, 1, 4), element="KinematicLinear3D8N"), RUBBER)
     model.fix("z-")
     model.add(kl.Gravity((9.81, 0, 0)))
     return model

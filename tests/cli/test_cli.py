@@ -229,6 +229,39 @@ def test_elem_set_by_hand_by_any_of_its_files_or_its_stem(run, folder):
         assert found["displacement"]["4"][2] == pytest.approx(-weight / 4 / (1.2e6 / 6), rel=1e-12)
 
 
+@pytest.mark.parametrize("word", ["standard", "enhanced", "b_bar", "non_locking"])
+def test_the_formulation_of_the_elements_is_an_option_and_a_key_of_run_files(run, box, word):
+    words = ["--traction", "z+:1e5,0,0", "--formulation", word, "--json", "out.json"]
+    assert run("solve", "box.vtu", *HELD, *words).code == 0
+    model = kl.Model(box, LAW, formulation=word)
+    model.fix("z-")
+    model.add(kl.Traction("z+", (1e5, 0.0, 0.0)))
+    assert same(displacement("out.json"), model.solve().displacement())
+    found = json.loads(Path("out.json").read_text())
+    assert found["formulation"].startswith(f"{word}, as asked for: ")
+    Path("run.json").write_text(
+        json.dumps(
+            {
+                "model": "box.vtu",
+                "formulation": word,
+                "material": {"E": LAW.E, "nu": LAW.nu, "density": LAW.density},
+                "fix": {"z-": "xyz"},
+                "traction": {"z+": [1e5, 0, 0]},
+                "json": "by_file.json",
+            }
+        )
+    )
+    assert run("solve", "run.json").code == 0
+    assert same(displacement("by_file.json"), displacement("out.json"), 1e-14)
+
+
+def test_a_formulation_that_a_run_file_misspells_is_refused_at_its_place(run, box):
+    Path("run.json").write_text('{"model": "box.vtu",\n "formulation": "enhnced"}')
+    assert run("solve", "run.json").refuses(
+        "run.json:2:", "formulation must be one of", "Did you mean enhanced?"
+    )
+
+
 def test_run_file_says_the_same_as_options(run, box):
     Path("run.json").write_text(
         json.dumps(
@@ -323,7 +356,7 @@ def test_check_tells_warnings_and_what_is_missing(run, folder):
 def test_check_tells_all_that_is_missing_at_once(run, box):
     needs = [line for line in run("check", "box.vtu").out.splitlines() if line.startswith("to solve")]
     assert len(needs) == 2
-    assert "element 1 (KinematicLinear3D8N) has no material" in needs[0]
+    assert "element 1 (Element3D8N) has no material" in needs[0]
     assert "can still move: translation x, y, z; rotation about x, y, z" in needs[1]
 
 
@@ -455,7 +488,16 @@ WRONG_OPTIONS = {
         ["--material", "Isotropic3D:E=1e-60,nu=0.3,density=1e49", "--fix", "z-:xyz", "--gravity", "0,0,1e50"],
         "numbers exceed what a computer holds",
     ),
-    "no material": (["--fix", "z-:xyz"], "element 1 (KinematicLinear3D8N) has no material"),
+    "no material": (["--fix", "z-:xyz"], "element 1 (Element3D8N) has no material"),
+    "misspelt formulation": (
+        [*HELD, "--formulation", "enhnced"],
+        "--formulation: formulation must be one of b_bar, enhanced, non_locking, reduced, standard; got",
+    ),
+    "no such formulation": (
+        [*HELD, "--formulation", "reduced"],
+        "there is no formulation 'reduced' of elements with 8 nodes",
+    ),
+    "formulation of a body": ([*HELD, "--formulation", "modal"], "--formulation: formulation must be one of"),
 }
 
 

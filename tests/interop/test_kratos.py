@@ -519,3 +519,18 @@ def test_values_at_integration_points_and_local_systems_are_those_of_kratos(kind
         assert (
             abs(local.M.sum() / np.array(theirs["M"]).sum() - 1) < 1e-3
         )  # by other rules on distorted cells
+
+
+def test_mean_dilatation_is_that_of_kratos(tmp_path):
+    """SmallDisplacementBbarElement3D8N against BBar3D8N, on distorted cells with ν near ½."""
+    rubber = kl.Isotropic3D(E=1e6, nu=0.499, density=1000.0)
+    model = kl.Model(distorted_cube(8, 2), rubber, formulation="b_bar")
+    model.fix("z-", "xyz")
+    model.fix("z+", "x", 1e-3)
+    model.add(kl.Gravity((3.0, -2.0, -9.81)))
+    assert kl.write(tmp_path / "cube.mdpa", model) == []
+    (found,) = ask(tmp_path, [{"mdpa": str(tmp_path / "cube.mdpa"), "solve": True}])
+    for element in (1, model.mesh.n_elements):
+        assert_close(model.local_system(element).K, np.array(found["elements"][str(element)]["K"]), 1e-12)
+    assert_close(model.solve().u, by_node(model.mesh, found["displacement"]), 1e-9)
+    assert [group.element for group in kl.read(tmp_path / "cube.mdpa").element_groups()] == [kl.BBar3D8N]

@@ -320,7 +320,7 @@ def test_points_outside_are_told_from_points_inside(name):
 
 
 def test_the_error_says_which_point_how_far_and_the_cure():
-    mesh = kl.box((1.0, 1.0, 1.0), (2, 1, 1))
+    mesh = kl.box((1.0, 1.0, 1.0), (2, 1, 1), element="KinematicLinear3D8N")
     points = [[0.5, 0.5, 0.5], [1.25, 0.5, 0.5], [0.0, 0.0, 9.0]]
     with pytest.raises(
         MeshError,

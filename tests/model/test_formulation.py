@@ -87,7 +87,7 @@ def test_a_model_whose_mesh_names_its_elements_says_nothing_about_formulations()
 @pytest.mark.parametrize(
     ("element", "word", "message"),
     [
-        ("KinematicLinear3D4N", "enhanced", r"element 1 \(KinematicLinear3D4N\): there is no formulation 'en"),
+        ("KinematicLinear3D4N", "enhanced", r"element 1 \(KinematicLinear3D4N\): there is no formulation"),
         ("KinematicLinear3D4N", "b_bar", "of elements with 4 nodes .* there is standard, non_locking"),
         ("KinematicLinear3D20N", "enhanced", "there is standard, reduced, b_bar, non_locking"),
         ("KinematicLinear3D8N", "reduced", "there is standard, enhanced, b_bar, non_locking"),

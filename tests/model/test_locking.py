@@ -126,6 +126,15 @@ def test_sound_elements_near_incompressibility_are_not_warned_of(element):
     assert warnings((1, 1, 1), (2, 2, 2), element, kl.Isotropic3D(E=1e6, nu=0.4999)) == []
 
 
+def test_bodies_far_apart_are_looked_at_one_by_one():
+    one = kl.box(element=PLAIN)
+    points = np.vstack([one.points, [*one.points, 20.0, 0, 0]])
+    nodes = one.blocks[0].nodes
+    model = kl.Model(kl.Mesh(points, {PLAIN: np.vstack([nodes, nodes + 8])}), STEEL)
+    model.fix("z-")
+    assert model.check() == []
+
+
 def test_the_forecast_stands_in_the_report_and_in_the_table():
     model = kl.Model(kl.box((10, 1, 0.1), (10, 1, 1), PLAIN), STEEL)
     model.fix("x-")

@@ -15,6 +15,7 @@ class Mutation(NamedTuple):
 ELEMENTS = "tests/testing/test_registered.py"
 STIFFNESS = "tests/assembly/test_stiffness.py"
 GAUSS = "tests/assembly/test_gauss_point_fields.py"
+CONDENSED = "tests/assembly/test_condensed_kernels.py"
 STRAIN = "tests/assembly/test_finite_strain.py"
 TRANSIENT = "tests/analysis/test_transient.py"
 SIGNS = "tests/analysis/test_signs_and_orders.py"
@@ -486,6 +487,21 @@ MUTATIONS = [
         "diagonal[a] += N[a] * N[a] * det;",
         "diagonal[a] += N[a] * det;",
         MASS + " -k scaled_diagonal",
+    ),
+    Mutation("native/condensed.hpp", "gamma[a][h] -= share", "gamma[a][h] += share", CONDENSED),
+    Mutation("native/condensed.hpp", "row[n] -= row[j]", "row[n] += row[j]", CONDENSED),
+    Mutation(
+        "native/gauss_kernels.hpp",
+        "deviate<V>(w.addition.share, trace[q], s.stress)",
+        "deviate<V>(1.0, trace[q], s.stress)",
+        CONDENSED,
+    ),
+    Mutation("native/stiffness.cpp", "- (i == j) * k / 2;", "- (i == j) * k;", CONDENSED),
+    Mutation(
+        "elements/kinematic_linear.py",
+        "*methods, *brought(owner, KinematicLinear))",
+        "*methods)",
+        CONDENSED,
     ),
     Mutation(
         "native/sparse.hpp",

@@ -17,6 +17,7 @@ FLAGS = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined",
 TESTS = [
     "tests/native",
     "tests/ale/test_kernel.py",
+    "tests/assembly/test_condensed_kernels.py",
     "tests/assembly/test_stiffness.py",
     "tests/assembly/test_finite_strain.py",
     "tests/io/formats/test_mdpa_kernel.py",

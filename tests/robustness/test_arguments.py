@@ -115,8 +115,14 @@ WRONG = {
     "tolerance word": (lambda: model().solve(tolerance="a"), "tolerance must be a number between 0 and 1"),
     "progress": (lambda: model().solve(progress=5), "progress must be a function"),
     "dense": (lambda: kl.Model(kl.box(cells=(15, 15, 15)), STEEL).solve("dense"), "can still move"),
-    "place": (lambda: model().solve().stress("nodes"), "at must be one of gauss, element, node; got 'nodes'"),
-    "place none": (lambda: model().solve().strain(None), "at must be one of gauss, element, node"),
+    "place": (
+        lambda: model().solve().stress("nodes"),
+        "at must be one of gauss, element, node, averaged, raw; got 'nodes'",
+    ),
+    "place none": (
+        lambda: model().solve().strain(None),
+        "at must be one of gauss, element, node, averaged, raw",
+    ),
     "part of result": (lambda: model().solve().displacement("nope"), "there is no part 'nope'"),
     "box size": (lambda: kl.box((-1, 1, 1)), "size must be three lengths > 0 m"),
     "box size word": (lambda: kl.box("abc"), "size must be made of real numbers; got 'abc'"),

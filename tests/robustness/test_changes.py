@@ -14,7 +14,7 @@ ROCK = kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0)
 
 def pressed(stress=1e5):
     """Return a block between two plates, with initial stress."""
-    model = kl.Model(kl.box(cells=(2, 2, 2)), ROCK)
+    model = kl.Model(kl.box(cells=(2, 2, 2), element="KinematicLinear3D8N"), ROCK)
     model.fix("z-")
     model.fix("z+", "z", 1e-3)
     model.add_prestress([stress, 0, 0, 0, 0, 0])

@@ -14,7 +14,7 @@ STEEL = kl.Isotropic3D(E=2e9, nu=0.3, density=1000.0)
 
 def bodies(n=3, cells=(2, 2, 2), held="z-"):
     """Return n bricks side by side that do not touch, each with a clamped bottom and a part of its own."""
-    meshes = [kl.box(cells=cells, origin=(1.5 * i, 0, 0)) for i in range(n)]
+    meshes = [kl.box(cells=cells, element="KinematicLinear3D8N", origin=(1.5 * i, 0, 0)) for i in range(n)]
     size, blocks, parts = meshes[0].n_nodes, [], {}
     for i, mesh in enumerate(meshes):
         old, m = mesh.blocks[0], mesh.n_elements

@@ -31,7 +31,7 @@ CELLS = {
     "hexahedron": "Hexahedron8", "hexahedron20": "Hexahedron20", "hexahedron27": "Hexahedron27",
 }  # fmt: skip
 """Our shape of each cell type of meshio."""
-_NAMES = ("PointCondition3D{}N", "LineCondition3D{}N", "SurfaceCondition3D{}N", "KinematicLinear3D{}N")
+_NAMES = ("PointCondition3D{}N", "LineCondition3D{}N", "SurfaceCondition3D{}N", "Element3D{}N")
 _PROPERTY_KEYS = ("gmsh:physical", "nastran:ref", "medit:ref", "PROPERTIES_ID")
 _INT32 = 2**31 - 1
 _OPTIONS = {
@@ -284,7 +284,7 @@ class _Reading:
         VTK's text inverts its linear wedge, VTK's formulas (and most writers) do not; the sign of
         the volume tells which was meant.
         """
-        if block.name != "KinematicLinear3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
+        if block.name != "Element3D6N" or self.path.suffix.lower() not in {".vtk", ".vtu"}:
             return block
         X = self.found.points[block.nodes]
         upward = X[:, 3:].sum(axis=1) - X[:, :3].sum(axis=1)

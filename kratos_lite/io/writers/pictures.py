@@ -15,11 +15,15 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.writers.results import fields
 from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
 
-NAMES = {"VON_MISES_STRESS": "von Mises stress"}
+NAMES = {
+    "VON_MISES_STRESS": "von Mises stress",
+    "ENERGY_NORM_ERROR": "estimated error in the energy norm, √J of an element",
+}
 """Titles where the words of the variable do not do."""
 
 
@@ -42,7 +46,7 @@ def draw(
     thing : a mesh; or a result, whose displacement is drawn if no other is given.
     displacement : (n, 3) m; the undeformed edges are drawn thin.
     values : (n,) numbers on the nodes that color the surface; of a result also the name of a nodal field,
-        ``VON_MISES_STRESS`` if nothing is given.
+        ``VON_MISES_STRESS`` if nothing is given; ``ENERGY_NORM_ERROR`` draws the estimated error.
     title : first line above the picture.
     unit : of `values`, at the color bar; found from the title if it names a variable that we know.
     scale : factor on the displacement; by default at least 1, the largest being a tenth of the body.
@@ -78,15 +82,27 @@ def draw(
 
 def _field(result: Result, name: str) -> tuple[Array, str]:
     """Return a nodal field as one number a node, and the title for it."""
+    if name == "ENERGY_NORM_ERROR":
+        return _around_nodes(result.mesh, result.error().per_element), NAMES[name]
     points, _ = fields(result)
     if name not in points:
-        raise InputError(f"there is no nodal field {name!r}; have {', '.join(points)}")
+        raise InputError(f"there is no nodal field {name!r}; have {', '.join(points)}, ENERGY_NORM_ERROR")
     field = points[name]
     if name == "CAUCHY_STRESS_VECTOR":
         field, name = voigt.von_mises(field), "VON_MISES_STRESS"
     elif field.ndim == 2:
         field = np.linalg.norm(field, axis=1)
     return field, NAMES.get(name, name.replace("_", " ").lower())
+
+
+def _around_nodes(mesh: Mesh, values: Array) -> Array:
+    """Return the means (n,) of values of elements (m,) around each node."""
+    total, count = np.zeros(mesh.n_nodes), np.zeros(mesh.n_nodes)
+    for block, at in with_rows(mesh.blocks):
+        nodes = block.nodes.ravel()
+        total += np.bincount(nodes, np.repeat(values[at], block.nodes.shape[1]), mesh.n_nodes)
+        count += np.bincount(nodes, minlength=mesh.n_nodes)
+    return total / np.maximum(count, 1)
 
 
 def draw_element(

@@ -39,7 +39,13 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
         "VON_MISES_STRESS": voigt.von_mises(nodal),
         **points,
     }
-    return points, {"CAUCHY_STRESS_VECTOR": mean, "VON_MISES_STRESS": voigt.von_mises(mean), **cells}
+    cells = {
+        "CAUCHY_STRESS_VECTOR": mean,
+        "VON_MISES_STRESS": voigt.von_mises(mean),
+        "ENERGY_NORM_ERROR": result.error().per_element,
+        **cells,
+    }
+    return points, cells
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
@@ -66,6 +72,7 @@ def summary(result: Result) -> dict[str, Any]:
     length = np.linalg.norm(result.u, axis=1)
     top = int(length.argmax())
     energy, mises, row = result.totals()
+    error = result.error()
     return {
         "nodes": mesh.n_nodes,
         "elements": element_counts(mesh, result.groups, report.formulation),
@@ -75,6 +82,12 @@ def summary(result: Result) -> dict[str, Any]:
         "total_reaction": report.total_reaction.tolist(),
         "largest_displacement": {"value": float(length[top]), "node": int(mesh.node_ids[top])},
         "strain_energy": energy,
+        "estimated_error": {
+            "relative": error.relative,
+            "absolute": error.absolute,
+            "method": error.method,
+            "warnings": error.warnings,
+        },
         "largest_von_mises_stress": {"value": mises, "element": int(mesh.element_ids[row])},
         "solver": report.solver,
         "reason": report.reason,

@@ -21,7 +21,7 @@ def one(name):
     x, y, z = shape.nodes.T
     X = shape.nodes + 0.05 * np.stack([y * z + z**2, x**2 + z, x * y + x], axis=-1)
     nodes = np.arange(len(X), dtype=np.int32)[None]
-    return Mesh(X, [Block(f"KinematicLinear3D{len(X)}N", nodes, np.array([1]), np.array([4]), shape)])
+    return Mesh(X, [Block(f"Element3D{len(X)}N", nodes, np.array([1]), np.array([4]), shape)])
 
 
 @pytest.mark.parametrize("ending", ["vtk", "vtu", "own.vtu"])
@@ -111,10 +111,10 @@ def volume(block, points):
 @pytest.mark.parametrize(
     ("recombine", "incomplete", "solid", "faces"),
     [
-        (0, 0, "KinematicLinear3D10N", {"SurfaceCondition3D6N"}),
-        (1, 0, "KinematicLinear3D27N", {"SurfaceCondition3D9N"}),
-        (1, 1, "KinematicLinear3D20N", {"SurfaceCondition3D8N"}),
-        (2, 1, "KinematicLinear3D15N", {"SurfaceCondition3D6N", "SurfaceCondition3D8N"}),
+        (0, 0, "Element3D10N", {"SurfaceCondition3D6N"}),
+        (1, 0, "Element3D27N", {"SurfaceCondition3D9N"}),
+        (1, 1, "Element3D20N", {"SurfaceCondition3D8N"}),
+        (2, 1, "Element3D15N", {"SurfaceCondition3D6N", "SurfaceCondition3D8N"}),
     ],
 )
 def test_gmsh_files_of_second_order_give_the_volume_and_the_named_parts(
@@ -282,9 +282,7 @@ def test_warnings_of_meshio_become_notes(tmp_path, monkeypatch):
 def test_elements_listed_twice_in_a_gmsh_file_are_refused(tmp_path):
     twice = [("tetra", [[0, 1, 2, 3], [0, 1, 2, 3]])]
     meshio.Mesh(np.eye(4, 3), twice).write(tmp_path / "a.msh", file_format="gmsh22")
-    with pytest.raises(
-        InputError, match=r"KinematicLinear3D4N listed twice; save it from Gmsh as version 4\.1"
-    ):
+    with pytest.raises(InputError, match=r"Element3D4N listed twice; save it from Gmsh as version 4\.1"):
         read_meshio(tmp_path / "a.msh")
 
 
