@@ -47,7 +47,7 @@ def _variation(result: Result, along: Ints) -> float:
 
 
 def _off_mean(rule: Rule, axis: int) -> Array:
-    """Return the matrix (g, g) that takes values at the points of a rule to what they differ by from means."""
+    """Return the matrix (g, g) from values at the points of a rule to their differences from means."""
     others = np.delete(rule.points, axis, axis=1)
     same = np.abs(others[:, None] - others[None]).max(axis=2) < 1e-9
     weights = same * rule.weights
