@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cases, curves, report, scenes, sets
+from benchmarks import cases, curves, effectivity, report, scenes, sets
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
 from benchmarks.tables import Row
@@ -93,6 +93,9 @@ def main(words: Sequence[str] | None = None) -> int:
     options = arguments(words)
     if options.command == "report":
         return write_report()
+    if options.command == "effectivity":
+        effectivity.write(effectivity.run(options.scenes, options.elements))
+        return 0
     if options.command == "references":
         return references(options.cells or (4, 8, 16))
     with scratch() as name:
@@ -130,7 +133,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("command", choices=[*COMMANDS, "report", "references"])
+    add("command", choices=[*COMMANDS, "report", "references", "effectivity"])
     add("--programs", nargs="+", choices=[*PROGRAMS, *HELPERS], default=[*PROGRAMS, *HELPERS], metavar="NAME",
         help="some of: " + ", ".join([*PROGRAMS, *HELPERS]))  # fmt: skip
     add(

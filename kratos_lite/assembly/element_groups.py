@@ -25,7 +25,7 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
 
 CHUNK_BYTES = 4_000_000
@@ -136,7 +136,7 @@ def geometries_of(points: Array, group: ElementGroup) -> Geometries:
     return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
 
-def add_nodal(total: Array, nodes: Rows, values: Array) -> None:
+def add_nodal(total: Array, nodes: Numbers, values: Array) -> None:
     """Add element vectors (m, k, 3) to nodal vectors `total` (n, 3)."""
     flat = nodes.ravel()
     for axis in range(total.shape[1]):

@@ -18,7 +18,7 @@ from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
-from kratos_lite.typing import Ints, Mask, Rows
+from kratos_lite.typing import Ints, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +77,12 @@ def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
             chosen = np.flatnonzero(alone[start : start + len(block)])
             picked = block.nodes[chosen][:, list(corners_of(face))]
             found.append(np.repeat(kinds[start + chosen], picked.shape[1]))
-            nodes.append(picked.ravel())
+            nodes.append(picked.ravel().astype(np.int64))
             start += len(block)
     return np.concatenate(found), np.concatenate(nodes)
 
 
-def _corners(blocks: Sequence[Block]) -> Rows:
+def _corners(blocks: Sequence[Block]) -> Ints:
     """Return the corner nodes of all elements (m, c), filled up with -1."""
     counts = [block.shape.corners if block.shape else block.nodes.shape[1] for block in blocks]
     found = np.full((sum(map(len, blocks)), max(counts, default=0)), -1)
@@ -93,7 +93,7 @@ def _corners(blocks: Sequence[Block]) -> Rows:
     return found
 
 
-def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
+def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
     """Return the elements around each corner node, also those that have it in the middle of an edge."""
     element, column = np.nonzero(corners >= 0)
     nodes, elements, first = [corners[element, column]], [element], 0
@@ -101,7 +101,7 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
         c = block.shape.corners if block.shape else block.nodes.shape[1]
         rest = block.nodes[:, c:]
         row, at = np.nonzero(is_corner[rest])
-        nodes.append(rest[row, at])
+        nodes.append(rest[row, at].astype(np.int64))
         elements.append(first + row)
         first += len(block)
     node, element = np.concatenate(nodes), np.concatenate(elements)
@@ -109,7 +109,7 @@ def _around(blocks: Sequence[Block], corners: Rows, is_corner: Mask) -> Lists:
     return lists(node[known], element[known], len(is_corner))
 
 
-def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
+def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
     """Return node and element of all pairs of the patches of nodes on the surface."""
     rows = np.flatnonzero(outer)
     if not len(rows):
@@ -121,13 +121,13 @@ def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -
     inner = usable & ~outer[near]
     # nodes inside count by the elements that they share, others by the elements around them
     pair, at = np.nonzero(inner)
-    codes, count = np.unique(node[pair] * len(outer) + near[pair, at], return_counts=True)
+    codes, count = _distinct(node[pair] * len(outer) + near[pair, at])
     chosen = _largest(codes // len(outer), count, len(outer))
     host, center = codes[chosen] // len(outer), codes[chosen] % len(outer)
     without = np.ones(len(outer), dtype=bool)
     without[host] = False
     pair, at = np.nonzero(usable & without[node][:, None])
-    codes = np.unique(node[pair] * len(outer) + near[pair, at])
+    codes, _ = _distinct(node[pair] * len(outer) + near[pair, at])
     alone, other = codes // len(outer), codes % len(outer)
     size = around.lengths
     best = np.zeros(len(outer), dtype=np.int64)
@@ -137,8 +137,15 @@ def _neighborhoods(around: Lists, corners: Rows, outer: Mask, is_corner: Mask) -
     host, center = np.concatenate([host, alone[chosen]]), np.concatenate([center, other[chosen]])
     patch = around.take(center)
     found = np.concatenate([host[patch.owner] * len(corners) + patch.entries, node * len(corners) + element])
-    found = np.unique(found)
+    found, _ = _distinct(found)
     return found // len(corners), found % len(corners)
+
+
+def _distinct(codes: Ints) -> tuple[Ints, Ints]:
+    """Return the distinct numbers, ascending, and how often each occurs; faster than NumPy's own way."""
+    codes = np.sort(codes)
+    first = np.flatnonzero(np.append(True, codes[1:] != codes[:-1])) if len(codes) else NO_ROWS
+    return codes[first], np.diff(np.append(first, len(codes)))
 
 
 def _largest(owner: Ints, count: Ints, n: int) -> Mask:
@@ -148,7 +155,7 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
     return count == best[owner]
 
 
-def _contain(owner: Ints, element: Ints, corners: Rows) -> Mask:
+def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
     """Return a mask of the elements that have the node as a corner."""
     return (corners[element] == owner[:, None]).any(axis=1)
 

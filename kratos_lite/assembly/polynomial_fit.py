@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import floats
 from kratos_lite.native import kernels
-from kratos_lite.typing import Array, Ints, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 TERMS = 20
 """Monomials up to degree 3."""
@@ -44,7 +44,7 @@ class Lists:
         return Lists(start, self.entries[np.repeat(self.start[rows], lengths) + within])
 
 
-def lists(owner: Ints, entries: Ints, n: int) -> Lists:
+def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
     """Return entries as rows, by the row of each, in their order."""
     start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=n))])
     return Lists(start, entries[np.argsort(owner, kind="stable")])
@@ -204,7 +204,7 @@ def _monomials(y: Array, degree: int) -> Array:
     return np.stack(p, axis=-1)
 
 
-def _solve(M: Rows, b: Array) -> tuple[Array, Mask]:
+def _solve(M: Array, b: Array) -> tuple[Array, Mask]:
     """Return the solutions of normal equations (p, n, n), and whether all monomials were used."""
     M, b, n = M.copy(), b.copy(), M.shape[1]
     diagonal = np.einsum("pii->pi", M).copy()
@@ -220,4 +220,4 @@ def _solve(M: Rows, b: Array) -> tuple[Array, Mask]:
     for i in range(n - 1, -1, -1):
         rest = b[:, i] - (M[:, i, None, i + 1 :] @ x[:, i + 1 :])[:, 0]
         x[:, i] = np.where(used[:, i, None], rest / np.where(used[:, i], M[:, i, i], 1.0)[:, None], 0.0)
-    return x, used.all(axis=1)
+    return x, np.asarray(used.all(axis=1))

@@ -25,7 +25,7 @@ from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
 from kratos_lite.registry import remembered
-from kratos_lite.typing import Array, Ints, Rows
+from kratos_lite.typing import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +67,14 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     points = rule.points
     if shape.cell == "hexahedron" and shape.degree > 1 and len(rule) > 8:
         points = hexahedron(degree=3).points
-        corner = shape.linear()
+        corner = shape.linear() or shape
         at_gauss, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (rule.points, points))
         weighted = at_gauss.T * rule.weights
         T = at_samples @ np.linalg.solve(weighted @ at_gauss, weighted)
     N = np.array([shape.N(xi) for xi in points])
     degree = shape.degree + (0 if simple or shape.cell == "tetrahedron" else 1)
-    near = shape.degree > 1 and shape.cell in ("hexahedron", "tetrahedron")
-    return Sampling(N, T, min(degree, 3), simple, 0.05 if near else 0.5)
+    far = 1.0 if shape.degree == 1 else 0.05 if shape.cell in ("hexahedron", "tetrahedron") else 0.5
+    return Sampling(N, T, min(degree, 3), simple, far)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Region:
 
     groups: list[ElementGroup]
     nodes: Ints
-    cells: list[Rows]
+    cells: list[Ints]
     patches: Patches
 
     def at_nodes(self, points: Array, values: Sequence[Array]) -> Array:
@@ -225,12 +225,12 @@ class Recovery:
         found = np.zeros((2, n_elements))
         for group, nodes, value, *nodal in self._compared(u):
             N, _ = tabulate(group.element.shape, group.rule)
-            dV, S = volumes(self.points, group), np.linalg.inv(group.material.C)
+            dV, S = volumes(self.points, group), floats(np.linalg.inv(group.material.C))
             for row, values in zip(found, nodal, strict=True):
                 row[group.rows] = _squares(values, nodes, N, value, dV, S)
         return found[0], found[1]
 
-    def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Rows, Array, Array, Array]]:
+    def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Ints, Array, Array, Array]]:
         """Yield each group, its nodes in the region, C ε at its points, and this recovered and averaged."""
         known = self._last[1] if self._last is not None and self._last[0] is u else []
         found = []
@@ -254,7 +254,7 @@ def _compared_at(group: ElementGroup) -> ElementGroup:
     return replace(group, rule=rule_for(shape.cell, 2 * shape.degree))
 
 
-def _squares(nodal: Array, cells: Rows, N: Array, value: Array, dV: Array, S: Array) -> Array:
+def _squares(nodal: Array, cells: Ints, N: Array, value: Array, dV: Array, S: Array) -> Array:
     """Return ∫ (N σ* - σ) : S : (N σ* - σ) dV of each element, (m,)."""
     if module := kernels("recovery"):
         rows = np.ascontiguousarray(cells, dtype=np.int32)

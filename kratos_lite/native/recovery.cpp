@@ -1,5 +1,8 @@
 // Recovery of smooth fields from values at points of elements, and the energy of what they differ by.
 
+#include <algorithm>
+#include <vector>
+
 #include "arrays.hpp"
 #include "recovery.hpp"
 
@@ -26,10 +29,17 @@ py::tuple fitted(Numbers X, Numbers values, Indices offset, Indices start, Indic
     require(are_rows(degree, 4), "degrees run from 0 to 3");
     Array<double> frame({static_cast<py::ssize_t>(patches), py::ssize_t{12}});
     Array<double> terms({static_cast<py::ssize_t>(patches), py::ssize_t{TERMS}, py::ssize_t{6}});
-    const Fit fit{X.data(),      values.data(), offset.data(), start.data(),         elements.data(),
-                  weights.data(), degree.data(), means.data(),  frame.mutable_data(), terms.mutable_data()};
+    const int64_t m = offset.size() - 1;
+    const bool simple = std::any_of(means.data(), means.data() + patches, [](int32_t mean) { return mean != 0; });
+    std::vector<double> mean(simple ? 9 * m : 0);
+    const Fit fit{X.data(),       values.data(), offset.data(), start.data(), elements.data(),        weights.data(),
+                  degree.data(), means.data(),  mean.data(),   frame.mutable_data(), terms.mutable_data()};
     {
         py::gil_scoped_release release;
+        if (simple)
+            parallel_ranges(m, 8 * GRAIN, [&](int64_t first, int64_t last) {
+                for (int64_t e = first; e < last; ++e) mean_samples(fit, e, mean.data() + 9 * e);
+            });
         parallel_ranges(patches, GRAIN, [&](int64_t first, int64_t last) { fit_patches({&fit, first, last}); });
     }
     return py::make_tuple(frame, terms);

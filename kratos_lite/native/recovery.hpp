@@ -28,6 +28,7 @@ struct Fit {
     const double* weights;   // their weights
     const int32_t* degree;   // (p) of the polynomials
     const int32_t* means;    // (p) 1 where means of elements are fitted if there are enough of them
+    const double* mean;      // (m, 9) mean place and values of each element, if there are any such
     double* frame;           // (p, 12) origin, and rows of the map to local coordinates
     double* terms;           // (p, TERMS, 6)
 };
@@ -109,12 +110,17 @@ KL_INLINE void samples(const Fit& w, int64_t patch, bool means, const F& f) {
             for (int32_t s = first; s < last; ++s) f(w.X + 3 * int64_t{s}, w.values + 6 * int64_t{s}, w.weights[at]);
             continue;
         }
-        double x[3] = {}, v[6] = {};
-        for (int32_t s = first; s < last; ++s) {
-            for (int i = 0; i < 3; ++i) x[i] += w.X[3 * int64_t{s} + i] / (last - first);
-            for (int i = 0; i < 6; ++i) v[i] += w.values[6 * int64_t{s} + i] / (last - first);
-        }
-        f(x, v, w.weights[at]);
+        const double* mean = w.mean + 9 * int64_t{w.elements[at]};
+        f(mean, mean + 3, w.weights[at]);
+    }
+}
+
+inline void mean_samples(const Fit& w, int64_t element, double* mean) {
+    const int32_t first = w.offset[element], last = w.offset[element + 1];
+    for (int i = 0; i < 9; ++i) mean[i] = 0;
+    for (int32_t s = first; s < last; ++s) {
+        for (int i = 0; i < 3; ++i) mean[i] += w.X[3 * int64_t{s} + i] / (last - first);
+        for (int i = 0; i < 6; ++i) mean[3 + i] += w.values[6 * int64_t{s} + i] / (last - first);
     }
 }
 

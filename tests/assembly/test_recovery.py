@@ -1,0 +1,342 @@
+"""Recovered stresses: polynomials are exact, materials apart, hanging nodes harmless, kernels as NumPy."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite import voigt
+from kratos_lite.assembly import polynomial_fit, recovery
+from kratos_lite.assembly.patches import patches
+from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
+from kratos_lite.assembly.recovery import Recovery, sampling
+from kratos_lite.mesh.refinement import refine
+from kratos_lite.verification import fields, scenes
+from kratos_lite.verification.meshes import element, split, warped
+
+KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N")
+STEEL = kl.Isotropic3D(E=210e9, nu=0.3)
+
+
+@pytest.fixture
+def numpy_alone(monkeypatch):
+    """Compute with the reference of the kernels."""
+    monkeypatch.setattr(polynomial_fit, "kernels", lambda name: None)
+    monkeypatch.setattr(recovery, "kernels", lambda name: None)
+
+
+def region_of(mesh, material=STEEL):
+    (region,) = Recovery(mesh, kl.Model(mesh, material).element_groups()).regions
+    return region
+
+
+def polynomial(degree, seed=1):
+    """Return a function: six random polynomials of places."""
+    powers = np.array([p for p in np.ndindex(*(degree + 1,) * 3) if sum(p) <= degree])
+    factors = np.random.default_rng(seed).uniform(-1, 1, (len(powers), 6))
+    return lambda X: np.prod(X[..., None, :] ** powers, axis=-1) @ factors
+
+
+# ---- what is reproduced ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_polynomials_of_the_degree_of_the_element_are_recovered_on_distorted_meshes(kind):
+    mesh = warped(kind, 3)
+    region = region_of(mesh)
+    (group,) = region.groups
+    field = polynomial(group.element.shape.degree)
+    values = field(group.at(mesh.points).gauss_points())
+    if (T := sampling(group.element, group.rule).from_gauss) is not None:
+        # trilinear functions of an element take part: give their values at the samples
+        N = sampling(group.element, group.rule).N
+        wanted = field(N @ mesh.points[group.nodes])
+        values = np.linalg.pinv(T) @ wanted
+    found = region.at_nodes(mesh.points, [values])
+    exact = field(mesh.points)
+    if sampling(group.element, group.rule).means:
+        exact = polynomial(1)(mesh.points)  # means of elements stand for linear fields on straight cells
+        found = region.at_nodes(mesh.points, [polynomial(1)(group.at(mesh.points).gauss_points())])
+    assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_linear_displacement_has_constant_recovered_strain_and_stress(kind):
+    mesh = warped(kind, 2)
+    model = kl.Model(mesh, STEEL)
+    gradient = np.random.default_rng(2).uniform(-1e-3, 1e-3, (3, 3))
+    model.fix(np.arange(mesh.n_nodes), "xyz", mesh.points @ gradient.T)
+    result = model.solve()
+    strain = voigt.symmetric_gradient(gradient)
+    assert np.abs(result.strain("node") - strain).max() < 1e-12
+    assert np.abs(result.stress("node") - strain @ STEEL.C).max() < 1e-12 * 210e9
+    assert result.error().relative < 1e-9
+    assert not result.error().warnings
+
+
+def test_bending_is_recovered_exactly_by_quadratic_elements():
+    scene = scenes.bending("20N", 2)
+    result = scene.model.solve()
+    exact = np.zeros((result.mesh.n_nodes, 6))
+    exact[:, 0] = 0.01 * result.mesh.points[:, 1]
+    assert np.abs(result.stress("node") - exact).max() < 1e-10
+
+
+def test_meshes_of_several_shapes_recover_linear_fields():
+    """A box of bricks beside one of wedges."""
+    grid = kl.box((2, 1, 1), (4, 2, 2))
+    bricks = grid.blocks[0].nodes
+    left = grid.points[bricks].mean(axis=1)[:, 0] < 1
+    wedges = split(grid.points, bricks[~left], "6N").blocks[0]
+    mesh = kl.Mesh(
+        grid.points, [kl.Block(element("8N"), bricks[left]), kl.Block(element("6N"), wedges.nodes)]
+    )
+    region, field = region_of(mesh), polynomial(1)
+    values = [field(group.at(mesh.points).gauss_points()) for group in region.groups]
+    assert len(region.groups) == 2
+    assert np.abs(region.at_nodes(mesh.points, values) - field(mesh.points)).max() < 1e-12
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (4, 1, 1), (3, 3, 1)])
+@pytest.mark.parametrize("kind", ["8N", "20N", "EnhancedStrain3D8N", "10N", "15N"])
+def test_meshes_of_few_layers_recover_constant_and_linear_stress(kind, cells):
+    mesh = kl.box((2, 1, 0.5), cells, element(kind))
+    region = region_of(mesh)
+    field = polynomial(1)
+    values = field(region.groups[0].at(mesh.points).gauss_points())
+    found = region.at_nodes(mesh.points, [values])
+    assert np.abs(found - field(mesh.points)).max() < 1e-9
+
+
+# ---- materials --------------------------------------------------------------------------------------
+
+
+def two_materials():
+    mesh = kl.box((1, 1, 2), (2, 2, 4))
+    model, centers = kl.Model(mesh, STEEL), mesh.points[mesh.blocks[0].nodes].mean(axis=1)
+    model.assign(kl.Isotropic3D(E=70e9, nu=0.2), np.flatnonzero(centers[:, 2] > 1))
+    rows = np.arange(mesh.n_nodes)
+    model.fix(rows, "xyz", np.column_stack([mesh.points[:, 0] * 1e-3, 0 * rows, 0 * rows]))
+    return model
+
+
+def test_materials_are_recovered_apart_and_an_interface_has_their_mean():
+    result = two_materials().solve()
+    z = result.mesh.points[:, 2]
+    stress = result.stress("node")
+    low, high = (kl.Isotropic3D(E=E, nu=nu).C[:, 0] * 1e-3 for E, nu in ((210e9, 0.3), (70e9, 0.2)))
+    for rows, exact in ((z < 0.9, low), (z > 1.1, high), (np.abs(z - 1) < 1e-9, (low + high) / 2)):
+        assert np.abs(stress[rows] - exact).max() < 1e-9 * low.max()
+    assert result.error().relative < 1e-9
+    averaged = result.stress("averaged")
+    assert np.abs(averaged[np.abs(z - 1) < 1e-9] - (low + high) / 2).max() < 1e-9 * low.max()
+
+
+def test_stress_of_each_material_at_its_interface():
+    result = two_materials().solve()
+    found = Recovery(result.mesh, result.groups)
+    values = [nodal[:, 0] for _, nodal in found.by_region(result.u)]
+    assert [v.max() - v.min() < 1e-6 * v.max() for v in values] == [True, True]
+    assert values[0][0] > 2 * values[1][0]
+
+
+def test_prestress_is_in_recovered_stress_and_not_in_the_error():
+    model = kl.Model(kl.box(cells=(3, 3, 3)), STEEL)
+    model.add_prestress(np.random.default_rng(3).uniform(-1e6, 1e6, (27, 6)))
+    model.fix(np.arange(64), "xyz")
+    result = model.solve()
+    assert result.error().absolute == 0
+    assert np.abs(result.stress("node")).max() > 1e4
+
+
+# ---- places by name ---------------------------------------------------------------------------------
+
+
+def test_raw_stress_has_a_row_for_each_node_of_each_element():
+    scene = scenes.manufactured("20N", 2)
+    result = scene.model.solve()
+    raw, nodes = result.stress("raw"), result.mesh.blocks[0].nodes
+    assert raw.shape == (8, 20, 6)
+    total = np.zeros((result.mesh.n_nodes, 6))
+    np.add.at(total, nodes, raw)
+    mean = total / np.bincount(nodes.ravel())[:, None]
+    assert np.abs(mean - result.stress("averaged")).max() < 1e-12 * np.abs(mean).max()
+
+
+@pytest.mark.parametrize(
+    ("kind", "n", "most"), [("20N", 6, 5e-3), ("Reduced3D20N", 6, 5e-3), ("8N", 9, 4e-2)]
+)
+def test_recovered_hoop_stress_of_a_sphere_is_closer_than_averaged(kind, n, most):
+    """Mean error over the inner surface of Lame's sphere, where σ_φ = (1 + b³ / 2a³) / (b³ / a³ - 1) p."""
+    result = scenes.sphere(kind, n).model.solve()
+    X = result.mesh.points
+    inner = np.abs(np.linalg.norm(X, axis=1) - 1) < 1e-9
+    error = {}
+    for place in ("node", "averaged"):
+        sigma = voigt.tensor(result.stress(place)[inner])
+        radial = np.einsum("ni,nij,nj->n", X[inner], sigma, X[inner])
+        hoop = (np.trace(sigma, axis1=1, axis2=2) - radial) / 2
+        error[place] = float(np.abs(hoop / (5 / 7) - 1).mean())
+    assert error["node"] < most
+    assert error["averaged"] > 1.9 * error["node"]
+
+
+# ---- patches ------------------------------------------------------------------------------------------
+
+
+def test_patches_of_inner_nodes_are_their_elements_and_those_outside_take_them_over():
+    mesh = kl.box(cells=(3, 3, 3))
+    region = region_of(mesh)
+    sizes = region.patches.elements.lengths
+    assert set(sizes.tolist()) == {8}
+    inside = (np.abs(mesh.points - 0.5) < 0.4).all(axis=1)
+    own = np.add.reduceat(region.patches.own, region.patches.elements.start[:-1])
+    assert (own[inside] == 8).all()
+    assert sorted(set(own[~inside].tolist())) == [1, 2, 4]
+
+
+def test_hanging_nodes_take_the_patches_of_their_masters():
+    mesh = kl.box(cells=(2, 1, 1))
+    none = np.zeros(mesh.n_nodes, dtype=bool)
+    masters = lists(np.array([0, 0]), np.array([1, 2]), 1)
+    found = patches(mesh.blocks, none, np.array([0]), masters)
+    assert found.of.lengths[0] == 2
+    assert len(found.elements) == mesh.n_nodes - 1
+
+
+@pytest.mark.parametrize("kind", ["8N", "20N"])
+def test_linear_fields_are_recovered_beside_hanging_nodes(kind):
+    mesh = refine(kl.box((1, 1, 1), (3, 3, 3), element(kind)), np.array([0, 1, 4])).mesh
+    assert len(mesh.hanging)
+    region, field = region_of(mesh), polynomial(1)
+    values = [field(group.at(mesh.points).gauss_points()) for group in region.groups]
+    assert np.abs(region.at_nodes(mesh.points, values) - field(mesh.points)).max() < 1e-9
+
+
+# ---- kernels ---------------------------------------------------------------------------------------------
+
+
+def compared(scene):
+    result = scene.model.solve()
+    found = Recovery(result.mesh, result.groups)
+    return [found.nodal(result.u), *found.squared_errors(result.u, result.mesh.n_elements)]
+
+
+@pytest.mark.parametrize("kind", ["4N", "6N", "8N", "10N", "13N", "20N"])
+def test_kernels_agree_with_numpy(kind, request):
+    scene = scenes.manufactured(kind, 2, 0.15)
+    compiled = compared(scene)
+    request.getfixturevalue("numpy_alone")
+    for one, other in zip(compiled, compared(scene), strict=True):
+        assert np.abs(one - other).max() < 1e-10 * np.abs(other).max()
+
+
+def test_fits_of_rank_deficient_samples_agree_with_numpy(request):
+    rng = np.random.default_rng(4)
+    places, values = rng.uniform(-1, 1, (60, 3)), rng.uniform(-1, 1, (60, 6))
+    places[30:, 2] = 0.25  # a plane
+    samples = Samples(places, values, np.arange(0, 61, 5))
+    rows = Lists(np.array([0, 6, 12, 15]), np.array([*range(12), 0, 4, 9]))
+    arguments = samples, rows, rng.uniform(0.1, 1, 15), np.array([3, 2, 3]), np.array([0, 0, 1])
+    one = fit(*arguments).at(places, lists(np.arange(60), np.arange(60) % 3, 60))
+    request.getfixturevalue("numpy_alone")
+    other = fit(*arguments).at(places, lists(np.arange(60), np.arange(60) % 3, 60))
+    assert np.abs(one - other).max() < 1e-9 * np.abs(other).max()
+
+
+def test_results_do_not_depend_on_the_number_of_threads():
+    from kratos_lite.native import kernels, threads
+
+    module = kernels("recovery")
+    if module is None:
+        pytest.skip("no compiled kernels")
+    scene, found = scenes.manufactured("20N", 4), []
+    try:
+        for count in (1, 2, 3):
+            module.set_threads(count)
+            found.append(compared(scene))
+    finally:
+        module.set_threads(threads())
+    for other in found[1:]:
+        assert all((a == b).all() for a, b in zip(found[0], other, strict=True))
+
+
+# ---- the estimate --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scene", "low", "high"),
+    [
+        (scenes.manufactured("8N", 6, 0.1), 1.0, 2.0),
+        (scenes.manufactured("20N", 4, 0.1), 1.0, 2.0),
+        (scenes.manufactured("10N", 4), 1.0, 2.0),
+        (scenes.manufactured("EnhancedStrain3D8N", 6), 1.0, 2.0),
+        (scenes.sphere("8N", 4), 1.0, 2.0),
+        (scenes.sphere("20N", 4), 1.0, 2.0),
+        (scenes.sphere("15N", 4), 1.0, 2.0),
+        (scenes.cavity("8N", 6), 1.0, 2.0),
+        (scenes.cavity("10N", 4), 1.0, 2.0),
+        (scenes.l_domain("8N", 8), 1.0, 2.0),
+        (scenes.l_domain("20N", 6), 1.0, 2.0),
+        (scenes.l_domain("27N", 6), 1.0, 2.0),
+    ],
+    ids=lambda value: f"{value.name}-{value.kind}" if isinstance(value, scenes.Scene) else "",
+)
+def test_the_reported_error_is_between_the_true_one_and_twice_that(scene, low, high):
+    from kratos_lite.verification.errors import errors
+
+    result = scene.model.solve()
+    effectivity = result.error().relative / errors(scene, result.u)["energy"]
+    assert low < effectivity < high
+
+
+def test_parts_of_the_elements_add_up_to_the_whole():
+    error = scenes.sphere("8N", 3).model.solve().error()
+    assert np.linalg.norm(error.per_element) == pytest.approx(error.absolute)
+    assert error.per_element.shape == (81,)
+    assert "in the energy norm" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (lambda: scenes.l_domain("8N", 8), "re-entrant corner"),
+        (lambda: scenes.sphere("8N", 1), "3 elements are too few"),
+        (lambda: scenes.cook("8N", 8, kl.Isotropic3D(E=1.0, nu=0.4999)), "lock near ν = ½"),
+    ],
+)
+def test_warnings_name_what_speaks_against_the_estimate(scene, words):
+    assert any(words in text for text in scene().model.solve().error().warnings)
+
+
+def test_no_warning_where_the_estimate_is_good():
+    assert scenes.manufactured("8N", 5).model.solve().error().warnings == []
+
+
+def test_the_table_shows_the_error():
+    rows = dict(scenes.sphere("20N", 2).model.solve().table())
+    assert "energy norm" in rows["estimated error"]
+
+
+def test_a_model_without_load_has_no_error():
+    model = kl.Model(kl.box(cells=(2, 2, 2)), STEEL)
+    model.fix("z-")
+    error = model.solve().error()
+    assert error.absolute == error.relative == 0
+    assert error.warnings == []
+
+
+def test_nodes_without_elements_have_no_stress():
+    box = kl.box(cells=(2, 2, 2))
+    mesh = kl.Mesh(np.vstack([box.points, [[9.0, 9, 9]]]), box.blocks)
+    model = kl.Model(mesh, STEEL)
+    model.fix(lambda X: X[:, 2] < 0.1)
+    model.add(kl.PointLoad(lambda X: (X[:, 2] > 0.9) & (X[:, 0] < 2), (0, 0, 1.0)))
+    assert (model.solve().stress("node")[-1] == 0).all()
+
+
+def test_exact_stresses_of_the_sphere():
+    """The field of the scene has the hoop stress that a test above compares with."""
+    C = scenes.UNIT.C
+    X = np.array([[1.0, 0.0, 0.0]])
+    stress = voigt.symmetric_gradient(fields.gradient(fields.hollow_sphere(1.0, 0.3, 1.0, 2.0, 1.0), X)) @ C
+    assert stress[0, 1] == pytest.approx(5 / 7, rel=1e-6)
