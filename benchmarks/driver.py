@@ -26,6 +26,8 @@ from kratos_lite.verification import errors
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCHER = Path(__file__).with_name("launch.py")
+ERRORS = ("difference", "displacement")
+"""Those kept of run time against error; of the adaptive solution that in the energy norm, too."""
 ENOUGH = 1e-4
 """Error at which a curve has gone far enough."""
 LARGE = 40
@@ -291,7 +293,16 @@ class Driver:
             row["warm"] = round(statistics.median(a["warm"] for a in answers), 6)
         row["peak"] = int(statistics.median(a["peak"] for a in answers))
         row["runs"] = len(answers)
-        for word in ("unknowns", "iterations", "residual", "solver", "version", "errors", "drift"):
+        for word in (
+            "unknowns",
+            "iterations",
+            "residual",
+            "solver",
+            "version",
+            "errors",
+            "reported",
+            "drift",
+        ):
             if answers[0].get(word) not in (None, "", {}):
                 row[word] = answers[0][word]
         return row
@@ -348,7 +359,7 @@ def kept(row: dict[str, Any]) -> dict[str, Any]:
     dropped = {"version"}
     if row["group"] == "error":
         dropped |= {"task", "phases", "work", "start", "spread", "peak", "runs", "iterations", "residual"}
-        errors = {k: v for k, v in row.get("errors", {}).items() if k in ("difference", "displacement")}
+        errors = {k: v for k, v in row.get("errors", {}).items() if k in ERRORS or "reported" in row}
         row = row | {"errors": {name: float(f"{value:.6g}") for name, value in errors.items()}}
     return {key: value for key, value in row.items() if key not in dropped}
 

@@ -112,8 +112,26 @@ def errors(rows: Sequence[Row]) -> str:
     solvers = {row["scene"]: row.get("solver") for row in rows if row["program"] == THEIRS}
     told = ", ".join(f"{scene} {solver}" for scene, solver in solvers.items() if solver)
     parts += [f"Kratos's solver: {told}.\n"] if told else []
+    if kept := promises(rows):
+        parts += ["### Asked, reported and true: relative errors in the energy norm\n", kept]
     parts += ["### Which element of kratos_lite\n", *(f"- {sentence}" for sentence in cheapest(rows)), ""]
     return "\n".join(parts)
+
+
+def promises(rows: Sequence[Row]) -> str:
+    """Return the errors in the energy norm of the adaptive solution: asked for, reported and true."""
+    body = [
+        [
+            row["scene"],
+            f"{100 * float(row['variant']):g} %",
+            *(f"{100 * error:.2g} %" for error in (row["reported"], row["errors"]["energy"])),
+            str(row["unknowns"]),
+            seconds(row["warm"]),
+        ]
+        for row in rows
+        if "reported" in row
+    ]
+    return table(["scene", "asked", "reported", "true", "unknowns", "warm, s"], body)
 
 
 TITLES = {

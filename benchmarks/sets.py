@@ -123,8 +123,11 @@ def error_runs(
                     and kind in chosen(program, scene, elements)
                 ]
         if ADAPTIVE in programs:
-            goals = [(goal, (*words, ("goal", goal), ("scene", scene))) for goal in GOALS_OF_ERROR]
-            runs += [Run("error", ADAPTIVE, scene, *START, options=o, variant=f"{g:g}") for g, o in goals]
+            start = (*words, ("scene", scene), ("n", START[1]))
+            runs += [
+                Run("error", ADAPTIVE, scene, *START, options=(*start, ("goal", goal)), variant=f"{goal:g}")
+                for goal in GOALS_OF_ERROR
+            ]
     return runs
 
 

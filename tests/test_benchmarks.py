@@ -313,6 +313,16 @@ def test_summary_has_the_best_element_of_each_program_and_the_ratio_to_the_best_
     assert "| s | 0.1 % | 3 27N | ≤ 1.1 20N | 10 20N | 0.3 |" in curves.summary(rows, "cold")
 
 
+def test_adaptive_solutions_are_listed_with_their_true_error(tmp_path):
+    options = (("errors", True), ("warm", True), ("scene", "sphere"), ("n", 2), ("goal", 0.2))
+    run = driver.Run("error", tables.ADAPTIVE, "sphere", "20N", 2, options=options, variant="0.2")
+    (row,) = driver.Driver(tmp_path, 1, tell=lambda line: None).measure([run])
+    row = driver.kept(row)
+    assert 0 < row["errors"]["displacement"] < row["errors"]["energy"] < row["reported"] < 0.2
+    assert f"| sphere | 20 % | {100 * row['reported']:.2g} % |" in report.promises([row])
+    assert report.promises(rows_of({"8N": [(1.0, 0.1)]})) == ""
+
+
 def test_rows_kept_stay_unless_they_are_measured_again(tmp_path):
     made = driver.Driver(tmp_path, 1)
     old = driver.results(

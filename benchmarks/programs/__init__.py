@@ -48,7 +48,7 @@ CALCULIX = ("4N", "6N", "8N", "10N", "15N", "20N", "20N reduced")
 OWN = ALL + tuple(FORMULATIONS)
 PROGRAMS = {
     "kratos_lite": Program("lite", OWN, OWN),
-    "kratos_lite adaptive": Program("lite", OWN, OWN),
+    "kratos_lite adaptive": Program("adaptive", OWN, OWN),
     "kratos_lite NumPy": Program("lite", OWN, OWN, {"KRATOS_LITE_KERNELS": "numpy"}),
     "Kratos": Program("kratos", kinds=(*ALL, *MORE), curved=(*ALL, *MORE)),
     "scikit-fem": Program("scikit_fem", curved=("10N", "27N"), environment=ONE_BLAS_THREAD),

@@ -35,8 +35,6 @@ def work(job: Job) -> Array | None:
         return None
     if job.task == "assembly":
         return assembly(job, model)
-    if "goal" in job.given:
-        return adaptive(job, model)
     system = model.static(**{word: job.given[word] for word in WORDS if word in job.given})
     for _ in range(job.given.get("cases", 1)):
         result = system.solve()
@@ -70,22 +68,6 @@ def from_arrays(job: Job, kl: Any) -> Any:
         model.fix(held, "xyz"[axis], values[held, axis, None])
     model.add(kl.NodalForces(forces))
     return model
-
-
-def adaptive(job: Job, model: Any) -> Array:
-    """Solve to an error; its true one is found on the final mesh, outside the time."""
-    with job.phase("solve"):
-        result = model.solve(error=job.given["goal"])
-        u = result.displacement()
-    with job.phase("answer"):
-        from dataclasses import replace
-
-        from benchmarks import scenes
-        from kratos_lite.verification.errors import errors
-
-        scene = replace(scenes.make(job.given["scene"], job.kind, 1), model=result.model)
-        job.answer |= {"errors": errors(scene, u), "unknowns": result.report.unknowns}
-    return np.asarray(u)
 
 
 def assembly(job: Job, model: Any) -> None:

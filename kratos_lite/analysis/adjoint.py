@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.analysis.error_estimate import Origin, QuantityError
+from kratos_lite.analysis.error_estimate import SAFETY, Origin, QuantityError
 from kratos_lite.analysis.quantities import Quantity, Solved
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.recovery import Recovery
@@ -58,9 +58,10 @@ def error_of(
         density = ((first @ np.linalg.inv(group.material.C)) * second).sum(axis=-1)
         shares[group.rows] = (density * volumes(mesh.points, group)).sum(axis=1)
     local = quantity.local(result)
-    bound = float(np.abs(shares).sum() + np.abs(local).sum())
+    raised = SAFETY["recovery"]
+    absolute = float(raised**2 * np.abs(shares).sum() + raised * np.abs(local).sum())
     shares += local
-    return QuantityError(value, float(shares.sum()), bound, shares, quantity.unit, warnings)
+    return QuantityError(value, float(shares.sum()), absolute, shares, quantity.unit, warnings)
 
 
 def _shared(result: Solved, held: Mask, part: Mask) -> list[str]:

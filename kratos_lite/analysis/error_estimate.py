@@ -143,8 +143,8 @@ class QuantityError:
     ----------
     value : Q(u_h), in its unit.
     signed : the best guess of Q(u) - Q(u_h); value + signed is a better value.
-    bound : the sum of the sizes of what the elements contribute: what the error is if nothing cancels.  No
-        proof makes it an upper bound.
+    absolute : on the safe side: the sum of the sizes of what the elements contribute, as if nothing canceled,
+        with the factors of the energy norm for both errors of the product.
     per_element : (m,) what each element contributes to `signed`.
     unit : of all these.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
@@ -152,20 +152,15 @@ class QuantityError:
 
     value: float
     signed: float
-    bound: float
+    absolute: float
     per_element: Array
     unit: str
     warnings: list[str] = field(default_factory=list)
 
     @property
-    def absolute(self) -> float:
-        """Size of the best guess."""
-        return abs(self.signed)
-
-    @property
     def relative(self) -> float:
-        """Size of the best guess over that of the better value; 0 where both are 0."""
-        return self.absolute / abs(self.value + self.signed) if self.signed else 0.0
+        """`absolute` over the size of the better value; 0 where both are 0."""
+        return self.absolute / abs(self.value + self.signed) if self.absolute else 0.0
 
     def __str__(self) -> str:
-        return f"{self.signed:+.3e} {self.unit}, at most about ±{self.bound:.1e} (value {self.value:.6e})"
+        return f"{self.signed:+.3e} {self.unit}, at most about ±{self.absolute:.1e} (value {self.value:.6e})"

@@ -362,7 +362,7 @@ class Result:
         >>> bar.fix("x-")
         >>> bar.add(kl.Traction("x+", (0, 0, 1.0)))
         >>> result = bar.solve()
-        >>> 0 < result.error(of=kl.MeanDisplacement("x+", "z")).relative < 0.01
+        >>> 0 < result.error(of=kl.MeanDisplacement("x+", "z")).relative < 0.05
         True
         >>> result.error().relative < result.error(method="equilibrated").relative < 0.3
         True

@@ -65,7 +65,7 @@ def manufactured(kind: str, n: int, distortion: float = 0.0) -> Scene:
     mesh = straight(kind, (n, n, n), place)
     model = Model(mesh, UNIT)
     side = on_boundary(mesh)
-    model.fix(side, "xyz", fields.manufactured(mesh.points[side]))
+    model.fix(side, field=fields.manufactured)
     model.add(NodalForces(body_forces(mesh, lambda X: fields.manufactured_force(X, UNIT.E, UNIT.nu))))
     return Scene("manufactured", kind, n, model, fields.manufactured)
 

@@ -28,6 +28,8 @@ MECHANICS = "tests/bodies/test_simple_mechanics.py"
 MATRICES = "tests/ale/test_matrices.py"
 MATERIALS = "tests/materials/test_orthotropic.py"
 MASS = "tests/assembly/test_exact_mass.py"
+QUANTITIES = "tests/analysis/test_quantities.py"
+BOUND = "tests/analysis/test_error_bound.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
 
 MUTATIONS = [
@@ -544,4 +546,11 @@ MUTATIONS = [
         "E[3 + i] += middle[r][i] * dF[r][j] - middle[r][j] * dF[r][i];",
         STRAIN,
     ),
+    # ---- errors of quantities, bound of the error
+    Mutation("analysis/quantities.py", "self.axis)] = -1.0", "self.axis)] = 1.0", QUANTITIES),
+    Mutation("analysis/quantities.py", "(off * volume).sum()", "2 * (off * volume).sum()", QUANTITIES),
+    Mutation("analysis/static.py", "displaced - at_rest,", "displaced + at_rest,", QUANTITIES),
+    Mutation("assembly/equilibrated_error.py", "load -= (gradients", "load += (gradients", BOUND),
+    Mutation("assembly/equilibrated_tractions.py", "np.where(sides.inner, 0.5, 1.0)", "1.0", BOUND),
+    Mutation("assembly/equilibrated_tractions.py", "np.where(is_first, 1.0, -1.0)", "np.ones(h)", BOUND),
 ]
