@@ -33,6 +33,24 @@ BOUND = "tests/analysis/test_error_bound.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
 
 MUTATIONS = [
+    # ---- elements that lock, and those that do not
+    Mutation(
+        "elements/formulations.py",
+        "(3 * (1 - 2 * 0.45))",
+        "(3 * (1 - 0.45))",
+        "tests/elements/test_formulations.py",
+    ),
+    Mutation("model/locking.py", "* ratio**2", "* ratio", "tests/model/test_locking.py"),
+    Mutation(
+        "model/locking.py", "tapered = walls.taper * ratio", "tapered = ratio", "tests/model/test_locking.py"
+    ),
+    Mutation(
+        "model/spurious_modes.py",
+        "joined.sum(axis=1) >= 2",
+        "joined.sum(axis=1) >= 1",
+        "tests/model/test_spurious_modes.py",
+    ),
+    Mutation("model/spurious_modes.py", "& held[ends]", "& True", "tests/model/test_spurious_modes.py"),
     # ---- shapes, rules, B, C
     Mutation("shapes/tensor.py", "f = 1 + x * p", "f = 1 - x * p", ELEMENTS),
     Mutation(
