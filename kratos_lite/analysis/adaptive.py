@@ -15,10 +15,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from kratos_lite.analysis.layers import layer_direction
 from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
@@ -26,7 +27,7 @@ from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_own
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Finer
+from kratos_lite.mesh import Finer, Mesh, with_rows
 from kratos_lite.mesh.order import quadratic, raised
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
@@ -35,10 +36,10 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import number
 
 S = TypeVar("S", bound=Structure)
-ALONE = {1: 1.5, 2: 1.3}
-"""Safety of an estimate that no coarser mesh corrects, by the order of the elements."""
+Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
+"""By part, a function that takes places (k, 3) near its true surface onto it."""
 SAFETY = 1.2
-"""Safety of an estimate that one corrects."""
+"""Safety of an estimate that a coarser mesh corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
 AIM = 0.9
@@ -46,6 +47,10 @@ AIM = 0.9
 SINGULAR = 0.25
 """Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
+FLAT = 0.05
+"""Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
+DEPTH = 2
+"""Times that elements around a singular point are cut at once."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
 UNKNOWNS = 400_000
@@ -59,7 +64,7 @@ def solve_to(
     tolerance: float = 1e-10,
     progress: Progress | None = None,
     most_unknowns: int = UNKNOWNS,
-    geometry: Mapping[str, Callable[[Array], Array]] | None = None,
+    geometry: Geometry | None = None,
 ) -> Result:
     """Solve a static model on meshes that become finer until the error is as small as asked for.
 
@@ -93,7 +98,7 @@ def solve_to(
     levels: list[_Level] = []
     steps: list[Finer] = []
     history: list[RefinementStep] = []
-    missed = ""
+    missed, keep = "", None
     while True:
         start = perf_counter()
         result = StaticAnalysis(model, solver, tolerance, progress).solve()
@@ -102,7 +107,9 @@ def solve_to(
         history.append(level.step(perf_counter() - start))
         if level.reported <= aim or missed:
             break
-        steps = [step.onto(geometry) if geometry else step for step in _next(level, aim)]
+        if keep is None and model.mesh.hanging is None:
+            keep = layer_direction(result, FLAT * aim * level.norm)
+        steps = _next(level, aim, keep, geometry or {})
         model = _carried(model, steps)
         if 3 * model.mesh.n_nodes > most_unknowns:
             missed = f"the next mesh has more than {most_unknowns} unknowns"
@@ -129,8 +136,9 @@ class _Level:
 
     @cached_property
     def squares(self) -> Array:
-        """Squared estimate of each element (m,) in J."""
-        return self.result.error().per_element ** 2
+        """Squared estimate of each element (m,) in J, the best guess."""
+        found = self.result.error()
+        return (found.per_element / found.safety) ** 2
 
     @cached_property
     def estimate(self) -> float:
@@ -161,14 +169,14 @@ class _Level:
     @cached_property
     def bound(self) -> float:
         """The error in √J that is reported."""
-        alone = ALONE[self.order] * self.estimate
+        alone = self.result.error().absolute
         if self.before is None:
             return alone
         ratio = self.estimate / self.before.estimate
         if not ratio < SETTLED:
             return max(alone, self.change)
         corrected = self.change * ratio / float(np.sqrt(1 - ratio**2))
-        return SAFETY * max(corrected, self.estimate)
+        return max(SAFETY * corrected, alone)
 
     @property
     def reported(self) -> float:
@@ -205,21 +213,62 @@ class _Level:
             left = self.squares / np.maximum(old[parents], np.finfo(float).tiny)
             kept[left > SINGULAR] = 0.5
             return kept
-        count, total = np.bincount(parents), np.bincount(parents, weights=self.squares)
-        left = np.clip(total / np.maximum(old, np.finfo(float).tiny), smooth, 0.8)[parents]
-        heavy = (count[parents] > 1) & (self.squares * count[parents] > total[parents])
-        kept[heavy] = left[heavy]
+        cuts, total = self.cuts(), np.bincount(parents, weights=self.squares)
+        most = np.zeros(len(old), dtype=np.int64)
+        np.maximum.at(most, parents, cuts)
+        left = (total / np.maximum(old, np.finfo(float).tiny)) ** (1 / np.maximum(most, 1))
+        count = np.bincount(parents)[parents]
+        heavy = (cuts > 0) & (cuts == most[parents]) & (self.squares * count > total[parents])
+        kept[heavy] = np.clip(left, smooth, 0.8)[parents[heavy]]
         return kept
 
+    def cuts(self) -> Ints:
+        """Return how often elements (m,) have been cut since the level before."""
+        cuts = np.zeros(self.steps[0].coarse.n_elements, dtype=np.int64)
+        for step in self.steps:
+            cuts = cuts[step.elements] + (np.bincount(step.elements)[step.elements] > 1)
+        return cuts
 
-def _next(level: _Level, error: float) -> list[Finer]:
-    """Return the steps to the next mesh."""
+
+def _next(level: _Level, error: float, keep: Array | None, geometry: Geometry) -> list[Finer]:
+    """Return the steps to the next mesh; edges along `keep` are not cut."""
     mesh = level.model.mesh
     if _can_be_raised(level.model):
-        return [raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")]
+        named = raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")
+        return [named.onto(geometry)]
     aim = AIM * error / level.reported * level.estimate
-    marked = _marked(level.squares, level.kept(), aim)
-    return [refine(mesh, marked)]
+    kept = level.kept()
+    times = _times(level.squares, kept, aim, 8 if keep is None else 4)
+    steps = [refine(mesh, times > 0, keep).onto(geometry)]
+    points = _singular_points(mesh, kept > SINGULAR)
+    wanted = times[steps[0].elements]
+    known = level.before is not None and level.before.order == level.order
+    for done in range(1, DEPTH if known else 1):
+        finer = steps[-1].mesh
+        again = (wanted > done) & _touching(finer, points)
+        if not again.any():
+            break
+        steps.append(refine(finer, again, keep).onto(geometry))
+        wanted = wanted[steps[-1].elements]
+    return steps
+
+
+def _singular_points(mesh: Mesh, singular: Mask) -> Mask:
+    """Return which nodes (n,) have singular elements alone around them, two or more."""
+    around, of_these = np.zeros(mesh.n_nodes, dtype=np.int64), np.zeros(mesh.n_nodes, dtype=np.int64)
+    for block, at in with_rows(mesh.blocks):
+        np.add.at(around, block.nodes, 1)
+        np.add.at(of_these, block.nodes[singular[at]], 1)
+    return (around > 1) & (around == of_these)
+
+
+def _touching(mesh: Mesh, points: Mask) -> Mask:
+    """Return which elements (m,) have one of some nodes, the first of the mesh, as a corner."""
+    every = np.zeros(mesh.n_nodes, dtype=bool)
+    every[: len(points)] = points
+    corners = [ELEMENTS[block.name].shape.corners for block in mesh.blocks]
+    cells = [block.nodes[:, :c] for block, c in zip(mesh.blocks, corners, strict=True)]
+    return np.concatenate([np.asarray(every[nodes].any(axis=1)) for nodes in cells])
 
 
 def _can_be_raised(model: Structure) -> bool:
@@ -234,14 +283,14 @@ def _can_be_raised(model: Structure) -> bool:
     )
 
 
-def _marked(squares: Array, kept: Array, aim: float) -> Mask:
-    """Return which elements (m,) are cut now, on the way to a mesh with the error `aim`.
+def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
+    """Return how often elements (m,) are cut on the way to a mesh with the error `aim`.
 
-    On it all elements have the same error τ.  An element cut k times has 8^k children, or 8 k around a
-    singular point, that hold kept^k of its squared error.
+    On it all elements have the same error τ.  An element cut k times has pieces^k children, or pieces · k
+    around a singular point, that hold kept^k of its squared error.
     """
     singular = kept > SINGULAR
-    rate = np.where(singular, -np.log(kept), np.log(8 / kept))
+    rate = np.where(singular, -np.log(kept), np.log(pieces / kept))
     logs = np.log(np.maximum(squares, np.finfo(float).tiny))
 
     def times(tau: float) -> Array:
@@ -254,9 +303,9 @@ def _marked(squares: Array, kept: Array, aim: float) -> Mask:
             high = middle
         else:
             low = middle
-    marked = times(low) > 0
-    marked[squares.argmax()] = True
-    return marked
+    found = times(low)
+    found[squares.argmax()] = max(found[squares.argmax()], 1)
+    return found
 
 
 def _carried(model: S, steps: Sequence[Finer]) -> S:

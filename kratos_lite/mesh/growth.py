@@ -15,7 +15,7 @@ from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.hanging import hanging_nodes
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import Piece
-from kratos_lite.shapes import Shape
+from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
 
 Target: TypeAlias = "Callable[[Block, str], tuple[str, type[Shape]]]"
@@ -137,6 +137,7 @@ class Growth:
         """Return the nodes of keys (m, ...) at places (p, d) in each cell; new ones are made."""
         shape = block.shape
         assert shape is not None
+        self._recognize(block, cells, keys, places)
         new = self.centers.make(keys.ravel(), self._n_nodes)
         self._n_nodes += len(new)
         cell, place = np.divmod(new, len(places))
@@ -148,6 +149,23 @@ class Growth:
             inside[mine] = keys_of(nodes[mine][:, list(corners_around(shape.cell, places[i]))])
         self._inside.append(inside)
         return self.centers.find(keys)
+
+    def _recognize(self, block: Block, cells: Ints, keys: Keys, places: Array) -> None:
+        """Let nodes in the middle of edges, faces or cells be those that the cells have there already."""
+        assert block.shape is not None
+        keys = keys.reshape(len(cells), len(places))
+        for column, xi in enumerate(places):
+            around = list(corners_around(block.shape.cell, xi))
+            if (
+                len(around) < 4
+                or np.abs(LINEAR[block.shape.cell].N(xi)[around] * len(around) - 1).max() > 1e-9
+            ):
+                continue
+            own = self.centers.find(keys_of(block.nodes[cells][:, around]))
+            known = (own >= 0) & (self.centers.find(keys[:, column]) < 0)
+            if known.any():
+                self.centers.add(keys[known, column], own[known])
+                self.centers.sort()
 
     def finer(self) -> Finer:
         """Return the mesh that has grown."""

@@ -124,12 +124,14 @@ class Split:
     nodes : (k, n) int.
     middles : (k, e) int, nodes in the middle of its edges, then, of four corners, in its own.
     rows : (k,) int, element of each.
+    half : 0 or 1 of four-sided faces that are halved, across the edges `half` and `half` + 2; else -1.
     """
 
     shape: type[Shape] | None
     nodes: Ints
     middles: Ints
     rows: Ints
+    half: int = -1
 
     @property
     def corners(self) -> Ints:
@@ -146,6 +148,14 @@ class Split:
             lines = [m[:, [i, (i + 1) % 3]] for i in range(3)]
             faces = [np.stack([c[:, i], m[:, i], m[:, i - 1]], axis=1) for i in range(3)]
             return [*lines, *faces, m]
+        if self.half >= 0:
+            one, other = m[:, self.half], m[:, self.half + 2]
+            ends = [c[:, (self.half + i) % 4] for i in range(4)]
+            return [
+                np.stack([one, other], axis=1),
+                np.stack([ends[0], one, other, ends[3]], axis=1),
+                np.stack([one, ends[1], ends[2], other], axis=1),
+            ]
         lines = [m[:, [i, 4]] for i in range(4)]
         return [*lines, *(np.stack([c[:, i], m[:, i], m[:, 4], m[:, (i + 3) % 4]], axis=1) for i in range(4))]
 
@@ -166,8 +176,8 @@ def split_edges(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iter
             yield Split(None, found, m, at.start + cell)
 
 
-def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iterator[Split]:
-    """Yield likewise the faces that are split."""
+def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask, existing: Keys) -> Iterator[Split]:
+    """Yield likewise the faces that are split; `existing` are the keys of the edges of all elements."""
     for block, at in with_rows(blocks):
         shape = block.shape
         if shape is None or not len(block):
@@ -177,16 +187,22 @@ def split_faces(blocks: Sequence[Block], centers: Centers, corner: Mask) -> Iter
             nodes = block.nodes[:, list(face)].astype(np.int64)
             around = nodes[:, np.array(kind.edges)]
             middles = centers.find(keys_of(around))
-            if kind.corners == 4:
-                own = centers.find(keys_of(nodes[:, :4]))
-                split = (own >= 0) & corner[own]
-                middles = np.column_stack([middles, own])
-            else:
-                split = np.asarray(((middles >= 0) & corner[middles]).all(axis=1))
-            split &= (middles >= 0).all(axis=1)
-            cells = np.flatnonzero(split)
-            if len(cells):
+            ends = (middles >= 0) & corner[middles]
+            if kind.corners == 3:
+                cells = np.flatnonzero(ends.all(axis=1))
                 yield Split(kind, nodes[cells], middles[cells], at.start + cells)
+                continue
+            own = centers.find(keys_of(nodes[:, :4]))
+            quartered = ends.all(axis=1) & (own >= 0) & corner[own]
+            cells = np.flatnonzero(quartered)
+            middles = np.column_stack([middles, own])
+            yield Split(kind, nodes[cells], middles[cells], at.start + cells)
+            for half in (0, 1):
+                cells = np.flatnonzero(ends[:, half] & ends[:, half + 2] & ~quartered)
+                if len(cells):
+                    line = keys_of(middles[cells][:, [half, half + 2]])
+                    cells = cells[np.isin(line, existing)]
+                yield Split(kind, nodes[cells], middles[cells], at.start + cells, half)
 
 
 def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> HangingNodes | None:
@@ -202,16 +218,16 @@ def hanging_nodes(blocks: Sequence[Block], centers: Centers, n_nodes: int) -> Ha
     found, large, small = _Found(), [], []
     for edge in split_edges(blocks, centers, corner):
         _on_edges(edge, centers, found)
-    existing = np.unique(
-        np.concatenate([keys_of(c) for c in _face_corners(blocks)] or [np.zeros(0, dtype=np.uint64)])
-    )
-    for face in split_faces(blocks, centers, corner):
+    existing = existing_keys(blocks)
+    for face in split_faces(blocks, centers, corner, existing):
+        if not len(face.rows):
+            continue
         smaller = face.parts()
         inside = [keys_of(part) for part in smaller if part.shape[1] > 2]
         cut = np.isin(np.stack(inside), existing).all(axis=0)
         if not cut.any():
             continue
-        coarse = Split(face.shape, face.nodes[cut], face.middles[cut], face.rows[cut])
+        coarse = Split(face.shape, face.nodes[cut], face.middles[cut], face.rows[cut], face.half)
         _on_faces(coarse, centers, found)
         large += [keys_of(coarse.corners)] * len(inside)
         small += [keys[cut] for keys in inside]
@@ -265,6 +281,16 @@ def _on_faces(face: Split, centers: Centers, found: _Found) -> None:
             xi = (middles[i] + middles[(i + 1) % 3]) / 2
             found.add(centers.find(keys_of(line)), face.nodes, shape.N(xi))
         return
+    if face.half >= 0:
+        if quadratic:
+            line, *halves = face.parts()
+            middle = centers.find(keys_of(line))
+            if len(shape.nodes) < 9:
+                found.add(middle, face.nodes, shape.N(np.zeros(2)))
+            for part, end in zip(halves, (-0.5, 0.5), strict=True):
+                xi = end * np.eye(2)[face.half]
+                found.add(centers.find(keys_of(part)), face.nodes, shape.N(xi))
+        return
     if len(shape.nodes) < 9:
         found.add(face.middles[:, 4], face.nodes, shape.N(np.zeros(2)), 4)
     if quadratic:
@@ -294,11 +320,10 @@ def is_corner(blocks: Iterable[Block], n_nodes: int) -> Mask:
     return corner
 
 
-def _face_corners(blocks: Iterable[Block]) -> Iterator[Rows]:
-    """Yield the corners (m, 3) or (m, 4) of the faces of elements."""
-    for block in blocks:
-        for face in block.shape.faces if block.shape is not None else ():
-            yield block.nodes[:, list(face)[: FACE_SHAPES[len(face)].corners]]
+def existing_keys(blocks: Iterable[Block]) -> Keys:
+    """Return the keys of the edges and faces of elements, each once and in order."""
+    keys = [entity_keys(block).ravel() for block in blocks if block.shape is not None and block.shape.faces]
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.uint64), *keys]))
 
 
 def entity_keys(block: Block) -> Keys:

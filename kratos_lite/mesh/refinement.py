@@ -14,15 +14,22 @@ from kratos_lite.mesh.blocks import Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of
 from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.growth import Cut, Growth, name_of
-from kratos_lite.mesh.hanging import entity_keys, is_corner, known_centers, split_edges, split_faces
+from kratos_lite.mesh.hanging import (
+    entity_keys,
+    existing_keys,
+    is_corner,
+    known_centers,
+    split_edges,
+    split_faces,
+)
 from kratos_lite.mesh.mesh import Mesh
-from kratos_lite.mesh.subdivision import pieces, shortest_diagonal
+from kratos_lite.mesh.subdivision import across, pieces, shortest_diagonal
 from kratos_lite.shapes import Shape, Tetrahedron4, Tetrahedron10
-from kratos_lite.typing import Ints, Mask
-from kratos_lite.validation import whole_numbers
+from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.validation import finite, whole_numbers
 
 
-def refine(mesh: Mesh, elements: ArrayLike | None = None) -> Finer:
+def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> Finer:
     """Return a mesh in which elements are cut into smaller ones of the same kind.
 
     A hexahedron, tetrahedron or wedge gives 8, a pyramid 6 and 4 tetrahedra.  Where a neighbor stays as it
@@ -32,6 +39,8 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None) -> Finer:
     ----------
     mesh : the mesh.
     elements : rows of the elements, or a mask; all if not given.
+    keep : (3,) float, a direction: edges along it are not cut, which gives 4 smaller elements.  Every
+        hexahedron and wedge of the mesh must have such edges, and all refinements of a mesh keep the same.
 
     Returns
     -------
@@ -41,7 +50,7 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None) -> Finer:
     Raises
     ------
     MeshError
-        Rows do not exist, or an element has no shape that can be cut.
+        Rows do not exist, or an element has no shape that can be cut, or no edges along `keep`.
 
     Examples
     --------
@@ -55,9 +64,10 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None) -> Finer:
     if mesh.hanging is not None:
         marked = _closed(mesh, centers, marked)
     growth = Growth(mesh, centers, _target)
-    growth.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at])))
+    direction = None if keep is None else finite(keep, "keep", (3,), error=MeshError)
+    growth.elements(lambda block, at: _cuts(mesh, block, np.flatnonzero(marked[at]), direction))
     cut = _cut_entities(mesh, marked)
-    growth.conditions(lambda block, at: _condition_cuts(block, cut))
+    growth.conditions(lambda block, at: _condition_cuts(mesh, block, cut, direction))
     return growth.finer()
 
 
@@ -86,12 +96,45 @@ def _target(block: Block, cell: str) -> tuple[str, type[Shape]]:
     return block.name, shape
 
 
-def _cuts(mesh: Mesh, block: Block, cells: Ints) -> list[Cut]:
+def axes_along(mesh: Mesh, block: Block, direction: Array) -> Ints:
+    """Return the axis of each cell (m,) all of whose edges are straight and along a direction (3,), or -1."""
+    shape = block.shape
+    assert shape is not None
+    corners = shape.nodes[: shape.corners]
+    found = np.full(len(block), -1)
+    if shape.cell not in ("hexahedron", "wedge", "quadrilateral", "line"):
+        return found
+    for axis in (2,) if shape.cell == "wedge" else range(shape.nodes.shape[1]):
+        steps = [(a, b) for a, b in shape.edges or ((0, 1),) if np.ptp(corners[[a, b]], axis=0)[axis] > 0]
+        ends = np.array(
+            [step for step in steps if np.count_nonzero(np.ptp(corners[list(step)], axis=0)) == 1]
+        )
+        edges = mesh.points[block.nodes[:, ends[:, 1]]] - mesh.points[block.nodes[:, ends[:, 0]]]
+        across = np.linalg.norm(np.cross(edges, direction), axis=-1)
+        length = np.linalg.norm(edges, axis=-1) * np.linalg.norm(direction)
+        found[(across <= 1e-6 * length).all(axis=1)] = axis
+    return found
+
+
+def _cuts_across(mesh: Mesh, block: Block, cells: Ints, direction: Array) -> list[Cut]:
+    """Return cells of a block with the pieces that they are cut into, edges along a direction kept."""
+    assert block.shape is not None
+    axes = axes_along(mesh, block.take(cells), direction)
+    return [
+        (cells[axes == axis], across(block.shape.cell, axis)) for axis in range(3) if (axes == axis).any()
+    ]
+
+
+def _cuts(mesh: Mesh, block: Block, cells: Ints, direction: Array | None) -> list[Cut]:
     """Return cells of a block with the pieces that they are cut into."""
     if not len(cells):
         return []
     if block.shape is None or block.shape.nodes.shape[1] != 3:
         raise MeshError(f"{mesh.place(block, int(cells[0]))}: cells of this kind cannot be refined")
+    if direction is not None:
+        if (axes_along(mesh, block.take(cells), direction) < 0).any():
+            raise MeshError(f"block {block.name}: not every element has edges along {direction.tolist()}")
+        return _cuts_across(mesh, block, cells, direction)
     if block.shape.cell != "tetrahedron":
         return [(cells, pieces(block.shape.cell))]
     shortest = shortest_diagonal(mesh.points[block.nodes[cells, :4]])
@@ -99,13 +142,18 @@ def _cuts(mesh: Mesh, block: Block, cells: Ints) -> list[Cut]:
     return [cut for cut in along if len(cut[0])]
 
 
-def _condition_cuts(block: Block, cut: Keys) -> list[Cut]:
+def _condition_cuts(mesh: Mesh, block: Block, cut: Keys, direction: Array | None) -> list[Cut]:
     """Return likewise the conditions on edges and faces that are cut."""
     shape = block.shape
     if shape is None or shape.cell == "point" or not len(block):
         return []
     cells = np.flatnonzero(np.isin(keys_of(block.nodes[:, : shape.corners]), cut))
-    return [(cells, pieces(shape.cell))] if len(cells) else []
+    cuts = []
+    if direction is not None and len(cells) and shape.cell in ("quadrilateral", "line"):
+        along = axes_along(mesh, block.take(cells), direction)
+        cuts = [] if shape.cell == "line" else _cuts_across(mesh, block, cells, direction)
+        cells = cells[along < 0]
+    return [*cuts, (cells, pieces(shape.cell))] if len(cells) else cuts
 
 
 # ---- one level between neighbors ---------------------------------------------------------------------
@@ -131,11 +179,12 @@ def _parts_of_split(mesh: Mesh, centers: Centers) -> tuple[Keys, Ints]:
     """Return the keys of the halves and quarters of split edges and faces, and whose these are."""
     corner = is_corner(mesh.blocks, mesh.n_nodes)
     parts, owners = [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int64)]
-    for found in (split_edges, split_faces):
-        for split in found(mesh.blocks, centers, corner):
-            inside = split.parts()
-            parts += [keys_of(part) for part in inside]
-            owners += [split.rows] * len(inside)
+    edges = split_edges(mesh.blocks, centers, corner)
+    faces = split_faces(mesh.blocks, centers, corner, existing_keys(mesh.blocks))
+    for split in (*edges, *faces):
+        inside = split.parts()
+        parts += [keys_of(part) for part in inside]
+        owners += [split.rows] * len(inside)
     return np.concatenate(parts), np.concatenate(owners)
 
 

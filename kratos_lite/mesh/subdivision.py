@@ -87,6 +87,24 @@ def _of_pyramid(X: Array) -> tuple[Piece, ...]:
     return tuple(found)
 
 
+@remembered
+def across(cell: str, axis: int) -> tuple[Piece, ...]:
+    """Return the pieces of a cell that is cut across all its axes but one: 4, or 2 of a face, 1 of a line.
+
+    Hexahedra and four-sided faces keep any axis, wedges that from triangle to triangle.
+    """
+    whole = pieces(cell)
+    X = LINEAR[cell].nodes
+    found: dict[tuple[float, ...], Piece] = {}
+    for piece in whole:
+        corners = piece.corners.copy()
+        corners[:, axis] = X[:, axis]
+        found.setdefault(
+            tuple(np.delete(corners, axis, axis=1).mean(axis=0).round(9).tolist()), Piece(cell, corners)
+        )
+    return tuple(found.values())
+
+
 def shortest_diagonal(corners: Array) -> Ints:
     """Return which of the `DIAGONALS` of tetrahedra with corners (m, 4, 3) is the shortest, (m,)."""
     ends = [corners[:, list(one)].mean(axis=1) - corners[:, list(two)].mean(axis=1) for one, two in DIAGONALS]

@@ -55,7 +55,7 @@ def bar():
 
 def test_a_mesh_that_is_fine_enough_stays():
     model = bar()
-    result = model.solve(error=0.9)
+    result = model.solve(error=0.99)
     assert result.mesh is model.mesh
     assert len(result.report.history) == 1
 

@@ -932,3 +932,22 @@ def test_progress_shows_after_two_seconds_five_times_a_second_and_is_wiped(monke
 def test_progress_of_a_short_work_or_without_a_terminal_is_not_shown(monkeypatch):
     assert shown(monkeypatch, True, CALLS[:1]) == ""
     assert shown(monkeypatch, False, CALLS) == ""
+
+
+def test_an_error_asked_for_is_reached_on_a_finer_mesh(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kl.write("bar.vtu", kl.box((4, 1, 1), (4, 1, 1)))
+    words = ["--material", "E=1e9,nu=0.3", "--fix", "x-:xyz", "--traction", "x+:0,0,1e3"]
+    done = run("solve", "bar.vtu", *words, "--error", "15%", "-o", "fine.vtu")
+    assert done.code == 0
+    assert "of the energy norm at most" in done.out
+    assert done.out.count("refinement") >= 2
+    assert Path("fine.vtu").exists()
+
+
+@pytest.mark.parametrize("share", ["0", "100%", "-1%", "much", "1.5", "nan"])
+def test_an_error_that_is_no_share_is_refused(run, tmp_path, monkeypatch, share):
+    monkeypatch.chdir(tmp_path)
+    kl.write("bar.vtu", kl.box())
+    done = run("solve", "bar.vtu", "--material", "E=1e9,nu=0.3", f"--error={share}")
+    assert done.refuses("--error must be a share between 0 and 1")

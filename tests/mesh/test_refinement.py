@@ -91,6 +91,48 @@ def test_quadratic_fields_are_exact_across_hanging_nodes(kind):
     assert np.abs(model.solve().u - quadratic(mesh.points)).max() < 1e-11
 
 
+ACROSS = [("8N", "z"), ("8N", "x"), ("20N", "y"), ("27N", "z"), ("27N", "x"), ("6N", "z"), ("15N", "z")]
+
+
+@pytest.mark.parametrize(("kind", "along"), ACROSS)
+def test_cells_cut_across_a_direction_keep_their_edges_along_it(kind, along):
+    direction = np.eye(3)["xyz".index(along)]
+    mesh = block(kind, (2, 2, 2))
+    n = mesh.n_elements
+    for rows in ([0], [0, 3], [2], [5]):
+        mesh = refine(mesh, rows, direction).mesh
+    assert (mesh.n_elements - n) % 3 == 0
+    assert abs(volume(mesh) - 0.91) < 1e-12
+    assert abs(area(mesh.boundary, mesh) - 2 * (1.3 + 0.7 + 0.91)) < 1e-12
+    places = mesh.points[np.concatenate([b.nodes[:, : b.shape.corners].ravel() for b in mesh.blocks])]
+    assert len(set((places @ direction).round(9))) == 3
+    model = kl.Model(mesh, UNIT)
+    model.fix(boundary_nodes(mesh), field=lambda X: X @ SLOPE)
+    assert np.abs(model.solve().u - mesh.points @ SLOPE).max() < 1e-13
+    if kind in QUADRATIC:
+        model = kl.Model(mesh, UNIT)
+        model.fix(boundary_nodes(mesh), field=quadratic)
+        lam, mu = 0.3 / (1.3 * 0.4), 1 / 2.6
+        model.add(kl.BodyForce((-lam - mu - 2 * mu, 2 * mu, -2 * mu)))
+        assert np.abs(model.solve().u - quadratic(mesh.points)).max() < 1e-11
+
+
+def test_conditions_are_halved_or_quartered_with_cells_cut_across():
+    plain = block("8N", (2, 1, 1))
+    faces = [plain.faces(side)[0].nodes for side in ("x-", "z+")]
+    shape = plain.boundary[0].shape
+    mesh = plain.replace(conditions=[kl.Block("SurfaceCondition3D4N", np.vstack(faces), shape=shape)])
+    finer = refine(mesh, None, (0, 0, 1))
+    assert np.bincount(finer.conditions).tolist() == [2, 4, 4]
+    assert abs(area(finer.mesh.conditions, finer.mesh) - 0.91 - 1.3) < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["4N", "5N", "8N"])
+def test_cells_without_edges_along_a_direction_are_refused(kind):
+    with pytest.raises(kl.MeshError, match="not every element has edges along"):
+        refine(block(kind), None, (1.0, 1.0, 0.0))
+
+
 def test_reactions_at_hanging_nodes_go_to_their_masters():
     """A column under its weight: the support carries it all, and inner nodes carry nothing."""
     mesh = thrice(block("8N", (2, 2, 2)))
