@@ -174,16 +174,26 @@ class _Level:
         return all(group.element.formulation == "standard" for group in self.result.groups)
 
     @cached_property
+    def corrected(self) -> float:
+        """The estimate in √J as the level before corrects it."""
+        if self.before is None or not self.before.is_nested:
+            return self.estimate
+        ratio = self.estimate / self.before.estimate
+        if not ratio < SETTLED:
+            return max(self.estimate, self.change)
+        found = self.change * ratio / float(np.sqrt(1 - ratio**2))
+        if ratio < 0.5:
+            return found
+        left = float(np.sqrt(max(self.before.corrected**2 - self.change**2, 0.0)))
+        return max(
+            found, min(left, 1.5 * found)
+        )  # of a short step: what the one before leaves, within reason
+
+    @cached_property
     def bound(self) -> float:
         """The error in √J that is reported."""
         alone = self.result.error().absolute
-        if self.before is None or not self.before.is_nested:
-            return alone
-        ratio = self.estimate / self.before.estimate
-        if not ratio < SETTLED:
-            return max(alone, self.change)
-        corrected = self.change * ratio / float(np.sqrt(1 - ratio**2))
-        return max(SAFETY * corrected, alone)
+        return alone if self.before is None else max(SAFETY * self.corrected, alone)
 
     @property
     def reported(self) -> float:
