@@ -45,7 +45,16 @@ def test_python_of_the_readme_runs(number, tmp_path):
 
 @pytest.mark.parametrize(
     "page",
-    ["users.md", "add-an-element.md", "formats.md", "exercises.md", "bodies.md", "dynamics.md", "ale.md"],
+    [
+        "users.md",
+        "elements.md",
+        "add-an-element.md",
+        "formats.md",
+        "exercises.md",
+        "bodies.md",
+        "dynamics.md",
+        "ale.md",
+    ],
 )
 def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
@@ -86,8 +95,8 @@ def test_elements_of_the_guide_conform(tmp_path):
     script = tmp_path / "guide.py"
     script.write_text("\n".join(python_blocks((EXAMPLES.parent / "docs" / "add-an-element.md").read_text())))
     out = run(sys.executable, "-m", "kratos_lite", "check", script)
-    assert "MyWedge3D6N: 32 checks passed, 0 failed" in out
-    assert "MeanDilatation3D8N: 32 checks passed, 0 failed" in out
+    assert "MyWedge3D6N: 33 checks passed, 0 failed" in out
+    assert "MeanDilatation3D8N: 33 checks passed, 0 failed" in out
     assert "slate (TransverseIsotropic3D): 6 checks passed, 0 failed" in out
 
 

@@ -42,7 +42,7 @@ def error_bound(origin: Origin, groups: Sequence[ElementGroup], u: Array, energy
         if not group.element.inherits(*GEOMETRY, *STRESS):
             raise ModelError(
                 "the bound of the error is for elements whose strain is that of their displacements; "
-                f"{group.element.__name__} has its own: ask for method='recovery'"
+                f"{group.element.__name__} has its own: take formulation='standard', or method='recovery'"
             )
     sides = Sides(mesh)
     body = [np.zeros((*group.nodes.shape, 3)) for group in groups]

@@ -101,7 +101,7 @@ def test_every_element_under_every_load(kind):
 
 
 def test_prestress_and_two_materials():
-    mesh = kl.box((2, 1, 1), (4, 2, 2))
+    mesh = kl.box((2, 1, 1), (4, 2, 2), "KinematicLinear3D8N")
     model = kl.Model(mesh, kl.Isotropic3D(E=1e3, nu=0.0))
     model.assign(kl.Isotropic3D(E=5e3, nu=0.0), mesh.elements()[: mesh.n_elements // 2])
     model.fix("x-")
@@ -127,7 +127,7 @@ def test_a_point_load_is_refused():
 
 
 def test_a_support_of_points_is_refused():
-    model = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e3, nu=0.3))
+    model = kl.Model(kl.box((2, 1, 1), (2, 1, 1), "KinematicLinear3D8N"), kl.Isotropic3D(E=1e3, nu=0.3))
     model.fix(lambda X: (X[:, 0] != 1) & (X[:, 2] == 0))
     model.add(kl.Gravity((0, 0, -1.0)))
     model.assign(kl.Isotropic3D(E=1e3, nu=0.3, density=1.0))

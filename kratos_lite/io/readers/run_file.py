@@ -96,7 +96,7 @@ def read_run_file(
     if time is None and _changes(model):
         model.notes.append("loads and supports that change in time are taken at t = 0")
     time = time and time.starting_from(model.supports, model.initial_displacement)
-    return Case(model, time, 0, solver, tolerance, outputs, files=settings.files)
+    return Case(model, time, 0, solver, tolerance, outputs=outputs, files=settings.files)
 
 
 def _choose_formulation(model: Model, settings: Settings) -> None:
