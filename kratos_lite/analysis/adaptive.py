@@ -38,12 +38,14 @@ from kratos_lite.validation import number
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
-SAFETY = 1.2
+SAFETY = 1.25
 """Safety of an estimate that a coarser mesh corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
-AIM = 0.9
+AIM = 0.8
 """Share of the error asked for at which the next mesh aims."""
+GROWTH = 1.5
+"""How many times more elements the next mesh has, unless singular ones hold most of the error."""
 SINGULAR = 0.25
 """Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
@@ -166,17 +168,32 @@ class _Level:
         points = self.model.mesh.points
         return float(np.sqrt(2 * totals(points, self.result.groups, self.result.u - old)[0]))
 
+    @property
+    def is_nested(self) -> bool:
+        """Whether a finer mesh has the strains of this one: others are not of displacements alone."""
+        return all(group.element.formulation == "standard" for group in self.result.groups)
+
+    @cached_property
+    def corrected(self) -> float:
+        """The estimate in √J as the level before corrects it."""
+        if self.before is None or not self.before.is_nested:
+            return self.estimate
+        ratio = self.estimate / self.before.estimate
+        if not ratio < SETTLED:
+            return max(self.estimate, self.change)
+        found = self.change * ratio / float(np.sqrt(1 - ratio**2))
+        if ratio < 0.5:
+            return found
+        left = float(np.sqrt(max(self.before.corrected**2 - self.change**2, 0.0)))
+        return max(
+            found, min(left, 1.5 * found)
+        )  # of a short step: what the one before leaves, within reason
+
     @cached_property
     def bound(self) -> float:
         """The error in √J that is reported."""
         alone = self.result.error().absolute
-        if self.before is None:
-            return alone
-        ratio = self.estimate / self.before.estimate
-        if not ratio < SETTLED:
-            return max(alone, self.change)
-        corrected = self.change * ratio / float(np.sqrt(1 - ratio**2))
-        return max(SAFETY * corrected, alone)
+        return alone if self.before is None else max(SAFETY * self.corrected, alone)
 
     @property
     def reported(self) -> float:
@@ -304,7 +321,11 @@ def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
         else:
             low = middle
     found = times(low)
-    found[squares.argmax()] = max(found[squares.argmax()], 1)
+    least = 1
+    if squares[singular].sum() < squares.sum() / 2:
+        least = int(np.ceil((GROWTH - 1) * len(squares) / (pieces - 1)))
+    largest = np.argsort(-squares)[:least]
+    found[largest] = np.maximum(found[largest], 1.0)
     return found
 
 

@@ -224,7 +224,7 @@ def _held(mesh: Mesh, corners: Ints, fixed: Mask) -> Mask:
     X, every = mesh.points[corners], fixed[corners].all(axis=1)
     normal = np.abs(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]))
     main = normal > 0.99 * np.linalg.norm(normal, axis=1, keepdims=True)
-    return every.all(axis=1) | (every & main).any(axis=1)
+    return np.asarray(np.all(every, axis=1) | np.any(every & main, axis=1))
 
 
 def _alone(across: OppositeFaces, start: Ints) -> Mask:
@@ -232,9 +232,8 @@ def _alone(across: OppositeFaces, start: Ints) -> Mask:
     found = np.zeros((len(start), 2), dtype=bool)
     for at, number, face, cells in _of_faces(across, start):
         for k, pair in enumerate(_sides(across, number, face)):
-            found[at, k] = (across.mate[across.number(number, np.array(pair)[:, None], cells)] < 0).all(
-                axis=0
-            )
+            ends = across.mate[across.number(number, np.array(pair)[:, None], cells)]
+            found[at, k] = np.all(ends < 0, axis=0)
     return found
 
 

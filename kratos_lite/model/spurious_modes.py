@@ -46,12 +46,13 @@ def check_spurious_modes(
     for open_ in faces.non_conforming():
         mate[open_] = -1
     mirrored, held = _supported(across, ends[mate[ends] < 0], fixed)
-    joined = ((mate >= 0) | mirrored)[ends].any(axis=2)  # (m, 3)
+    joined: Mask = np.any(((mate >= 0) | mirrored)[ends], axis=2)  # (m, 3)
     rows = faces.element[ends[:, 0, 0]]
     sound = ~reduced
     sound[rows[joined.sum(axis=1) >= 2]] = True
     held |= (mate >= 0) & sound[faces.element[mate]]
-    free = ~sound[rows] & ~(joined[:, :, None] & held[ends]).all(axis=2).any(axis=1)
+    chained = np.all(joined[:, :, None] & held[ends], axis=2)
+    free = ~sound[rows] & ~np.any(chained, axis=1)
     if free.any():
         row = int(rows[np.argmax(free)])
         raise ModelError(
@@ -84,7 +85,7 @@ def _supported(across: OppositeFaces, outer: Ints, fixed: Mask) -> tuple[Mask, M
     """
     mirrored = np.zeros(len(across.mate), dtype=bool)
     held = mirrored.copy()
-    outer = outer[fixed[across.corners(outer)].all(axis=1).any(axis=1)]
+    outer = outer[np.any(np.all(fixed[across.corners(outer)], axis=1), axis=1)]
     for face, nodes in zip(outer.tolist(), across.nodes(outer), strict=True):
         all_fixed = fixed[nodes].all(axis=0)
         if all_fixed.any():

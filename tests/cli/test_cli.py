@@ -696,7 +696,7 @@ def test_forces_that_cancel_are_shown_as_zero(run, box):
 
 
 def test_a_defect_is_told_apart_from_bad_input(run, box, monkeypatch):
-    monkeypatch.setattr(kl.Model, "solve", lambda *_: 1 / 0)
+    monkeypatch.setattr(kl.Model, "solve", lambda *_, **__: 1 / 0)
     done = run("solve", "box.vtu", *HELD)
     assert done.code == 1
     assert done.err.startswith("internal error: ZeroDivisionError: division by zero\n")
@@ -704,14 +704,14 @@ def test_a_defect_is_told_apart_from_bad_input(run, box, monkeypatch):
 
 
 def test_want_of_memory_is_told(run, box, monkeypatch):
-    def greedy(*_):
+    def greedy(*_, **__):
         raise MemoryError
 
     monkeypatch.setattr(kl.Model, "solve", greedy)
     assert run("solve", "box.vtu", *HELD).refuses("not enough memory", "--solver amg")
 
 
-def interrupt(*_):
+def interrupt(*_, **__):
     signal.raise_signal(signal.SIGINT)
 
 
