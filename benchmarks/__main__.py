@@ -197,7 +197,7 @@ def pythons(words: Sequence[str]) -> dict[str, str]:
 
 def write_report() -> int:
     """Make the page and its picture from the results kept."""
-    files = [kept(path) for path in sorted(RESULTS.glob("*.json"))]
+    files = [found for path in sorted(RESULTS.glob("*.json")) if "command" in (found := kept(path))]
     if not files:
         print(f"there are no results in {RESULTS}; make some with --out", file=sys.stderr)
         return 1
