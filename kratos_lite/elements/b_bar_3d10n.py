@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from kratos_lite.elements import arguments
 from kratos_lite.elements.b_bar import BBar
 from kratos_lite.elements.tables import StrainTables
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, tetrahedron
 from kratos_lite.shapes import Tetrahedron10
 from kratos_lite.typing import Array
@@ -55,10 +55,17 @@ class BBar3D10N(BBar):
         ------
         InputError
             If `C` is not given.
+        MaterialError
+            If its bulk or shear modulus is not positive.
         """
         if C is None:
             raise InputError(f"the strain of {type(self).__name__} depends on the material; give its C")
         C = arguments.elasticity(C, self.X)
         bulk = C[..., :3, :3].sum(axis=(-1, -2)) / 9
         shear = np.einsum("...ii->...", C[..., 3:, 3:]) / 3
+        if not ((bulk > 0) & (shear > 0)).all():
+            raise MaterialError(
+                f"{type(self).__name__} needs a C with bulk and shear modulus > 0; got {bulk.min():.3g} and "
+                f"{shear.min():.3g} Pa"
+            )
         return np.sqrt(np.minimum(1.0, shear / bulk))

@@ -125,7 +125,7 @@ class EnhancedStrain3D8N(KinematicLinear):
         xi = arguments.points(xi)
         alpha = self._amplitudes(C, self._modes(self.rule.points)) @ _column(arguments.nodal(u, self.X))
         enhanced = self._modes(xi.reshape(-1, 3)) @ alpha[..., None, :, :]
-        return super().strain_at(xi, u) - enhanced.reshape(*self.X.shape[:-2], *xi.shape[:-1], 6)
+        return super().strain_at(xi, u) - enhanced.reshape(*enhanced.shape[:-3], *xi.shape[:-1], 6)
 
     def _modes(self, xi: Array) -> Array:
         """Return G (..., g, 6, 21) at points (g, 3)."""

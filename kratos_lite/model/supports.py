@@ -128,8 +128,9 @@ class Supports:
         else:
             if fixing.field is not None:
                 value = fixing.field(self.mesh.points[rows])
-            if np.ndim(value) == 2 and len(np.asarray(value)) == len(rows) and not stays.all():
-                value = np.asarray(value)[stays]
+            value = finite(value, "a prescribed displacement")
+            if value.ndim == 2 and len(value) == len(rows):
+                value = value[stays]
             self.fix(rows[stays], fixing.axes, value, fixing.override)
         self.fixings.append(fixing)
 

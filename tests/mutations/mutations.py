@@ -130,8 +130,8 @@ MUTATIONS = [
     ),
     Mutation(
         "model/loads/body.py",
-        "return group.material.density * self.force",
-        "return -group.material.density * self.force",
+        "return group.material.density * self.nodal(points)",
+        "return -group.material.density * self.nodal(points)",
         LOADS,
     ),
     Mutation("model/loads/nodal.py", "total[rows] += self.force", "total[rows] -= self.force", LOADS),

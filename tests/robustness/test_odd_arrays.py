@@ -62,6 +62,10 @@ def element(name, *arguments):
     return getattr(BRICK(BRICK.nodes), name)(*arguments)
 
 
+def enhanced(name, *arguments):
+    return getattr(kl.EnhancedStrain3D8N(BRICK.nodes), name)(*arguments)
+
+
 PRESCRIBED = (POINT, VECTOR, 0.0)
 NODES, CELLS = np.arange(4), np.arange(8)[None]
 TURNED = 1e-3 * CUBE.points[:, ::-1]
@@ -134,6 +138,14 @@ CASES: Case = {
     ("Result.reaction", "where"): (RESULT.reaction, NODES),
     ("reaction_resultant", "where"): (lambda v: kl.reaction_resultant(static(), RESULT, v), NODES),
     ("reaction_resultant", "center"): (lambda v: kl.reaction_resultant(static(), RESULT, "z-", v), VECTOR),
+    ("DisplacementAt", "point"): (lambda v: kl.DisplacementAt(v, "z").value(RESULT), POINT),
+    ("StressAt", "point"): (lambda v: kl.StressAt(v, "zz").value(RESULT), POINT),
+    ("MeanDisplacement", "part"): (lambda v: kl.MeanDisplacement(v, "z").value(RESULT), CUBE.nodes("z+")),
+    ("ReactionOf", "part"): (lambda v: kl.ReactionOf(v, "z").value(RESULT), NODES),
+    ("Structure.fix", "field"): (
+        lambda v: changed("fix", "z+", "xyz", field=lambda X: v),
+        VECTOR,
+    ),
     ("Force", "point"): (lambda v: moved(kl.RigidBody, kl.Force(v, VECTOR)), POINT),
     ("Force", "force"): (lambda v: moved(kl.RigidBody, kl.Force((0.5, 0.5, 0.5), v)), VECTOR),
     ("Torque", "torque"): (lambda v: moved(kl.RigidBody, kl.Torque(v)), VECTOR),
@@ -146,6 +158,10 @@ CASES: Case = {
         (f"KinematicLinear.{name}", "xi"): (lambda v, name=name: element(name, v), VECTOR)
         for name in ("B", "J", "dNdX", "detJ", "position")
     },
+    ("KinematicLinear.strain_at", "xi"): (lambda v: element("strain_at", v, U), VECTOR),
+    ("KinematicLinear.strain_at", "u"): (lambda v: element("strain_at", VECTOR, v), U),
+    ("EnhancedStrain3D8N.strain_at", "C"): (lambda v: enhanced("strain_at", VECTOR, U, v), ROCK.C),
+    ("BBar3D10N.kept", "C"): (lambda v: kl.BBar3D10N(kl.BBar3D10N.nodes).kept(v), ROCK.C),
     ("KinematicLinear.body_force", "b"): (lambda v: element("body_force", v), VECTOR),
     ("KinematicLinear.internal_load", "stress"): (lambda v: element("internal_load", v), np.ones((8, 6))),
     ("KinematicLinear.strain", "u"): (lambda v: element("strain", v), U),
