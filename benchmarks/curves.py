@@ -170,6 +170,7 @@ def picture(rows: Sequence[Row], scene: str, path: Path) -> None:
         ax.set(xlabel="seconds", title=what)
         ax.grid(True, which="major", alpha=0.25)
         ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter("")
     axes[0].set(ylabel="relative error of displacement")
     figure.suptitle(scene.replace("_", " "), fontweight="bold")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", frameon=False)

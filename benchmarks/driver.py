@@ -28,6 +28,8 @@ ROOT = Path(__file__).resolve().parents[1]
 LAUNCHER = Path(__file__).with_name("launch.py")
 ERRORS = ("difference", "displacement")
 """Those kept of run time against error; of the adaptive solution that in the energy norm, too."""
+PLANE = ("l_domain", "hole_incompressible", "cook")
+"""Scenes of one layer: their unknowns grow as n²."""
 ENOUGH = 1e-4
 """Error at which a curve has gone far enough."""
 LARGE = 40
@@ -134,7 +136,11 @@ class Driver:
         if "failed" in row or row["group"] != "error":
             return "failed" in row
         larger = [run.n for run in runs if run.series == series(row) and run.n > row["n"]]
-        growth = 3.0 if "variant" in row else (min(larger, default=row["n"]) / row["n"]) ** 3
+        growth = (
+            3.0
+            if "variant" in row
+            else (min(larger, default=row["n"]) / row["n"]) ** (2 if row["scene"] in PLANE else 3)
+        )
         return row["errors"].get("displacement", 1.0) < ENOUGH or row["warm"] * growth > self.point
 
     def _forget(self, place: tuple[str, str, int]) -> None:
