@@ -19,7 +19,9 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from kratos_lite.analysis.error_estimate import QuantityError
 from kratos_lite.analysis.layers import layer_direction
+from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
@@ -33,7 +35,7 @@ from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Ints, Mask, Progress
-from kratos_lite.validation import number
+from kratos_lite.validation import number, short
 
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
@@ -67,16 +69,18 @@ def solve_to(
     progress: Progress | None = None,
     most_unknowns: int = UNKNOWNS,
     geometry: Geometry | None = None,
+    quantity: Quantity | None = None,
 ) -> Result:
     """Solve a static model on meshes that become finer until the error is as small as asked for.
 
     Parameters
     ----------
     model : the structure; it stays as it is.
-    error : of the energy norm, relative, such as 0.01.
+    error : of the energy norm or of the quantity, relative, such as 0.01.
     solver, tolerance, progress : as for `Model.solve`.
     most_unknowns : no larger mesh is solved.
     geometry : by part, a function that takes places (k, 3) in m near its true surface onto it.
+    quantity : the mesh is made finer for it, where its `QuantityError` lies.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def solve_to(
     Raises
     ------
     InputError
-        The error is no number between 0 and 1.
+        The error is no number between 0 and 1, or the quantity is of rows, which are others on finer meshes.
     MeshError, ModelError, SolveError
         As by `Model.solve`; or what the model has cannot be carried over to a finer mesh.
     """
@@ -97,19 +101,24 @@ def solve_to(
         raise ModelError(
             "a model whose material moves through its mesh is not refined; solve it without error"
         )
+    check_quantity(quantity)
     levels: list[_Level] = []
     steps: list[Finer] = []
     history: list[RefinementStep] = []
     missed, keep = "", None
     while True:
         start = perf_counter()
-        result = StaticAnalysis(model, solver, tolerance, progress).solve()
-        level = _Level(model, result, steps, levels[-1] if levels else None)
+        analysis = StaticAnalysis(model, solver, tolerance, progress)
+        result, before = analysis.solve(), levels[-1] if levels else None
+        level = _Level(model, result, steps, before)
+        if quantity is not None:
+            level = _QuantityLevel(model, result, steps, before, quantity)
         levels = [*levels[-1:], level]
         history.append(level.step(perf_counter() - start))
-        if level.reported <= aim or missed:
+        analysis.release()
+        if (level.reported <= aim and level.is_settled) or missed:
             break
-        if keep is None and model.mesh.hanging is None:
+        if keep is None and quantity is None and model.mesh.hanging is None:
             keep = layer_direction(result, FLAT * aim * level.norm)
         steps = _next(level, aim, keep, geometry or {})
         model = _carried(model, steps)
@@ -124,7 +133,27 @@ def solve_to(
             f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         )
     result.report.history, result.report.error = history, level.reported
+    result.report.error_of = "the energy norm" if quantity is None else str(quantity)
     return result
+
+
+def check_quantity(quantity: Quantity | None) -> None:
+    """Raise InputError for what is no quantity, or one that does not hold on finer meshes.
+
+    Parameters
+    ----------
+    quantity : such as `DisplacementAt`, or None.
+    """
+    if quantity is None:
+        return
+    if not isinstance(quantity, Quantity):
+        raise InputError(f"quantity must be one such as DisplacementAt; got {short(quantity)}")
+    part = getattr(quantity, "part", "")
+    if not (isinstance(part, str) or callable(part)):
+        raise InputError(
+            f"{quantity} is of rows of nodes, which are others on a finer mesh; give the part by its name, "
+            "or a function of places"
+        )
 
 
 @dataclass(eq=False)
@@ -200,6 +229,15 @@ class _Level:
         """The same, relative."""
         return self.bound / self.norm if self.norm > 0 else 0.0
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether the estimate needs no other level beside it."""
+        return True
+
+    def aim(self, error: float) -> float:
+        """Return the estimate in √J at which a mesh aims that is to reach a relative error."""
+        return AIM * error / self.reported * self.estimate
+
     def step(self, seconds: float) -> RefinementStep:
         """Return the level as a step of the history."""
         kinds = dict.fromkeys(group.element.__name__ for group in self.result.groups)
@@ -247,13 +285,51 @@ class _Level:
         return cuts
 
 
+@dataclass(eq=False)
+class _QuantityLevel(_Level):
+    """The same for the error of a quantity: products of two errors stand for the squares of one."""
+
+    quantity: Quantity
+
+    @cached_property
+    def found(self) -> QuantityError:
+        """Error of the quantity."""
+        return self.result.error(self.quantity)
+
+    @cached_property
+    def squares(self) -> Array:
+        """What each element contributes to the error of the quantity (m,), in its unit."""
+        return np.abs(self.found.per_element)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the level before has elements of the same order: one level alone may say too little."""
+        return self.before is not None and self.before.order == self.order
+
+    @property
+    def reported(self) -> float:
+        """The error on the safe side, relative; at least what the last step promises of the next ones."""
+        found, before = self.found, self.before
+        absolute = found.absolute
+        if isinstance(before, _QuantityLevel) and before.order == self.order:
+            ratio = min(SETTLED, (self.estimate / before.estimate) ** 2) if before.estimate > 0 else 0.0
+            change = abs(found.value - before.found.value)
+            absolute = max(absolute, SAFETY * change * ratio / (1 - ratio))
+        size = abs(found.value + found.signed)
+        return absolute / size if size > 0 else float(absolute > 0)
+
+    def aim(self, error: float) -> float:
+        """Return the root of the sum of `squares` at which a mesh aims that is to reach a relative error."""
+        return self.estimate * float(np.sqrt(AIM * error / self.reported))
+
+
 def _next(level: _Level, error: float, keep: Array | None, geometry: Geometry) -> list[Finer]:
     """Return the steps to the next mesh; edges along `keep` are not cut."""
     mesh = level.model.mesh
     if _can_be_raised(level.model):
         named = raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")
         return [named.onto(geometry)]
-    aim = AIM * error / level.reported * level.estimate
+    aim = level.aim(error)
     kept = level.kept()
     times = _times(level.squares, kept, aim, 8 if keep is None else 4)
     steps = [refine(mesh, times > 0, keep).onto(geometry)]

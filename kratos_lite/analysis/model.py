@@ -15,6 +15,7 @@ from kratos_lite.typing import Array, Complexes, Progress
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
+    from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.analysis.transient import TransientAnalysis
 
 
@@ -56,6 +57,7 @@ class Model(Structure):
         error: float | None = None,
         most_unknowns: int | None = None,
         geometry: Mapping[str, Callable[[Array], Array]] | None = None,
+        quantity: Quantity | None = None,
     ) -> Result:
         """Check the model and solve it: statics, or the steady state of a motion at the time 0.
 
@@ -70,6 +72,9 @@ class Model(Structure):
             reached.
         geometry : with `error`: by part, a function that takes places (k, 3) in m near its true surface onto
             it; without, edges that are straight stay straight.
+        quantity : with `error`: the error is that of a quantity, such as ``kl.DisplacementAt(point, "z")``,
+            as `Result.error` estimates it, in place of the energy norm.  Relative to its value, which must
+            not be 0.
 
         Returns
         -------
@@ -86,7 +91,8 @@ class Model(Structure):
         if error is not None:
             from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
-            return solve_to(self, error, solver, tolerance, progress, most_unknowns or UNKNOWNS, geometry)
+            most = most_unknowns or UNKNOWNS
+            return solve_to(self, error, solver, tolerance, progress, most, geometry, quantity)
         if self.motion is not None:
             from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 

@@ -33,7 +33,7 @@ class RefinementStep:
     ----------
     elements, kinds : number of elements, and their classes.
     unknowns : free degrees of freedom.
-    error : relative error of the energy norm, as it was known then.
+    error : relative error of the energy norm or of the quantity, as it was known then.
     seconds : for solution and estimate.
     """
 
@@ -66,7 +66,8 @@ class Report:
     skipped : what this solution did without, as it would have changed nothing.
     kernels : what computed, compiled kernels and their threads or NumPy.
     formulation : which one of the elements was chosen and why; "" where their names say it.
-    error : relative error of the energy norm at most, of a solution to a requested accuracy.
+    error : relative error at most, of a solution to a requested accuracy.
+    error_of : what has that error.
     history : the meshes that it took, the last one of the result.
     motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
     """
@@ -89,6 +90,7 @@ class Report:
     formulation: str = ""
     motion: dict[str, Any] = field(default_factory=dict)
     error: float | None = None
+    error_of: str = "the energy norm"
     history: list[RefinementStep] = field(default_factory=list)
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
@@ -114,7 +116,7 @@ class Report:
         rows += [("peak memory", f"{self.peak_memory / 1e6:.0f} MB"), ("kernels", self.kernels)]
         rows += self.motion_rows()
         if self.error is not None:
-            rows.append(("error", f"{self.error:.2%} of the energy norm at most"))
+            rows.append(("error", f"{self.error:.2%} of {self.error_of} at most"))
         rows += [("refinement", str(step)) for step in self.history if len(self.history) > 1]
         if self.skipped:
             rows.append(("skipped", "; ".join(self.skipped)))

@@ -46,8 +46,8 @@ def test_the_true_error_is_at_most_the_reported_one(make, error, round_):
         assert np.abs(r - 1).max() < 1e-3
 
 
-def bar():
-    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.3))
+def bar(cells=(4, 1, 1), **options):
+    model = kl.Model(kl.box((4, 1, 1), cells, **options), kl.Isotropic3D(E=1e6, nu=0.3))
     model.fix("x-")
     model.add(kl.Traction("x+", (0, 0, 1.0)))
     return model
@@ -88,3 +88,33 @@ def test_a_motion_is_refused():
     model.add(kl.ale.Rotation("z", 1.0))
     with pytest.raises(kl.ModelError, match="is not refined"):
         model.solve(error=0.1)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return bar((24, 6, 6), element="KinematicLinear3D20N").solve()
+
+
+@pytest.mark.parametrize(
+    "quantity",
+    [
+        kl.DisplacementAt((4, 0.5, 0.5), "z"),
+        kl.MeanDisplacement("x+", "z"),
+        kl.ReactionOf("x-", "z"),
+        kl.StressAt((2, 0.5, 0.9), "xx"),
+    ],
+    ids=repr,
+)
+def test_a_quantity_is_as_accurate_as_asked_for(quantity, reference):
+    result = bar().solve(error=0.02, quantity=quantity)
+    exact = quantity.value(reference)
+    assert abs(quantity.value(result) / exact - 1) <= result.report.error + 1e-3  # of the reference
+    assert result.report.error <= 0.02
+    assert str(quantity) in dict(result.table())["error"]
+
+
+def test_a_quantity_of_node_rows_is_refused_before_anything_is_solved():
+    with pytest.raises(kl.InputError, match="rows of nodes, which are others on a finer mesh"):
+        bar().solve(error=0.02, quantity=kl.ReactionOf(np.arange(4), "z"))
+    with pytest.raises(kl.InputError, match="quantity must be one such as DisplacementAt"):
+        bar().solve(error=0.02, quantity="z")
