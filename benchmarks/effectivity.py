@@ -49,6 +49,18 @@ star marks a warning: plain elements near ν = ½ lock, and their estimate is to
 few elements and singular corners are named, too. A proven bound, larger and more expensive, is
 `result.error(method="equilibrated")`.
 
+**A requested error.** `model.solve(error=0.01)` and `kratos-lite solve … --error 1%` solve on meshes
+that become finer until the reported error is as small: linear elements become quadratic first, then the
+elements that hold most of the error are cut, with nodes that hang on larger neighbors. `report.history`
+and the summary show the meshes; the result is on the last one. Edges along a direction in which neither
+cells nor stresses change, as in plane strain, are not cut. Supports and loads should be given by part,
+by predicate, or as functions of places (`model.fix(…, field=…)`), which new nodes take exactly; rows
+and masks of nodes grow by their faces, forces on single nodes stay there. Curved surfaces of straight
+cells need `geometry={part: function}`. Estimates of successive meshes correct each other, so that the
+reported error is safe at singular points, too. With `quantity=kl.StressAt((2, 0.5, 0.9), "xx")` the
+error is that of the quantity, relative to its value, and the elements that matter for it are cut; give
+parts by name.
+
 Each entry is for two meshes, the second of half the cell size; "exact" where the element has the exact
 solution, "-" where it is refused or the scene is not made for it.
 
