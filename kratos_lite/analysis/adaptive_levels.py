@@ -1,0 +1,195 @@
+"""Levels of an adaptive solution: a mesh, its solution, and what it and the level before say of the error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kratos_lite.analysis.error_estimate import QuantityError
+from kratos_lite.analysis.quantities import Quantity
+from kratos_lite.analysis.report import RefinementStep
+from kratos_lite.analysis.result import Result
+from kratos_lite.assembly.gauss_point_fields import totals
+from kratos_lite.mesh import Finer
+from kratos_lite.model.structure import Structure
+from kratos_lite.typing import Array, Ints
+
+SAFETY = 1.25
+"""Safety of an estimate that a coarser mesh corrects."""
+SETTLED = 0.9
+"""Share to which estimates must fall, so that they can be corrected."""
+AIM = 0.8
+"""Share of the error asked for at which the next mesh aims."""
+SINGULAR = 0.25
+"""Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
+solution counts as singular there."""
+
+
+@dataclass(eq=False)
+class Level:
+    """A model solved, and what is known of its error; the level before it, and the steps from there."""
+
+    model: Structure
+    result: Result
+    steps: Sequence[Finer]
+    before: Level | None
+
+    @cached_property
+    def squares(self) -> Array:
+        """Squared estimate of each element (m,) in J, the best guess."""
+        found = self.result.error()
+        return (found.per_element / found.safety) ** 2
+
+    @cached_property
+    def estimate(self) -> float:
+        """Estimate of the error in √J."""
+        return float(np.sqrt(self.squares.sum()))
+
+    @cached_property
+    def norm(self) -> float:
+        """‖u‖ in √J."""
+        return float(np.sqrt(2 * self.result.energy()))
+
+    @cached_property
+    def order(self) -> int:
+        """Order of the elements."""
+        shapes = [block.shape for block in self.model.mesh.blocks if len(block) and block.shape]
+        return min(shape.degree for shape in shapes)
+
+    @cached_property
+    def change(self) -> float:
+        """‖u - u_H‖ in √J from the solution of the level before."""
+        assert self.before is not None
+        old = self.before.result.u
+        for step in self.steps:
+            old = step.interpolate(old)
+        points = self.model.mesh.points
+        return float(np.sqrt(2 * totals(points, self.result.groups, self.result.u - old)[0]))
+
+    @property
+    def is_nested(self) -> bool:
+        """Whether a finer mesh has the strains of this one: others are not of displacements alone."""
+        return all(group.element.formulation == "standard" for group in self.result.groups)
+
+    @cached_property
+    def corrected(self) -> float:
+        """The estimate in √J as the level before corrects it."""
+        if self.before is None or not self.before.is_nested:
+            return self.estimate
+        ratio = self.estimate / self.before.estimate
+        if not ratio < SETTLED:
+            return max(self.estimate, self.change)
+        found = self.change * ratio / float(np.sqrt(1 - ratio**2))
+        if ratio < 0.5:
+            return found
+        left = float(np.sqrt(max(self.before.corrected**2 - self.change**2, 0.0)))
+        return max(
+            found, min(left, 1.5 * found)
+        )  # of a short step: what the one before leaves, within reason
+
+    @cached_property
+    def bound(self) -> float:
+        """The error in √J that is reported."""
+        alone = self.result.error().absolute
+        return alone if self.before is None else max(SAFETY * self.corrected, alone)
+
+    @property
+    def reported(self) -> float:
+        """The same, relative."""
+        return self.bound / self.norm if self.norm > 0 else 0.0
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the estimate needs no other level beside it."""
+        return True
+
+    def aim(self, error: float) -> float:
+        """Return the estimate in √J at which a mesh aims that is to reach a relative error."""
+        return AIM * error / self.reported * self.estimate
+
+    def step(self, seconds: float) -> RefinementStep:
+        """Return the level as a step of the history."""
+        kinds = dict.fromkeys(group.element.__name__ for group in self.result.groups)
+        return RefinementStep(
+            self.model.mesh.n_elements,
+            ", ".join(kinds),
+            self.result.report.unknowns,
+            self.reported,
+            seconds,
+        )
+
+    @cached_property
+    def parents(self) -> Ints:
+        """(m,) element of the level before of each element."""
+        parents = np.arange(self.before.model.mesh.n_elements) if self.before else np.zeros(0, dtype=np.int64)
+        for step in self.steps:
+            parents = parents[step.elements]
+        return parents
+
+    def kept(self) -> Array:
+        """Return the share of its squared error (m,) that each element keeps if it is cut."""
+        smooth = 4.0**-self.order
+        kept = np.full(len(self.squares), smooth)
+        if self.before is None:
+            return kept
+        parents, old = self.parents, self.before.squares
+        if self.before.order < self.order:
+            left = self.squares / np.maximum(old[parents], np.finfo(float).tiny)
+            kept[left > SINGULAR] = 0.5
+            return kept
+        cuts, total = self.cuts(), np.bincount(parents, weights=self.squares)
+        most = np.zeros(len(old), dtype=np.int64)
+        np.maximum.at(most, parents, cuts)
+        left = (total / np.maximum(old, np.finfo(float).tiny)) ** (1 / np.maximum(most, 1))
+        count = np.bincount(parents)[parents]
+        heavy = (cuts > 0) & (cuts == most[parents]) & (self.squares * count > total[parents])
+        kept[heavy] = np.clip(left, smooth, 0.8)[parents[heavy]]
+        return kept
+
+    def cuts(self) -> Ints:
+        """Return how often elements (m,) have been cut since the level before."""
+        cuts = np.zeros(self.steps[0].coarse.n_elements, dtype=np.int64)
+        for step in self.steps:
+            cuts = cuts[step.elements] + (np.bincount(step.elements)[step.elements] > 1)
+        return cuts
+
+
+@dataclass(eq=False)
+class QuantityLevel(Level):
+    """The same for the error of a quantity: products of two errors stand for the squares of one."""
+
+    quantity: Quantity
+
+    @cached_property
+    def found(self) -> QuantityError:
+        """Error of the quantity."""
+        return self.result.error(self.quantity)
+
+    @cached_property
+    def squares(self) -> Array:
+        """What each element contributes to the error of the quantity (m,), in its unit."""
+        return np.abs(self.found.per_element)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the level before has elements of the same order: one level alone may say too little."""
+        return self.before is not None and self.before.order == self.order
+
+    @property
+    def reported(self) -> float:
+        """The error on the safe side, relative; at least what the last step promises of the next ones."""
+        found, before = self.found, self.before
+        absolute = found.absolute
+        if isinstance(before, QuantityLevel) and before.order == self.order:
+            ratio = min(SETTLED, (self.estimate / before.estimate) ** 2) if before.estimate > 0 else 0.0
+            change = abs(found.value - before.found.value)
+            absolute = max(absolute, SAFETY * change * ratio / (1 - ratio))
+        size = abs(found.value + found.signed)
+        return absolute / size if size > 0 else float(absolute > 0)
+
+    def aim(self, error: float) -> float:
+        """Return the root of the sum of `squares` at which a mesh aims that is to reach a relative error."""
+        return self.estimate * float(np.sqrt(AIM * error / self.reported))
