@@ -90,21 +90,22 @@ def solve_to(
             "a model whose material moves through its mesh is not refined; solve it without error"
         )
     check_quantity(quantity)
-    levels: list[Level] = []
+    level: Level | None = None
     steps: list[Finer] = []
     history: list[RefinementStep] = []
     missed, keep = "", None
     while True:
         start = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
-        result, before = analysis.solve(), levels[-1] if levels else None
+        result, before = analysis.solve(), level
         level = Level(model, result, steps, before)
         if quantity is not None:
             level = QuantityLevel(model, result, steps, before, quantity)
-        levels = [*levels[-1:], level]
         history.append(level.step(perf_counter() - start))
         analysis.release()
-        if (level.reported <= aim and level.is_settled) or missed:
+        if before is not None:
+            before.before = None  # the meshes before it are needed no more
+        if level.reported <= aim and level.is_settled:
             break
         if keep is None and quantity is None and model.mesh.hanging is None:
             keep = layer_direction(result, FLAT * aim * level.norm)

@@ -17,7 +17,7 @@ from kratos_lite.mesh import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Ints
 
-SAFETY = 1.25
+CORRECTED = 1.25
 """Safety of an estimate that a coarser mesh corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
@@ -94,7 +94,7 @@ class Level:
     def bound(self) -> float:
         """The error in √J that is reported."""
         alone = self.result.error().absolute
-        return alone if self.before is None else max(SAFETY * self.corrected, alone)
+        return alone if self.before is None else max(CORRECTED * self.corrected, alone)
 
     @property
     def reported(self) -> float:
@@ -186,7 +186,7 @@ class QuantityLevel(Level):
         if isinstance(before, QuantityLevel) and before.order == self.order:
             ratio = min(SETTLED, (self.estimate / before.estimate) ** 2) if before.estimate > 0 else 0.0
             change = abs(found.value - before.found.value)
-            absolute = max(absolute, SAFETY * change * ratio / (1 - ratio))
+            absolute = max(absolute, CORRECTED * change * ratio / (1 - ratio))
         size = abs(found.value + found.signed)
         return absolute / size if size > 0 else float(absolute > 0)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -19,7 +20,31 @@ from kratos_lite.validation import finite, number
 SURFACES = ("triangle", "quadrilateral")
 
 
-class Traction(Load):
+class FaceLoad(Load):
+    """A load on faces or lines."""
+
+    @abstractmethod
+    def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
+        """Yield blocks of faces with the forces on the nodes of each face.
+
+        Parameters
+        ----------
+        mesh : points (n, 3), elements, conditions and named parts.
+
+        Returns
+        -------
+        Blocks of m faces, and (m, k, 3) in N.
+        """
+
+    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
+        """Return the nodal forces (n, 3) in N of all faces."""
+        total = np.zeros_like(mesh.points)
+        for block, forces in self.on_faces(mesh):
+            add_nodal(total, block.nodes, forces)
+        return total
+
+
+class Traction(FaceLoad):
     """Force per area on the faces of a part.
 
     Parameters
@@ -35,21 +60,8 @@ class Traction(Load):
         if not callable(traction):
             self.traction = vectors(traction, "a traction", "(3,) in Pa")
 
-    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return ∫ N t dA as nodal forces (n, 3) in N."""
-        return _summed(mesh, self.on_faces(mesh))
-
     def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face.
-
-        Parameters
-        ----------
-        mesh : points (n, 3), elements, conditions and named parts.
-
-        Yields
-        ------
-        The block, and the forces on the nodes of its faces.
-        """
+        """Yield blocks of faces with ∫ N t dA (m, k, 3) in N of each face."""
         what = "a traction" if self.cells == SURFACES else "a line load"
         for block in _faces(mesh, self.where, what, self.cells):
             assert block.shape is not None
@@ -74,7 +86,7 @@ class LineLoad(Traction):
     cells: ClassVar[tuple[str, ...]] = ("line",)
 
 
-class Pressure(Load):
+class Pressure(FaceLoad):
     """Pressure on the faces of a part; a positive one pushes into the body.
 
     Parameters
@@ -97,21 +109,8 @@ class Pressure(Load):
             pressure = number(pressure, "a pressure")
         self.where, self.pressure, self.normal = where, pressure, normal
 
-    def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
-        """Return -∫ N p n dA as nodal forces (n, 3) in N."""
-        return _summed(mesh, self.on_faces(mesh))
-
     def on_faces(self, mesh: Mesh) -> Iterator[tuple[Block, Array]]:
-        """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face.
-
-        Parameters
-        ----------
-        mesh : points (n, 3), elements, conditions and named parts.
-
-        Yields
-        ------
-        The block, and the forces on the nodes of its faces.
-        """
+        """Yield blocks of faces with -∫ N p n dA (m, k, 3) in N of each face."""
         for block in _faces(mesh, self.where, "a pressure"):
             assert block.shape is not None
             X, p = mesh.points[block.nodes], self.pressure
@@ -134,14 +133,6 @@ def outward(mesh: Mesh, block: Block) -> Array:
             f"face {lost} ({block.name}) is not on the boundary of the body, so it has no outward normal"
         )
     return signs
-
-
-def _summed(mesh: Mesh, faces: Iterable[tuple[Block, Array]]) -> Array:
-    """Return nodal forces (n, 3) of forces on the nodes of faces."""
-    total = np.zeros_like(mesh.points)
-    for block, forces in faces:
-        add_nodal(total, block.nodes, forces)
-    return total
 
 
 def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES) -> list[Block]:
