@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements.formulations import bulk_over_shear
@@ -42,7 +43,8 @@ class SplitMatrix:
     D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
     bulk : (p,) Pa, κ.
     modulus : (p,) Pa, λ + 2μ in A.
-    means : (n, p) sparse, the means at corner nodes of a pressure of each element, scaled by 1 / √modulus.
+    means : (n, p) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
+        stiffest element there.
     groups : the elements, with materials as in A.
     """
 
@@ -74,7 +76,9 @@ class SplitMatrix:
         return (self.A.scipy().tocsr() + self.D.T @ diags_array(self.bulk) @ self.D).tocsr()
 
 
-def split(K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern: Pattern) -> Any:
+def split(
+    K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern: Pattern
+) -> BlockMatrix | SplitMatrix:
     """Return K as a SplitMatrix, which takes its memory, or K itself where no group is to be split.
 
     Parameters
@@ -86,55 +90,95 @@ def split(K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern
     """
     if not any(map(is_split, groups)):
         return K
-    parts, left = [], []
+    left, parts = list(groups), []
     for number, group in enumerate(groups):
-        if not is_split(group):
-            left.append(group)
-            continue
-        bulk, shear = _moduli(group.material.C)
-        taken = bulk - KEPT * shear
-        D = np.concatenate([dilatations(points, group, chunk) for chunk in group.chunks()])
-        for _ in add_in_parts(K.data, group, pattern, number, lambda chunk, D=D, k=taken: _products(D[chunk], -k)):
-            pass
-        parts.append((group, D, taken, (KEPT + 4 / 3) * shear))
-        left.append(_softened(group, taken))
-    D = _assembled(len(points), parts)
-    bulk, modulus = (
-        np.concatenate([np.full(D.shape[0] * D.shape[1], part[i]) for part in parts for D in part[1:2]])
-        for i in (2, 3)
-    )
-    return SplitMatrix(K, D, bulk, modulus, _means(points, parts), left)
+        if is_split(group):
+            taken = _moduli(group.material.C)[0] - KEPT * _moduli(group.material.C)[1]
+            left[number] = _softened(group, taken)
+            parts.append(_Part(group, taken, _longitudinal(left[number]), _dilatations(points, group)))
+            parts[-1].take_off(K, pattern, number)
+    bulk = np.concatenate([np.full(part.count, part.bulk) for part in parts])
+    modulus = np.concatenate([np.full(part.count, part.modulus) for part in parts])
+    means = _means(points, parts, _stiffest(len(points), left))
+    return SplitMatrix(K, _assembled(len(points), parts), bulk, modulus, means, left)
 
 
 def is_split(group: ElementGroup) -> bool:
     """Return whether the dilatations of a group are known and its material is nearly incompressible.
 
-    Those of the library's B-bar elements are their projected ones, those of enhanced elements their means: the
-    modes take up the others.
+    Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
+    the modes take up the others.
     """
     known = group.element.has_kernels(*GEOMETRY, *MECHANICS) and group.strain_tables() is not None
     return known and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-def dilatations(points: Array, group: ElementGroup, chunk: slice = slice(None)) -> Array:
+@dataclass(eq=False)
+class _Part:
+    """A group, the bulk modulus taken off it, λ + 2μ that it keeps, and its dilatations (m, r, 3k)."""
+
+    group: ElementGroup
+    bulk: float
+    modulus: float
+    D: Array
+
+    @property
+    def count(self) -> int:
+        return self.D.shape[0] * self.D.shape[1]
+
+    def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
+        """Subtract Dᵀ κ D from the matrix."""
+        m, r, size = self.D.shape
+        by_axis = self.D.reshape(m, r, size // 3, 3).swapaxes(-1, -2).reshape(m, r, size)
+
+        def products(chunk: slice) -> Array:
+            D = by_axis[chunk]
+            return (-self.bulk * D.swapaxes(-1, -2) @ D).reshape(len(D), 3, size // 3, 3, size // 3)
+
+        for _ in add_in_parts(K.data, self.group, pattern, number, products):
+            pass
+
+
+def _dilatations(points: Array, group: ElementGroup) -> Array:
     """Return the dilatations of elements, (m, r, 3k): their integrals with r orthonormal polynomials."""
-    elements, tables = group.at(points, chunk), group.strain_tables()
+    tables = group.strain_tables()
     assert tables is not None
-    dV, gradients = elements._gauss
-    rows = np.swapaxes(gradients, -1, -2).reshape(*dV.shape, -1)
-    weighted = dV[..., None]
-    if tables.C is not None or not tables.functions.shape[1]:
-        return np.swapaxes(weighted, -1, -2) @ rows / np.sqrt(weighted.sum(axis=-2))[..., None]
-    volume = weighted.sum(axis=-2)[..., None]
-    P = np.concatenate([np.ones_like(weighted), tables.functions @ elements.X / np.cbrt(volume)], axis=-1)
-    moments = np.swapaxes(P * weighted, -1, -2)
-    return np.linalg.solve(np.linalg.cholesky(moments @ P), moments @ rows)
+    linear = tables.C is None and tables.functions.shape[1] > 0
+    found = []
+    for chunk in group.chunks():
+        elements = group.at(points, chunk)
+        dV, gradients = elements._gauss
+        rows, weighted = np.swapaxes(gradients, -1, -2).reshape(*dV.shape, -1), dV[..., None]
+        volume = weighted.sum(axis=-2)[..., None]
+        if linear:
+            P = np.concatenate(
+                [np.ones_like(weighted), tables.functions @ elements.X / np.cbrt(volume)], axis=-1
+            )
+            moments = np.swapaxes(P * weighted, -1, -2)
+            found.append(np.linalg.solve(np.linalg.cholesky(moments @ P), moments @ rows))
+        else:
+            found.append(np.swapaxes(weighted, -1, -2) @ rows / np.sqrt(volume))
+    return np.concatenate(found)
 
 
 def _moduli(C: Array) -> tuple[float, float]:
     """Return bulk and mean shear modulus of a C (6, 6)."""
     shear = float(C.diagonal()[3:].mean())
     return bulk_over_shear(C) * shear, shear
+
+
+def _longitudinal(group: ElementGroup) -> float:
+    """Return λ + 2μ of a group."""
+    bulk, shear = _moduli(group.material.C)
+    return bulk + 4 / 3 * shear
+
+
+def _stiffest(n_nodes: int, groups: Sequence[ElementGroup]) -> Array:
+    """Return the largest λ + 2μ of the elements at each node, (n,)."""
+    found = np.ones(n_nodes)
+    for group in sorted(groups, key=_longitudinal):
+        found[group.nodes] = _longitudinal(group)
+    return found
 
 
 def _softened(group: ElementGroup, taken: float) -> ElementGroup:
@@ -144,29 +188,21 @@ def _softened(group: ElementGroup, taken: float) -> ElementGroup:
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _products(D: Array, factor: float) -> Array:
-    """Return factor Dᵀ D of dilatations (m, r, 3k) by axis, then node: (m, 3, k, 3, k)."""
-    m, _, size = D.shape
-    k = size // 3
-    by_axis = D.reshape(m, -1, k, 3).swapaxes(-1, -2).reshape(m, -1, size)
-    return (factor * by_axis.swapaxes(-1, -2) @ by_axis).reshape(m, 3, k, 3, k)
-
-
-def _assembled(n_nodes: int, parts: Sequence[tuple[ElementGroup, Array, float, float]]) -> csr_array:
+def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
     """Return D (p, 3n) of the dilatations of each group."""
     from scipy.sparse import csr_array, vstack
 
     rows = []
-    for group, D, *_ in parts:
-        m, r, size = D.shape
-        dofs = (3 * group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
+    for part in parts:
+        (m, r, size), D = part.D.shape, part.D
+        dofs = (3 * part.group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
         columns = np.repeat(dofs, r, axis=1).ravel()
         starts = np.arange(0, D.size + 1, size, dtype=np.int32)
         rows.append(csr_array((D.ravel(), columns, starts), shape=(m * r, 3 * n_nodes)))
     return rows[0] if len(rows) == 1 else vstack(rows, format="csr")
 
 
-def _means(points: Array, parts: Sequence[tuple[ElementGroup, Array, float, float]]) -> csr_array:
+def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:
     """Return the means (n, p) at corner nodes; see `SplitMatrix`.
 
     The first polynomial of an element is 1 / √volume, and a corner has its share of the volume.
@@ -174,15 +210,14 @@ def _means(points: Array, parts: Sequence[tuple[ElementGroup, Array, float, floa
     from scipy.sparse import csr_array, hstack
 
     columns, mass = [], np.zeros(len(points))
-    for group, D, _, modulus in parts:
-        corners = group.nodes[:, : group.element.shape.corners]
-        volume = np.concatenate([group.at(points, chunk).dV.sum(axis=-1) for chunk in group.chunks()])
-        share = np.repeat(volume / corners.shape[1], corners.shape[1])
-        mass += np.bincount(corners.ravel(), share, len(points))
-        m, r, _ = D.shape
-        first = np.repeat(r * np.arange(m), corners.shape[1])
-        value = np.repeat(np.sqrt(volume / modulus) / corners.shape[1], corners.shape[1])
-        columns.append(csr_array((value, (corners.ravel(), first)), shape=(len(points), m * r)))
+    for part in parts:
+        corners = part.group.nodes[:, : part.group.element.shape.corners]
+        (m, r, _), k = part.D.shape, corners.shape[1]
+        volume = np.repeat(volumes(points, part.group).sum(axis=1), k)
+        mass += np.bincount(corners.ravel(), volume / k, len(points))
+        places = corners.ravel(), np.repeat(r * np.arange(m), k)
+        columns.append(csr_array((np.sqrt(volume) / k, places), shape=(len(points), m * r)))
     means = hstack(columns, format="csr")
-    means.data /= np.repeat(np.sqrt(np.where(mass > 0, mass, 1.0)), np.diff(means.indptr))
+    scale = np.sqrt(np.where(mass > 0, mass, 1.0) * stiffest)
+    means.data /= np.repeat(scale, np.diff(means.indptr))
     return means

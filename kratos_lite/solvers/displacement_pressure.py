@@ -5,16 +5,15 @@ With p = κ D u the equations (A + Dᵀ κ D) u = b are
     [A  Dᵀ  ] [u]   [b]
     [D  -1/κ] [p] = [0],
 
-which stay well-conditioned for ν → ½.  Generalized conjugate residuals solve them.  Each step takes
+which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
 p = -S⁻¹ r_p and one multigrid cycle for A u = r_u - Dᵀ p.  S ≈ D A⁻¹ Dᵀ + 1/κ is
 
     S = D diag(A)⁻¹ Dᵀ + (means at corner nodes)² / (λ + 2μ) + 1/κ:
 
-the second term holds for smooth pressures, the first one for those that change sign from element to element, of
-which some hardly act on the nodes (checkerboards), so that no element needs to be stable.
+the second term holds for smooth pressures, the first one for those that change sign from element to element.
+Some of these hardly act on the nodes (checkerboards): no element needs to be stable.
 
-Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (2014), chapter 4; Eisenstat,
-Elman & Schultz, SIAM J. Numer. Anal. 20 (1983) 345-357.
+Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (2014), chapter 4.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.blas import one_thread
@@ -30,12 +30,12 @@ from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.iteration import Share
 from kratos_lite.typing import Array, Mask, Progress
 
-KEPT = 10
-"""Directions that a new one is made conjugate to."""
-REFRESHED = 1e-5
-"""Share of the residual at which it is computed anew."""
-MAX_ITERATIONS, STALLED = 400, 60
-"""Iterations in all, and those without a new smallest residual, after which it does not converge."""
+DIRECTIONS = 60
+"""Iterations after which they start anew from what is left: their directions are kept until then."""
+REDUCED = 1e-10
+"""Share of the residual at which they start anew, as rounding leaves no more."""
+MAX_ITERATIONS = 400
+"""Iterations after which it does not converge."""
 INNER, INNER_MAX = 0.02, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
@@ -56,7 +56,7 @@ class DisplacementPressure:
         size = np.concatenate([np.sqrt(np.einsum("nii->ni", inverse)).ravel(), np.sqrt(K.modulus)])
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
-        self._schur = _Schur(K, inverse)
+        self._schur = _Schur(K, inverse, np.asarray(free.reshape(-1, 3).any(axis=1)))
 
     def solve(
         self,
@@ -78,38 +78,30 @@ class DisplacementPressure:
         if norm_b == 0:
             return x[:n], 0, True
         r = self._residual(b, x)
-        W, Z = np.empty((2, KEPT, len(x)))
-        used, best, best_at, refreshed = 0, np.inf, 0, np.linalg.norm(r)
+        first = float(np.linalg.norm(r))
+        aim, before, space = tolerance * first, float("inf"), _Directions(r)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            z = self._precondition(r * self._inverse_weight)
-            w = self._weight * self._product(z)
-            old = min(used, KEPT)
-            along = W[:old] @ w
-            w -= along @ W[:old]
-            z -= along @ Z[:old]
-            W[used % KEPT], Z[used % KEPT] = (v / np.linalg.norm(w) for v in (w, z))
-            step = float(W[used % KEPT] @ r)
-            x += step * Z[used % KEPT]
-            r -= step * W[used % KEPT]
-            used += 1
-            if np.linalg.norm(r) < REFRESHED * refreshed:
-                r, used = self._residual(b, x), 0
-                refreshed = np.linalg.norm(r)
-            left = self._left(r)
+            z = self._precondition(space.last * self._inverse_weight).astype(np.float32)
+            estimate = space.extend(z, self._weight * self._product(z.astype(float)))
+            stop = bool(go_on and not go_on(estimate / first))
             if share:
-                share(left / norm_b)
-            limit = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(x[:n])) + norm_b)
-            if left <= max(tolerance * norm_b, limit):
-                if share:
-                    share.finish()
-                return x[:n], iteration, True
-            if go_on and not go_on(left / norm_b):
+                share(estimate / first)
+            exhausted = space.full or estimate <= REDUCED * space.start or iteration == MAX_ITERATIONS
+            if not (stop or exhausted or estimate <= aim):
+                continue
+            found = space.added_to(x)
+            r = self._residual(b, found)
+            left = self._left(r)
+            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(found[:n])) + norm_b)
+            limit = max(float(rounding), tolerance * norm_b)
+            if left <= limit or stop or (exhausted and left > before / 2):
                 break
-            if left < best:
-                best, best_at = left, iteration
-            elif iteration - best_at > STALLED:
-                break
-        return x[:n], iteration, False
+            aim = min(aim, estimate * limit / left) / 2
+            if exhausted:
+                x, before, space = found, left, _Directions(r)
+        if share and left <= limit:
+            share.finish()
+        return found[:n], iteration, left <= limit
 
     def _product(self, x: Array) -> Array:
         """Return the product of the matrix of displacements and pressures with both."""
@@ -141,15 +133,66 @@ class DisplacementPressure:
         return np.concatenate([self._cycle.precondition(forces), p])
 
 
+class _Directions:
+    """Directions Z and their products with the matrix, of which the residual is made as small as can be.
+
+    The preconditioner may differ from step to step, as it does.  Source: Saad, SIAM J. Sci. Comput. 14 (1993)
+    461-469.
+    """
+
+    def __init__(self, r: Array) -> None:
+        self.start = float(np.linalg.norm(r))
+        self._V = np.empty((DIRECTIONS + 1, len(r)))
+        self._Z = np.empty((DIRECTIONS, len(r)), dtype=np.float32)  # as the multigrid cycle gives them
+        self._H = np.zeros((DIRECTIONS + 1, DIRECTIONS))
+        self._V[0] = r / (self.start or 1.0)
+        self._count = 0
+        self._y = np.zeros(0)
+
+    @property
+    def last(self) -> Array:
+        """The last of the orthonormal vectors."""
+        return self._V[self._count]
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for more directions."""
+        return self._count == DIRECTIONS
+
+    def extend(self, z: NDArray[np.float32], w: Array) -> float:
+        """Take a direction and its product; return the smallest norm that the residual can have."""
+        from scipy.linalg.blas import daxpy
+
+        k = self._count
+        self._Z[k] = z
+        for j in range(k + 1):
+            self._H[j, k] = self._V[j] @ w
+            w = daxpy(self._V[j], w, a=-self._H[j, k])
+        self._H[k + 1, k] = np.linalg.norm(w)
+        self._V[k + 1] = w / (self._H[k + 1, k] or 1.0)
+        self._count = k + 1
+        H, goal = self._H[: k + 2, : k + 1], self.start * np.eye(k + 2)[0]
+        self._y = np.linalg.lstsq(H, goal, rcond=None)[0]
+        return float(np.linalg.norm(goal - H @ self._y))
+
+    def added_to(self, x: Array) -> Array:
+        """Return x changed along the directions so that the residual is smallest."""
+        found = x.copy()
+        for factor, z in zip(self._y, self._Z, strict=False):
+            found += factor * z
+        return found
+
+
 class _Schur:
     """S in single precision, scaled to a diagonal of 1."""
 
-    def __init__(self, K: SplitMatrix, inverse: Array) -> None:
+    def __init__(self, K: SplitMatrix, inverse: Array, loose: Mask) -> None:
         from scipy.sparse import bsr_array, diags_array
 
         n = len(inverse)
         blocks = bsr_array((inverse, np.arange(n), np.arange(n + 1)), shape=K.shape)
-        S = (K.D @ blocks.tocsr()) @ K.D.T + K.means.T @ K.means + diags_array(1 / K.bulk)
+        means = diags_array(loose * 1.0) @ K.means  # around held nodes checkerboards have means, too
+        S = (K.D @ blocks.tocsr()) @ K.D.T + means.T @ means + diags_array(1 / K.bulk)
         self._scale = 1 / np.sqrt(S.diagonal())
         scale = diags_array(self._scale)
         self._S: Any = (scale @ S @ scale).astype(np.float32).tocsr()

@@ -142,8 +142,9 @@ class LinearSolver:
                 return solution
             if len(b) > FALLBACK_LIMIT:
                 raise SolveError(
-                    f"{why}; {len(b)} unknowns are too many to factorize instead; look for thin elements or "
-                    "ν near 0.5, use quadratic elements, or ask for solver='direct'"
+                    f"{why}; {len(b)} unknowns are too many to factorize instead; look for thin elements, "
+                    "for plain ones with ν near 0.5 (formulation='non_locking' takes others), or ask for "
+                    "solver='direct'"
                 )
         q = self.factors.solve(b)
         return Solution(q, "direct", why, 0, backward_error(self._sparse, q, b))
