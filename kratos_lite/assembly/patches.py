@@ -8,7 +8,6 @@ thick, those of its neighbors with the most elements, unless it has half as many
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +17,13 @@ from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
+from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Ints, Mask
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Patches:
     """Patches of some elements, numbered 0 … m - 1.
 
