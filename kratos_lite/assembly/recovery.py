@@ -262,7 +262,7 @@ class Recovery:
         """Return a group without prestress and with a rule for squared errors, its N and volumes, and C⁻¹."""
         fine = _compared_at(group)
         N, _ = tabulate(fine.element.shape, fine.rule)
-        return fine, N, volumes(self.points, fine), np.linalg.inv(fine.material.C)
+        return fine, N, volumes(self.points, fine), floats(np.linalg.inv(fine.material.C))
 
 
 def _plain(group: ElementGroup) -> ElementGroup:
