@@ -6,7 +6,6 @@ Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -25,11 +24,12 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
+from kratos_lite.records import record, replace
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array, Ints, Numbers
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Sampling:
     """Where the values of an element are taken, and what is fitted to them.
 
@@ -78,7 +78,7 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Region:
     """Elements of one material, over which stresses are smooth.
 
