@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.model.loads import Load
-from kratos_lite.model.locking import NEAR_HALF
+from kratos_lite.model.locking import NEAR_HALF, better_element
 from kratos_lite.model.structure import Structure
+from kratos_lite.records import field, record
 from kratos_lite.typing import Array
 
 
@@ -31,7 +31,7 @@ class Origin(Protocol):
         """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class ErrorEstimate:
     """How far a result is from the exact solution, in the energy norm ‖e‖² = ∫ e : C : e dV.
 
@@ -94,17 +94,20 @@ def energy_error(
     size = energy + float(squares[method].sum())
     relative = absolute / size**0.5 if size > 0 else 0.0
     warnings = _warnings(recovered, averaged, groups) if relative > NEGLIGIBLE else []
+    if len(recovered) == 1 and energy > 0 and not warnings:
+        warnings = ["one element has no neighbors that could show its error"]
     return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
 
 
 def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup]) -> list[str]:
     """Return what speaks against trusting an estimate."""
     warnings, total = [], float(recovered.sum())
-    locked = sorted({group.element.__name__ for group in groups if _locks(group)})
+    plain = sorted({group.element.__name__: group.element for group in groups if _locks(group)}.items())
+    locked = {name: better_element(element, "BBar") for name, element in plain}
     if locked:
         warnings.append(
-            f"{', '.join(locked)} lock near ν = ½, and the estimated error may be several times too small; "
-            "take formulation='non_locking'"
+            f"{', '.join(locked)} may lock near ν = ½, and the estimated error may be several times too "
+            f"small; take {', '.join(sorted(set(locked.values())))}"
         )
     if total > COARSE**2 * float(averaged.sum()):
         warnings.append(
@@ -133,7 +136,7 @@ def _locks(group: ElementGroup) -> bool:
     return plain and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class QuantityError:
     """How far a quantity of a result is from that of the exact solution: Q(u) - Q(u_h).
 
@@ -159,8 +162,9 @@ class QuantityError:
 
     @property
     def relative(self) -> float:
-        """`absolute` over the size of the better value; 0 where both are 0."""
-        return self.absolute / abs(self.value + self.signed) if self.absolute else 0.0
+        """`absolute` over the size of the better value; 0 where there is no error, inf where that is 0."""
+        size = abs(self.value + self.signed)
+        return self.absolute / size if size else np.inf if self.absolute else 0.0
 
     def __str__(self) -> str:
         return f"{self.signed:+.3e} {self.unit}, at most about ±{self.absolute:.1e} (value {self.value:.6e})"

@@ -210,6 +210,23 @@ class Result:
     def _nodal_stress(self) -> Array:
         return np.asarray(self._field("node", stress=True))
 
+    def stress_of_material(self, row: int) -> Array:
+        """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
+
+        Parameters
+        ----------
+        row : of an element of this material.
+
+        Returns
+        -------
+        (n, 6) in Pa, 0 at nodes that no element of this material has.
+        """
+        stress = np.zeros((self.mesh.n_nodes, 6))
+        for region, values in self._recovery.by_region(self._strained):
+            if any((group.rows == row).any() for group in region.groups):
+                stress[region.nodes] = values
+        return stress
+
     def von_mises(self, at: At = "gauss") -> Any:
         """Return von Mises stresses.
 
@@ -392,6 +409,13 @@ class Result:
         squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
         return energy_error(*squares, 2 * self.energy(), self.groups)
 
+    def _stated_error(self) -> str:
+        """Return the error for the table: the one that was asked for, which its meshes have corrected."""
+        report = self.report
+        if report.error is None:
+            return str(self._error)
+        return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
+
     # ---- out -----------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
@@ -414,7 +438,7 @@ class Result:
             *report.load_rows(forces),
             ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),
-            ("estimated error", str(self._error)),
+            ("estimated error", self._stated_error()),
             ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],

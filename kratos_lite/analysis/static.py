@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
@@ -20,6 +19,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
+from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
@@ -44,7 +44,7 @@ class Phases:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LoadSet:
     """Loads, their nodal forces (n, 3) in N without and with initial stress, and the parts that they move."""
 
@@ -238,7 +238,7 @@ class StaticAnalysis:
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
             inner = model.supports.on_masters(stress_load(model, self.groups, u))
-            rounding = count * max(noise, self._initial_noise())
+            rounding = count * max(noise, self._initial_noise(case.forces))
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
             judge(solution, u, balance)
             initial = case.external - case.forces
@@ -282,12 +282,13 @@ class StaticAnalysis:
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
-    def _initial_noise(self) -> float:
-        """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
-        u0 = self.model.initial_displacement
-        if u0 is None or self.system is None:
+    def _initial_noise(self, forces: Array) -> float:
+        """Return what rounding and the solver leave of the forces of an initial state, in N."""
+        if self.initial is None or self.system is None:
             return 0.0
-        return float(np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0))
+        u0 = 0.0 if self.model.initial_displacement is None else self.model.initial_displacement
+        rounding = np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0)
+        return float(max(rounding, self.tolerance * np.linalg.norm(forces)))
 
     def _report(
         self,
@@ -344,7 +345,7 @@ class StaticAnalysis:
         return skipped
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class _Origin:
     """An analysis with its loads, and the version of its model, when it was solved."""
 

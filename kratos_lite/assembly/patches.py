@@ -2,47 +2,58 @@
 
 The patch of a node inside the body are the elements around it.  A node on the surface takes those of its
 nearest nodes inside, in which its own elements weigh more; where there are none, as in a mesh one element
-thick, those of its neighbors with the most elements, unless it has half as many itself.
+thick, those of its neighbors with the most elements, unless it has half as many itself.  Among linear
+hexahedra, whose stresses are good at one point alone, it takes the elements around these as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.assembly.polynomial_fit import Lists, lists
+from kratos_lite.assembly.polynomial_fit import Lists, distinct, lists
 from kratos_lite.mesh import Block
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
-from kratos_lite.typing import Ints, Mask
+from kratos_lite.records import record
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array, Ints, Mask
+
+ENOUGH = 27
+"""Elements of a patch that tell a polynomial of one degree more: three along each axis."""
+DECAY = 4
+"""Power of the distance, in radii of an element, with which its weight in such a patch falls."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Patches:
     """Patches of some elements, numbered 0 … m - 1.
 
     Attributes
     ----------
     elements : those of each patch.
-    own : whether each of these contains the node.
+    weights : of each of these, 1 for those that contain the node.
+    wide : (p,) whether a patch has a second layer, and can tell a polynomial of one degree more.
     of : the patches whose mean counts at each node; none at nodes without elements.
     """
 
     elements: Lists
-    own: Mask
+    weights: Array
+    wide: Mask
     of: Lists
 
 
-def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists) -> Patches:
+def patches(blocks: Sequence[Block], points: Array, outer: Mask, hanging: Ints, masters: Lists) -> Patches:
     """Return the patches of blocks of elements.
 
     Parameters
     ----------
     blocks : the elements, numbered through the blocks.
+    points : (n, 3) m.
     outer : (n,) whether a node is a corner of a face on the surface.
     hanging : nodes that others interpolate.
     masters : those of each.
@@ -56,13 +67,60 @@ def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists)
     hanging, masters = hanging[held], masters.take(np.flatnonzero(held))
     around, outer = _around(blocks, corners, is_corner), outer & is_corner
     inside = ~outer[around.owner]
-    wide_owner, wide = _neighborhoods(around, corners, outer, is_corner)
-    rows = np.concatenate([around.owner[inside], wide_owner])
-    own = np.concatenate([inside[inside], _contain(wide_owner, wide, corners)])
-    number, order = np.cumsum(is_corner) - 1, np.argsort(rows, kind="stable")
-    entries = np.concatenate([around.entries[inside], wide])[order]
-    elements = lists(number[rows[order]], entries, int(is_corner.sum()))
-    return Patches(elements, own[order], _patches_of_nodes(blocks, is_corner, number, hanging, masters))
+    far = np.repeat([_far(block) for block in blocks], [len(block) for block in blocks])
+    is_wide, owner, element, weights = _outside(points, around, corners, far, outer, is_corner)
+    rows = np.concatenate([around.owner[inside], owner])
+    weights = np.concatenate([np.ones(int(inside.sum())), weights])
+    number, n = np.cumsum(is_corner) - 1, int(is_corner.sum())
+    found = lists(number[rows], np.arange(len(rows)), n)
+    elements = Lists(found.start, np.concatenate([around.entries[inside], element])[found.entries])
+    of = _patches_of_nodes(blocks, is_corner, number, hanging, masters)
+    return Patches(elements, weights[found.entries], is_wide[is_corner], of)
+
+
+def _far(block: Block) -> float:
+    """Return the weight of elements that do not contain the node; 0 where it falls with the distance."""
+    if block.shape is None or (block.shape.degree == 1 and block.shape.cell != "hexahedron"):
+        return 1.0
+    if block.shape.degree == 1:
+        return 0.0
+    return 0.05 if block.shape.cell in ("hexahedron", "tetrahedron") else 0.5
+
+
+def _outside(
+    points: Array, around: Lists, corners: Ints, far: Array, outer: Mask, is_corner: Mask
+) -> tuple[Mask, Ints, Ints, Array]:
+    """Return which patches are wide, and node, element and weight of all pairs of those on the surface."""
+    owner, element = _neighborhoods(around, corners, outer, is_corner)
+    grows = outer.copy()
+    grows[owner[far[element] > 0]] = False
+    more = _second_layer(owner[grows[owner]], element[grows[owner]], around, corners, len(outer))
+    is_wide = np.bincount(more[0], minlength=len(outer)) >= ENOUGH
+    kept, added = ~is_wide[owner], is_wide[more[0]]
+    owner = np.concatenate([owner[kept], more[0][added]])
+    element = np.concatenate([element[kept], more[1][added]])
+    weights = np.where(_contain(owner, element, corners), 1.0, far[element])
+    near = np.flatnonzero(weights == 0)
+    weights[near] = _decayed(points, owner[near], corners[element[near], :8])
+    return is_wide, owner, element, weights
+
+
+def _second_layer(owner: Ints, element: Ints, around: Lists, corners: Ints, n: int) -> tuple[Ints, Ints]:
+    """Return the pairs of node and element with the elements around those."""
+    known = corners[element]
+    pair, at = np.nonzero(known >= 0)
+    owner, near, _ = distinct(owner[pair], known[pair, at], n)
+    found = around.take(near)
+    return distinct(owner[found.owner], found.entries, n)[:2]
+
+
+def _decayed(points: Array, owner: Ints, hexahedra: Ints) -> Array:
+    """Return weights of hexahedra (k, 8) by their distance from a node each."""
+    X = points[hexahedra]
+    center = X.mean(axis=1)
+    radius = np.sqrt(((X - center[:, None]) ** 2).sum(axis=(1, 2)) / 8)
+    distance = np.linalg.norm(center - points[owner], axis=1)
+    return np.minimum(1.0, radius / distance) ** DECAY
 
 
 def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
@@ -95,18 +153,16 @@ def _corners(blocks: Sequence[Block]) -> Ints:
 
 def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
     """Return the elements around each corner node, also those that have it in the middle of an edge."""
-    element, column = np.nonzero(corners >= 0)
-    nodes, elements, first = [corners[element, column]], [element], 0
+    at = np.flatnonzero((corners >= 0) & is_corner[corners])
+    nodes, elements, first = [corners.ravel()[at]], [at // corners.shape[1]], 0
     for block in blocks:
         c = block.shape.corners if block.shape else block.nodes.shape[1]
         rest = block.nodes[:, c:]
-        row, at = np.nonzero(is_corner[rest])
-        nodes.append(rest[row, at].astype(np.int64))
+        row, column = np.nonzero(is_corner[rest]) if rest.size else (NO_ROWS, NO_ROWS)
+        nodes.append(rest[row, column].astype(np.int64))
         elements.append(first + row)
         first += len(block)
-    node, element = np.concatenate(nodes), np.concatenate(elements)
-    known = is_corner[node]
-    return lists(node[known], element[known], len(is_corner))
+    return lists(np.concatenate(nodes), np.concatenate(elements), len(is_corner))
 
 
 def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
@@ -120,15 +176,14 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     usable = (near >= 0) & is_corner[near]
     inner = usable & ~outer[near]
     # nodes inside count by the elements that they share, others by the elements around them
-    pair, at = np.nonzero(inner)
-    codes, count = _distinct(node[pair] * len(outer) + near[pair, at])
-    chosen = _largest(codes // len(outer), count, len(outer))
-    host, center = codes[chosen] // len(outer), codes[chosen] % len(outer)
+    at, c = np.flatnonzero(inner), corners.shape[1]
+    host, center, count = distinct(node[at // c], near.ravel()[at], len(outer))
+    chosen = _largest(host, count, len(outer))
+    host, center = host[chosen], center[chosen]
     without = np.ones(len(outer), dtype=bool)
     without[host] = False
-    pair, at = np.nonzero(usable & without[node][:, None])
-    codes, _ = _distinct(node[pair] * len(outer) + near[pair, at])
-    alone, other = codes // len(outer), codes % len(outer)
+    at = np.flatnonzero(usable & without[node][:, None])
+    alone, other, _ = distinct(node[at // c], near.ravel()[at], len(outer))
     size = around.lengths
     best = np.zeros(len(outer), dtype=np.int64)
     np.maximum.at(best, alone, size[other])
@@ -136,16 +191,8 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     chosen = np.where(enough, other == alone, size[other] == best[alone])
     host, center = np.concatenate([host, alone[chosen]]), np.concatenate([center, other[chosen]])
     patch = around.take(center)
-    found = np.concatenate([host[patch.owner] * len(corners) + patch.entries, node * len(corners) + element])
-    found, _ = _distinct(found)
-    return found // len(corners), found % len(corners)
-
-
-def _distinct(codes: Ints) -> tuple[Ints, Ints]:
-    """Return the distinct numbers, ascending, and how often each occurs; faster than NumPy's own way."""
-    codes = np.sort(codes)
-    first = np.flatnonzero(np.append(True, codes[1:] != codes[:-1])) if len(codes) else NO_ROWS
-    return codes[first], np.diff(np.append(first, len(codes)))
+    pairs = np.concatenate([host[patch.owner], node]), np.concatenate([patch.entries, element])
+    return distinct(*pairs, len(outer))[:2]
 
 
 def _largest(owner: Ints, count: Ints, n: int) -> Mask:
@@ -157,7 +204,10 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
 
 def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
     """Return a mask of the elements that have the node as a corner."""
-    return (corners[element] == owner[:, None]).any(axis=1)
+    found = np.zeros(len(owner), dtype=bool)
+    for column in corners.T.copy():
+        found |= column[element] == owner
+    return found
 
 
 def _patches_of_nodes(
@@ -172,10 +222,12 @@ def _patches_of_nodes(
     done[hanging] = True
     for block in blocks:
         for a, support in enumerate(_supports(block)):
-            new, first = np.unique(block.nodes[:, a], return_index=True)
-            new, first = new[~done[new]], first[~done[new]]
+            left = np.flatnonzero(~done[block.nodes[:, a]])
+            if not len(left):
+                continue
+            new, first = np.unique(block.nodes[left, a], return_index=True)
             done[new] = True
-            at = block.nodes[first][:, support]
+            at = block.nodes[left[first]][:, support]
             known = is_corner[at]
             owner.append(np.repeat(new, known.sum(axis=1)))
             entries.append(number[at[known]])
@@ -184,9 +236,13 @@ def _patches_of_nodes(
 
 def _supports(block: Block) -> list[list[int]]:
     """Return the corners of the edge, face or cell in which each node of a cell lies."""
-    shape = block.shape
-    if shape is None:
+    if block.shape is None:
         return [[a] for a in range(block.nodes.shape[1])]
+    return _supports_in(block.shape)
+
+
+@remembered
+def _supports_in(shape: type[Shape]) -> list[list[int]]:
     linear = shape.linear()
     if linear is None:
         return [[a] if a < shape.corners else list(range(shape.corners)) for a in range(len(shape.nodes))]

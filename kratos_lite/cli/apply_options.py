@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.records import replace
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def share(text: str, what: str) -> float:
     """
     given = text.strip()
     try:
-        found = float(given.removesuffix("%")) / (100 if given.endswith("%") else 1)
-    except ValueError:
+        found = number(given.removesuffix("%"), what) / (100 if given.endswith("%") else 1)
+    except InputError:
         found = 0.0
     if not 0 < found < 1:
         raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
@@ -107,6 +107,7 @@ def _take_modes(case: Case, options: Namespace) -> None:
         raise InputError("--modes and --time: give one of them")
     if options.output or options.json or options.picture or options.state:
         raise InputError("--modes prints a table; it writes no files")
+    _refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
     case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
 
 

@@ -10,7 +10,6 @@ Sources: Hughes, The Finite Element Method (1987), ch. 4; MacNeal, IJNME 24 (198
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.mesh import Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
+from kratos_lite.records import names_of, record
 from kratos_lite.typing import Array, Ints, Mask
 
 STIFF = 0.1
@@ -56,7 +56,7 @@ def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     for kind, C in ((group.element, group.material.C) for group in groups):
         plain = kind.inherits(*MECHANICS) and kind.formulation == "standard"
         if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
-            found[kind.__name__] = _better(kind, "BBar")
+            found[kind.__name__] = better_element(kind, "BBar")
     if not found:
         return []
     names, better = ", ".join(sorted(found)), ", ".join(sorted(set(found.values())))
@@ -68,7 +68,7 @@ def _tetrahedra(groups: Sequence[ElementGroup]) -> list[str]:
     return [f"{name} locks in bending (comes out far too stiff); take KinematicLinear3D10N" for name in names]
 
 
-def _better(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:
+def better_element(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:
     """Return the name of the element to take in place of one that locks."""
     known = formulations_of(kind.shape)
     if "enhanced" in known:
@@ -81,7 +81,7 @@ def _better(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str
 # ---- in bending ----------------------------------------------------------------------------------------
 
 
-@dataclass
+@record
 class Walls:
     """Outer faces of elements, and the wall behind each: up to the outer face opposite.
 
@@ -102,7 +102,7 @@ class Walls:
 
     def take(self, chosen: Mask | Ints) -> Walls:
         """Return some of the walls."""
-        return Walls(*(getattr(self, item.name)[chosen] for item in fields(self)))
+        return Walls(*(getattr(self, name)[chosen] for name in names_of(type(self))))
 
 
 def _has_two_sides(kind: type[KinematicLinear]) -> bool:
@@ -130,13 +130,15 @@ def _in_bending(
         ]
     single = walls.layers == 1
     if kind.formulation == "b_bar" and single.any():
-        place, better = _place(mesh, walls, np.where(single, ratio, 0.0)), _better(kind)
+        place, better = _place(mesh, walls, np.where(single, ratio, 0.0)), better_element(kind)
         wrong = "far too easily in short cells, too stiffly in long ones"
         return [f"{name} alone through a thickness, {place}, may bend {wrong}; take {better}"]
     excess = modulus[walls.element] * ratio**2
     if (excess > STIFF).any():
         place, most = _place(mesh, walls, excess), 1 + float(excess.max())
-        return [f"{name} may come out {most:.2g} times too stiff in bending, {place}; take {_better(kind)}"]
+        return [
+            f"{name} may come out {most:.2g} times too stiff in bending, {place}; take {better_element(kind)}"
+        ]
     return []
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +17,7 @@ from kratos_lite.elements import (
     KinematicLinear3D6N,
     KinematicLinear3D8N,
 )
+from kratos_lite.records import record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -29,7 +28,7 @@ LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
 """The linear element of each linear shape."""
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LinearLevel:
     """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
 
@@ -51,7 +50,8 @@ LONG = 3.0
 """Length of a cell to its second length from which its halves are the linear elements."""
 
 
-class _Part(NamedTuple):
+@record(eq=False)
+class _Part:
     """Some elements of a group, and the linear ones in each of them."""
 
     group: ElementGroup

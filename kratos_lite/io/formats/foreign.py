@@ -15,7 +15,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
+from kratos_lite.records import field, record
 from kratos_lite.validation import free_memory
 
 SECONDS = 30.0
@@ -39,7 +39,7 @@ OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 Numbers = NDArray[Any]
 
 
-@dataclass
+@record
 class Cells:
     """Cells of one type of meshio: rows (m, k) of the points; (m, 0) where their number of nodes differs."""
 
@@ -48,7 +48,7 @@ class Cells:
     data: Numbers
 
 
-@dataclass
+@record
 class Found:
     """What meshio finds in a file; data that are no numbers are None.  `output` is what meshio says."""
 
@@ -139,6 +139,8 @@ class _Process:
 
     def _why(self, child: subprocess.Popen[bytes], seconds: float) -> str:
         """Return why a process has ended."""
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(1.0)  # else it ends by our signal, and its own reason is lost
         self.end()
         cure = "are its counts right, and is it complete? Save it anew, as .msh of version 4.1 or .vtu"
         if child.returncode in (-getattr(signal, "SIGXCPU", 24), -getattr(signal, "SIGKILL", 9)):
@@ -235,6 +237,8 @@ def load(path: Path) -> tuple[dict[str, Any], list[Numbers]]:
             answer |= {"points": _packed(np.asarray(found.points), arrays), "cells": cells}
     except InputError as error:
         return {"error": str(error).removeprefix(str(path))}, []
+    except ImportError as error:
+        return {"error": f": {error}; this format needs it: pip install {error.name}"}, []
     except MemoryError:
         text = "is it complete, and are its counts right? Else convert it on a machine with more memory"
         return {"error": f": meshio needs more memory than there is; {text}"}, []
