@@ -209,6 +209,7 @@ class StaticAnalysis:
                 tolerance=self.tolerance,
                 patterns=model.patterns,
                 progress=self.progress,
+                hanging=model.mesh.hanging,
             )
             self._prescribed = None
             self._still = sum(map(len, every)) - sum(map(len, groups))

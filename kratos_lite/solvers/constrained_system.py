@@ -16,6 +16,7 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.linear_solver import DENSE_MAX
@@ -38,6 +39,7 @@ class ConstrainedSystem:
     tolerance : relative residual at which the iterative solver stops.
     patterns : where sparsity patterns are kept from one system to the next.
     progress : called with the phase and the share done, 0 … 1.
+    hanging : the nodes of the mesh that hang on larger neighbors, which the constraints hold, too.
 
     Attributes
     ----------
@@ -72,12 +74,14 @@ class ConstrainedSystem:
         tolerance: float = 1e-10,
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
+        hanging: HangingNodes | None = None,
     ) -> None:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
         self.reduced = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
+        self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
@@ -113,7 +117,7 @@ class ConstrainedSystem:
             self.points,
             self.method,
             self.reason,
-            lambda: linear_level(self.points, self.groups),
+            lambda: linear_level(self.points, self.groups, self._hanging),
         )
 
     def solve(
