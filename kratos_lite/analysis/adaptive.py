@@ -32,7 +32,7 @@ from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Mask, Progress
-from kratos_lite.validation import number, short
+from kratos_lite.validation import number, short, whole_number
 
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
@@ -66,7 +66,7 @@ def solve_to(
     model : the structure; it stays as it is.
     error : of the energy norm or of the quantity, relative, such as 0.01.
     solver, tolerance, progress : as for `Model.solve`.
-    most_unknowns : no larger mesh is solved.
+    most_unknowns : no larger mesh is solved after the first one.
     geometry : by part, a function that takes places (k, 3) in m near its true surface onto it.
     quantity : the mesh is made finer for it, where its `QuantityError` lies.
 
@@ -78,13 +78,16 @@ def solve_to(
     Raises
     ------
     InputError
-        The error is no number between 0 and 1, or the quantity is of rows, which are others on finer meshes.
+        The error is no number between 0 and 1, another argument is not what it must be, or the quantity is of
+        rows, which are others on finer meshes.
     MeshError, ModelError, SolveError
-        As by `Model.solve`; or what the model has cannot be carried over to a finer mesh.
+        As by `Model.solve`; what the model has cannot be carried over to a finer mesh; or the quantity is 0.
     """
     aim = number(error, "error")
     if not 0 < aim < 1:
         raise InputError(f"error must be a share between 0 and 1, such as 0.01; got {error!r}")
+    most = whole_number(most_unknowns, "most_unknowns")
+    check_geometry(geometry, model.mesh)
     if model.motion is not None:
         raise ModelError(
             "a model whose material moves through its mesh is not refined; solve it without error"
@@ -101,18 +104,19 @@ def solve_to(
         level = Level(model, result, steps, before)
         if quantity is not None:
             level = QuantityLevel(model, result, steps, before, quantity)
+            level.check_value()
         history.append(level.step(perf_counter() - start))
         analysis.release()
         if before is not None:
             before.before = None  # the meshes before it are needed no more
         if level.reported <= aim and level.is_settled:
             break
-        if keep is None and quantity is None and model.mesh.hanging is None:
+        if keep is None and quantity is None and model.mesh.hanging is None and not _can_be_raised(model):
             keep = layer_direction(result, FLAT * aim * level.norm)
         steps = _next(level, aim, keep, geometry or {})
         model = _carried(model, steps)
-        if 3 * model.mesh.n_nodes > most_unknowns:
-            missed = f"the next mesh has more than {most_unknowns} unknowns"
+        if 3 * model.mesh.n_nodes > most:
+            missed = f"the next mesh has more than {most} unknowns"
         elif len(history) == STEPS:
             missed = f"{STEPS} meshes did not suffice"
         if missed:
@@ -145,12 +149,38 @@ def check_quantity(quantity: Quantity | None) -> None:
         )
 
 
+def check_geometry(geometry: Geometry | None, mesh: Mesh) -> None:
+    """Raise an error for what are no functions of places by parts of a mesh.
+
+    Parameters
+    ----------
+    geometry : by part, a function of places, or None.
+    mesh : with these parts.
+
+    Raises
+    ------
+    InputError
+        It is no mapping, or a value is no function.
+    MeshError
+        There is no such part.
+    """
+    must = "geometry must map parts to functions of places (k, 3)"
+    if not (geometry is None or isinstance(geometry, Mapping)):
+        raise InputError(f"{must}; got {short(geometry)}")
+    for part, function in (geometry or {}).items():
+        if not isinstance(part, str) or not callable(function):
+            raise InputError(f"{must}; got {short(function)} for {short(part)}")
+        mesh.nodes(part)
+
+
 def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) -> list[Finer]:
     """Return the steps to the next mesh; edges along `keep` are not cut."""
     mesh = level.model.mesh
     if _can_be_raised(level.model):
         named = raised(mesh, lambda name: f"Element3D{len(ELEMENTS[quadratic(name)].nodes)}N")
         return [named.onto(geometry)]
+    if level.is_blind:
+        return [refine(mesh, keep=keep).onto(geometry)]
     aim = level.aim(error)
     kept = level.kept()
     times = _times(level.squares, kept, aim, 8 if keep is None else 4)

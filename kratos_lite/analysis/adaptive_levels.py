@@ -8,11 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from kratos_lite.analysis.error_estimate import QuantityError
+from kratos_lite.analysis.error_estimate import FEW, NEGLIGIBLE, QuantityError
 from kratos_lite.analysis.quantities import Quantity
 from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import totals
+from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Ints
@@ -26,6 +27,9 @@ AIM = 0.8
 SINGULAR = 0.25
 """Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
 solution counts as singular there."""
+
+ROUNDING = 1e-10
+"""Share of the sizes that a quantity is the sum of, up to which its value is rounding."""
 
 
 @dataclass(eq=False)
@@ -77,7 +81,7 @@ class Level:
     @cached_property
     def corrected(self) -> float:
         """The estimate in √J as the level before corrects it."""
-        if self.before is None or not self.before.is_nested:
+        if self.before is None or not self.before.is_nested or self.before.is_blind:
             return self.estimate
         ratio = self.estimate / self.before.estimate
         if not ratio < SETTLED:
@@ -102,9 +106,14 @@ class Level:
         return self.bound / self.norm if self.norm > 0 else 0.0
 
     @property
+    def is_blind(self) -> bool:
+        """Whether there is no error to be seen because there are too few elements to see one by."""
+        return self.model.mesh.n_elements < FEW and self.norm > 0 and self.reported <= NEGLIGIBLE
+
+    @property
     def is_settled(self) -> bool:
         """Whether the estimate needs no other level beside it."""
-        return True
+        return not self.is_blind
 
     def aim(self, error: float) -> float:
         """Return the estimate in √J at which a mesh aims that is to reach a relative error."""
@@ -176,7 +185,22 @@ class QuantityLevel(Level):
     @property
     def is_settled(self) -> bool:
         """Whether the level before has elements of the same order: one level alone may say too little."""
+        if self.reported == 0:
+            return not self.is_blind
         return self.before is not None and self.before.order == self.order
+
+    def check_value(self) -> None:
+        """Raise ModelError if the value is rounding of what it is made of, and has no relative error."""
+        result, load = self.result, np.abs(self.quantity.load(self.result))
+        size = float(load.sum() * np.abs(result.u).max(initial=0.0))
+        if self.quantity.motion(result).any():
+            size += float(np.abs(result.reactions).sum())
+        found = self.found
+        if self.before is not None and 0 < max(abs(found.value), found.absolute) < ROUNDING * size:
+            raise ModelError(
+                f"{self.quantity} is 0 but for rounding, {found.value:.1e} {found.unit}, so that it has no "
+                "relative error; ask for that of another quantity or of the energy norm"
+            )
 
     @property
     def reported(self) -> float:

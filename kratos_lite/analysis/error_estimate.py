@@ -94,6 +94,8 @@ def energy_error(
     size = energy + float(squares[method].sum())
     relative = absolute / size**0.5 if size > 0 else 0.0
     warnings = _warnings(recovered, averaged, groups) if relative > NEGLIGIBLE else []
+    if len(recovered) == 1 and energy > 0 and not warnings:
+        warnings = ["one element has no neighbors that could show its error"]
     return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
 
 
@@ -159,8 +161,9 @@ class QuantityError:
 
     @property
     def relative(self) -> float:
-        """`absolute` over the size of the better value; 0 where both are 0."""
-        return self.absolute / abs(self.value + self.signed) if self.absolute else 0.0
+        """`absolute` over the size of the better value; 0 where there is no error, inf where that is 0."""
+        size = abs(self.value + self.signed)
+        return self.absolute / size if size else np.inf if self.absolute else 0.0
 
     def __str__(self) -> str:
         return f"{self.signed:+.3e} {self.unit}, at most about ±{self.absolute:.1e} (value {self.value:.6e})"

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
+from kratos_lite.errors import InputError
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
@@ -84,15 +85,20 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken or its supports leave rigid-body modes free.
+            If the model is broken or its supports leave rigid-body modes free; what belongs to `error` is
+            wrong or given without it; or the quantity is 0.
         SolveError
             If the accuracy asked for cannot be reached.
         """
         if error is not None:
             from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
-            most = most_unknowns or UNKNOWNS
+            most = UNKNOWNS if most_unknowns is None else most_unknowns
             return solve_to(self, error, solver, tolerance, progress, most, geometry, quantity)
+        unused = {"most_unknowns": most_unknowns, "geometry": geometry, "quantity": quantity}
+        for name, value in unused.items():
+            if value is not None:
+                raise InputError(f"{name} belongs to a requested error; give error, such as error=0.01, too")
         if self.motion is not None:
             from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 

@@ -34,6 +34,9 @@ class Solved(Protocol):
     def stress(self, at: Any) -> Any:
         """Return stresses (..., 6) in Pa at points, of elements or recovered at nodes."""
 
+    def stress_of_material(self, row: int) -> Array:
+        """Return recovered stresses (n, 6) in Pa at the nodes of the material of an element."""
+
 
 class Quantity(ABC):
     """A number Q(u) of a result, linear in u but for a constant.  One of your own needs these methods.
@@ -304,8 +307,8 @@ class StressAt(Quantity):
     def local(self, result: Solved) -> Array:
         """Return the difference of the error at the point, by recovered stresses, from its mean around."""
         c, group = COMPONENTS.index(self.component), self._around(result)
-        recovered = result.stress(at="node")
         located = _located(result, self.point)
+        recovered = result.stress_of_material(int(located.rows))
         at_point = float(located.interpolate(recovered)[c]) - self.value(result)
         N, _ = tabulate(group.element.shape, group.rule)
         volume = volumes(result.mesh.points, group)

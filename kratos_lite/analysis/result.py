@@ -210,6 +210,23 @@ class Result:
     def _nodal_stress(self) -> Array:
         return np.asarray(self._field("node", stress=True))
 
+    def stress_of_material(self, row: int) -> Array:
+        """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
+
+        Parameters
+        ----------
+        row : of an element of this material.
+
+        Returns
+        -------
+        (n, 6) in Pa, 0 at nodes that no element of this material has.
+        """
+        stress = np.zeros((self.mesh.n_nodes, 6))
+        for region, values in self._recovery.by_region(self._strained):
+            if any((group.rows == row).any() for group in region.groups):
+                stress[region.nodes] = values
+        return stress
+
     def von_mises(self, at: At = "gauss") -> Any:
         """Return von Mises stresses.
 

@@ -239,7 +239,7 @@ class StaticAnalysis:
             # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
             count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
             inner = model.supports.on_masters(stress_load(model, self.groups, u))
-            rounding = count * max(noise, self._initial_noise())
+            rounding = count * max(noise, self._initial_noise(case.forces))
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
             judge(solution, u, balance)
             initial = case.external - case.forces
@@ -283,12 +283,13 @@ class StaticAnalysis:
         displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
-    def _initial_noise(self) -> float:
-        """Return what rounding leaves of the forces of a stress-free displacement that strains nothing, N."""
-        u0 = self.model.initial_displacement
-        if u0 is None or self.system is None:
+    def _initial_noise(self, forces: Array) -> float:
+        """Return what rounding and the solver leave of the forces of an initial state, in N."""
+        if self.initial is None or self.system is None:
             return 0.0
-        return float(np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0))
+        u0 = 0.0 if self.model.initial_displacement is None else self.model.initial_displacement
+        rounding = np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0)
+        return float(max(rounding, self.tolerance * np.linalg.norm(forces)))
 
     def _report(
         self,

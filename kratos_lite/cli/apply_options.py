@@ -86,8 +86,8 @@ def share(text: str, what: str) -> float:
     """
     given = text.strip()
     try:
-        found = float(given.removesuffix("%")) / (100 if given.endswith("%") else 1)
-    except ValueError:
+        found = number(given.removesuffix("%"), what) / (100 if given.endswith("%") else 1)
+    except InputError:
         found = 0.0
     if not 0 < found < 1:
         raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")

@@ -83,6 +83,63 @@ def test_errors_that_are_no_share_are_refused(error):
         bar().solve(error=error)
 
 
+@pytest.mark.parametrize("most", [0, -1, np.nan, "x", 1.5, True, [3]])
+def test_a_limit_that_is_no_number_of_unknowns_is_refused(most):
+    with pytest.raises(kl.InputError, match="most_unknowns must be a whole number"):
+        bar().solve(error=0.5, most_unknowns=most)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "kind", "words"),
+    [
+        ("x+", kl.InputError, "must map parts"),
+        ([1], kl.InputError, "must map parts"),
+        ({"x+": 3}, kl.InputError, "got 3 for 'x\\+'"),
+        ({3: np.sin}, kl.InputError, "for 3"),
+        ({"rim": np.sin}, kl.MeshError, "rim"),
+    ],
+)
+def test_a_geometry_that_is_none_is_refused_before_anything_is_solved(geometry, kind, words):
+    with pytest.raises(kind, match=words):
+        bar().solve(error=0.99, geometry=geometry)
+
+
+@pytest.mark.parametrize(
+    "given", [{"quantity": kl.ReactionOf("x-", "z")}, {"geometry": {}}, {"most_unknowns": 9}], ids=repr
+)
+def test_what_belongs_to_a_requested_error_is_refused_without_one(given):
+    with pytest.raises(kl.InputError, match="belongs to a requested error"):
+        bar().solve(**given)
+
+
+def test_one_element_is_cut_though_it_shows_no_error():
+    result = bar((1, 1, 1)).solve(error=0.3, most_unknowns=600)
+    assert result.mesh.n_elements >= 8
+    assert any("no neighbors" in text for text in bar((1, 1, 1)).solve().error().warnings)
+
+
+def test_linear_elements_do_not_say_that_stresses_do_not_change_across_one_layer():
+    result = bar().solve(error=0.1, most_unknowns=600)
+    assert len(np.unique(result.mesh.points[:, 1])) > 3  # cut across, as the clamped end needs it
+
+
+@pytest.mark.parametrize(
+    "quantity",
+    [kl.DisplacementAt((4, 0.5, 0.5), "y"), kl.ReactionOf("x-", "y"), kl.StressAt((2, 0.5, 0.5), "yz")],
+    ids=repr,
+)
+def test_a_quantity_that_is_0_has_no_relative_error(quantity):
+    with pytest.raises(kl.ModelError, match="is 0 but for rounding"):
+        bar().solve(error=0.02, quantity=quantity)
+
+
+def test_a_displacement_that_is_prescribed_has_no_error():
+    model = bar()
+    model.fix("x+", "y", 0.1)
+    for x in (0, 4):
+        assert model.solve(error=0.01, quantity=kl.DisplacementAt((x, 0.5, 0.5), "y")).report.error < 1e-9
+
+
 def test_a_motion_is_refused():
     model = kl.Model(kl.annulus(1.0, 2.0, 1.0), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     model.add(kl.ale.Rotation("z", 1.0))

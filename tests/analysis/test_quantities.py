@@ -243,6 +243,27 @@ def test_a_part_that_nothing_moves_has_no_error():
     assert again.signed == pytest.approx(loaded.signed)
 
 
+@pytest.mark.parametrize("kind", ["4N", "8N", "10N", "20N"])
+def test_the_stress_in_a_layer_takes_no_part_of_the_layer_beside_it(kind):
+    """Two layers are pulled side by side: the stress jumps between them, and is exact."""
+    mesh = kl.box((4, 1, 1), (2, 1, 4), f"KinematicLinear3D{kind}")
+    (block,) = mesh.blocks
+    upper = np.flatnonzero(mesh.points[block.nodes].mean(axis=1)[:, 2] > 0.5)
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.0))
+    model.assign(kl.Isotropic3D(E=1e9, nu=0.0), upper)
+    for part, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(part, axis)
+    model.fix("x+", "x", 0.01)
+    result = model.solve()
+    for z, stress in ((0.3, 2.5e3), (0.49, 2.5e3), (0.51, 2.5e6)):
+        found = result.error(of=kl.StressAt((2, 0.4, z), "xx"))
+        assert found.value == pytest.approx(stress)
+        assert found.absolute < 1e-8 * stress
+    lower = result.stress_of_material(0)[:, 0]
+    assert np.abs(lower[mesh.points[:, 2] < 0.6] - 2.5e3).max() < 1e-6
+    assert not lower[mesh.points[:, 2] > 0.6].any()
+
+
 def test_prestress_and_prescribed_values_are_no_part_of_the_adjoint():
     plain = pulled_bar()
     other = pulled_bar()

@@ -945,7 +945,7 @@ def test_an_error_asked_for_is_reached_on_a_finer_mesh(run, tmp_path, monkeypatc
     assert Path("fine.vtu").exists()
 
 
-@pytest.mark.parametrize("share", ["0", "100%", "-1%", "much", "1.5", "nan"])
+@pytest.mark.parametrize("share", ["0", "100%", "-1%", "much", "1.5", "nan", "1_0%"])
 def test_an_error_that_is_no_share_is_refused(run, tmp_path, monkeypatch, share):
     monkeypatch.chdir(tmp_path)
     kl.write("bar.vtu", kl.box())

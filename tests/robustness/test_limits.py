@@ -55,6 +55,16 @@ def test_a_file_in_which_meshio_never_ends_is_given_up_and_the_next_one_is_read(
     assert kl.read(tmp_path / "good.msh").mesh.n_elements == 1
 
 
+def test_a_missing_meshio_is_named_with_its_cure(monkeypatch, tmp_path):
+    (tmp_path / "meshio.py").write_text("raise ModuleNotFoundError('No module named meshio', name='meshio')")
+    monkeypatch.syspath_prepend(tmp_path)
+    foreign._process.end()
+    kl.write(tmp_path / "bar.vtu", kl.box())
+    with pytest.raises(kl.InputError, match=r"bar\.vtu: No module named meshio.*pip install meshio"):
+        kl.read(tmp_path / "bar.vtu")
+    foreign._process.end()
+
+
 def test_a_gzip_bomb_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch):
     monkeypatch.setattr("kratos_lite.io.text.free_memory", lambda: 4e7)
     path = tmp_path / "bomb.mdpa.gz"

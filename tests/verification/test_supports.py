@@ -366,3 +366,17 @@ def test_one_equation_among_very_many_decides(held):
     else:
         with pytest.raises(kl.ModelError, match=r"can still move: rotation about z\. Fix more"):
             model.check()
+
+
+@pytest.mark.parametrize("kind", ["KinematicLinear3D6N", "KinematicLinear3D27N", "BBar3D20N", "Reduced3D20N"])
+@pytest.mark.parametrize("cells", [(3, 2, 2), (10, 2, 2)])
+def test_a_free_expansion_that_the_supports_allow_is_in_equilibrium(kind, cells):
+    mesh = kl.box((3, 1, 1), cells, kind)
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+    for part, axis in (("x-", "x"), ("y-", "y"), ("z-", "z")):
+        model.fix(part, axis)
+    expansion = mesh.points * [0.01, 0.02, 0.03]
+    model.stress_free_at(expansion)
+    result = model.solve()
+    assert np.abs(result.u - expansion).max() < 1e-11
+    assert np.abs(result.stress()).max() < 1e-5  # of stresses of 1e4 Pa, if it were held

@@ -139,6 +139,8 @@ class _Process:
 
     def _why(self, child: subprocess.Popen[bytes], seconds: float) -> str:
         """Return why a process has ended."""
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(1.0)  # else it ends by our signal, and its own reason is lost
         self.end()
         cure = "are its counts right, and is it complete? Save it anew, as .msh of version 4.1 or .vtu"
         if child.returncode in (-getattr(signal, "SIGXCPU", 24), -getattr(signal, "SIGKILL", 9)):
@@ -235,6 +237,8 @@ def load(path: Path) -> tuple[dict[str, Any], list[Numbers]]:
             answer |= {"points": _packed(np.asarray(found.points), arrays), "cells": cells}
     except InputError as error:
         return {"error": str(error).removeprefix(str(path))}, []
+    except ImportError as error:
+        return {"error": f": {error}; this format needs it: pip install {error.name}"}, []
     except MemoryError:
         text = "is it complete, and are its counts right? Else convert it on a machine with more memory"
         return {"error": f": meshio needs more memory than there is; {text}"}, []
