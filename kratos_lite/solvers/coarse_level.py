@@ -180,7 +180,8 @@ def _followers(
         shape = group.element.shape
         around = () if _is_linear(shape) else surroundings(shape)
         for node, corners in enumerate(around, shape.corners):
-            nodes, first = np.unique(group.nodes[:, node], return_index=True)
+            nodes, first = np.unique(group.nodes[:, node].astype(np.int64), return_index=True)
             inner = number[nodes] >= 0
-            leaders = group.nodes[first[inner]][:, list(corners)]
-            yield nodes[inner], leaders, np.full(leaders.shape, 1 / len(corners))
+            leaders = group.nodes[first[inner]][:, list(corners)].astype(np.int64)
+            shares: Array = np.full(leaders.shape, 1 / len(corners))
+            yield nodes[inner], leaders, shares

@@ -121,7 +121,11 @@ class ConstrainedSystem:
         )
 
     def solve(
-        self, forces: Array, prescribed: Array | None = None, tolerance: float | None = None
+        self,
+        forces: Array,
+        prescribed: Array | None = None,
+        tolerance: float | None = None,
+        start: Array | None = None,
     ) -> tuple[Array, solvers.Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
 
@@ -130,6 +134,7 @@ class ConstrainedSystem:
         forces : (n, 3) N.
         prescribed : (3a,) m, in place of c of the constraint map.
         tolerance : in place of that of the system.
+        start : (n, 3) m, near the solution; an iteration begins there.
 
         Raises
         ------
@@ -137,7 +142,8 @@ class ConstrainedSystem:
             If the matrix is singular or the accuracy asked for cannot be reached.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
-        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed)
+        near = None if start is None else self.gather(start)
+        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
         return self.scatter(solution.x), solution
 
     def internal_load(self, u: Array) -> Array:
