@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kratos_lite.assembly.element_groups import floats
 from kratos_lite.native import kernels
+from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 MONOMIALS = (1, 4, 10, 20)
@@ -16,7 +15,7 @@ DEPENDENT, NOTHING, FLAT, ALIGNED = 1e-3, 1e-6, 1e-12, 1e-6
 """See ``native/recovery.hpp``."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Lists:
     """Rows of numbers of any length, one after another: row i is ``entries[start[i] : start[i + 1]]``."""
 
@@ -38,6 +37,8 @@ class Lists:
 
     def take(self, rows: Ints) -> Lists:
         """Return some of the rows."""
+        if module := kernels("recovery"):
+            return Lists(*module.taken(*map(_integers, (self.start, self.entries, rows))))
         lengths = self.lengths[rows]
         start = np.concatenate([[0], np.cumsum(lengths)])
         within = np.arange(start[-1]) - np.repeat(start[:-1], lengths)
@@ -46,11 +47,27 @@ class Lists:
 
 def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
     """Return entries as rows, by the row of each, in their order."""
+    if module := kernels("recovery"):
+        return Lists(*module.dealt(_integers(owner), _integers(entries), n))
     start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=n))])
     return Lists(start, entries[np.argsort(owner, kind="stable")])
 
 
-@dataclass(frozen=True, eq=False)
+def distinct(owner: Numbers, entries: Numbers, n: int) -> tuple[Ints, Ints, Ints]:
+    """Return row and entry of the distinct entries of n rows, ascending, and how often each occurs."""
+    if module := kernels("recovery"):
+        rows, found, count = module.distinct(_integers(owner), _integers(entries), n)
+        return rows, found, count
+    most = int(entries.max(initial=0)) + 1
+    codes, count = np.unique(owner * most + entries, return_counts=True)
+    return codes // most, codes % most, count
+
+
+def _integers(numbers: Numbers) -> Ints:
+    return np.ascontiguousarray(numbers, dtype=np.int64)
+
+
+@record(frozen=True, eq=False)
 class Samples:
     """Values at points of elements.
 
@@ -66,7 +83,7 @@ class Samples:
     offset: Ints
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Polynomials:
     """Fitted polynomials.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from kratos_lite.mesh import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Fixing
 from kratos_lite.quadrature import Rule
+from kratos_lite.records import replace
 
 S = TypeVar("S", bound=Structure)
 

@@ -6,6 +6,7 @@
 #include "arrays.hpp"
 #include "nodal_fields.hpp"
 #include "recovery.hpp"
+#include "rows.hpp"
 
 namespace {
 
@@ -132,6 +133,49 @@ Array<double> multiplied(Numbers nodal, Numbers raw, Numbers others, Numbers oth
     return out;
 }
 
+using Integers = const Array<int64_t>&;
+
+void require_members(Integers numbers, int64_t n, const char* what) {
+    const int64_t* number = numbers.data();
+    bool inside = true;
+    for (int64_t i = 0; i < numbers.size(); ++i) inside &= 0 <= number[i] && number[i] < n;
+    require(inside, what);
+}
+
+Array<int64_t> copied(const std::vector<int64_t>& numbers) {
+    return Array<int64_t>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+}
+
+py::tuple dealt(Integers owner, Integers entries, int64_t n) {
+    require(n >= 0 && owner.size() == entries.size(), "each entry must have an owner");
+    require_members(owner, n, "owners must be rows");
+    Array<int64_t> start(n + 1), out(entries.size());
+    deal(owner.data(), entries.data(), owner.size(), n, start.mutable_data(), out.mutable_data());
+    return py::make_tuple(start, out);
+}
+
+py::tuple distinct(Integers owner, Integers entries, int64_t n) {
+    const py::tuple rows = dealt(owner, entries, n);
+    auto start = rows[0].cast<Array<int64_t>>(), all = rows[1].cast<Array<int64_t>>();
+    const Distinct found(start.data(), all.mutable_data(), n);
+    return py::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
+}
+
+py::tuple taken(Integers start, Integers entries, Integers rows) {
+    const int64_t n = start.size() - 1, *from = start.data();
+    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == entries.size(),
+            "start must rise from 0 to the number of entries");
+    require_members(rows, n, "rows must be there");
+    Array<int64_t> first(rows.size() + 1);
+    int64_t* to = first.mutable_data();
+    to[0] = 0;
+    for (int64_t i = 0; i < rows.size(); ++i) to[i + 1] = to[i] + from[rows.data()[i] + 1] - from[rows.data()[i]];
+    Array<int64_t> out(to[rows.size()]);
+    for (int64_t i = 0; i < rows.size(); ++i)
+        std::copy_n(entries.data() + from[rows.data()[i]], to[i + 1] - to[i], out.mutable_data() + to[i]);
+    return py::make_tuple(first, out);
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_recovery, m) {
@@ -140,6 +184,10 @@ PYBIND11_MODULE(_recovery, m) {
            "values", "offset", "start", "elements", "weights", "degree", "means");
     define(m, "evaluate", evaluated, "mean of some polynomials at each place, (n, 6)", "frame", "terms", "places",
            "start", "patches");
+    define(m, "dealt", dealt, "start (n + 1) and entries of n rows, by their owners", "owner", "entries", py::arg("n"));
+    define(m, "distinct", distinct, "owner, entry and count of the distinct entries of n rows", "owner", "entries",
+           py::arg("n"));
+    define(m, "taken", taken, "some of the rows", "start", "entries", "rows");
     define(m, "combined", combined, "rows of values combined by a table, (m, s, c)", "table", "values", "rows");
     define(m, "summed", summed, "sums at n nodes of values (m, k, 6) of elements", "values", "nodes", py::arg("n"));
     define(m, "products", multiplied, "∫ (σ* - σ) S (σ*' - σ') dV (m)", "nodal", "raw", "others", "other_raw",

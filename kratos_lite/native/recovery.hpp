@@ -155,6 +155,7 @@ inline void place(const Fit& w, int64_t patch, bool means, double* frame) {
 // weight, and the normal equations with six right-hand sides behind the matrix, above its diagonal.
 struct Equations {
     double *rows, *weighted;  // (samples, ROW), (samples, TERMS)
+    double* weights;          // (samples)
     double (*M)[ROW];         // (TERMS)
     int64_t samples;
     int n, width;  // monomials; columns in use, a multiple of 8
@@ -163,11 +164,11 @@ struct Equations {
 inline void fill(const Fit& w, int64_t patch, bool means, const double* frame, Equations& to) {
     to.samples = 0;
     const auto add = [&](const double* x, const double* values, double weight) {
-        double y[3], *row = to.rows + ROW * to.samples, *left = to.weighted + TERMS * to.samples++;
+        double y[3], *row = to.rows + ROW * to.samples;
         local(frame, x, y);
         powers(y, w.degree[patch], row);
-        for (int i = 0; i < to.n; ++i) left[i] = weight * row[i];
         for (int c = 0; c < 6; ++c) row[to.n + c] = values[c];
+        to.weights[to.samples++] = weight;
     };
     for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
         const int64_t e = w.elements[at];
@@ -178,6 +179,8 @@ inline void fill(const Fit& w, int64_t patch, bool means, const double* frame, E
             for (int64_t s = w.offset[e]; s < w.offset[e + 1]; ++s)
                 add(w.X + 3 * s, w.values + 6 * s, w.weights[at]);
     }
+    for (int64_t s = 0; s < to.samples; ++s)  // once the rows have left the store buffer
+        for (int i = 0; i < (to.n + 3) / 4 * 4; ++i) to.weighted[TERMS * s + i] = to.weights[s] * to.rows[ROW * s + i];
 }
 
 // Rows [i, i + 4) and COUNT vectors of columns of the normal equations.
@@ -222,10 +225,16 @@ KL_INLINE bool solve(const Equations& at, double* terms) {
                 *reinterpret_cast<Vec*>(M[k] + j) -= factor * *reinterpret_cast<const Vec*>(M[i] + j);
         }
     }
+    constexpr int PAD = 8;
+    double right[TERMS * PAD] = {};
+    for (int i = 0; i < at.n; ++i)
+        for (int c = 0; c < 6; ++c) right[PAD * i + c] = M[i][at.n + c];
     for (int i = at.n - 1; i >= 0; --i) {
-        for (int c = 0; c < 6; ++c) terms[6 * i + c] = M[i][at.n + c] * inverse[i];
+        Vec x[PAD / V];
+        for (int v = 0; v < PAD / V; ++v) x[v] = inverse[i] * *reinterpret_cast<Vec*>(right + PAD * i + V * v);
+        for (int c = 0; c < 6; ++c) terms[6 * i + c] = x[c / V][c % V];
         for (int k = 0; k < i; ++k)
-            for (int c = 0; c < 6; ++c) M[k][at.n + c] -= M[k][i] * terms[6 * i + c];
+            for (int v = 0; v < PAD / V; ++v) *reinterpret_cast<Vec*>(right + PAD * k + V * v) -= M[k][i] * x[v];
     }
     return all;
 }
@@ -257,10 +266,9 @@ KL_INLINE void fit_body(const FitRange& range) {
             count += w.offset[w.elements[at] + 1] - w.offset[w.elements[at]];
         most = std::max(most, count);
     }
-    Workspace space((ROW + TERMS) * most + TERMS * ROW);
-    double* rows = space.data();
-    Equations at{rows, rows + ROW * most, nullptr, 0, 0, 0};
-    at.M = reinterpret_cast<double(*)[ROW]>(at.weighted + TERMS * most);
+    Workspace space(TERMS * ROW + (ROW + TERMS + 1) * most);
+    double *M = space.data(), *rows = M + TERMS * ROW, *weighted = rows + ROW * most;
+    Equations at{rows, weighted, weighted + TERMS * most, reinterpret_cast<double(*)[ROW]>(M), 0, 0, 0};
     for (int64_t patch = range.first; patch < range.last; ++patch) {
         if (w.means[patch] && fit_one<V>(w, patch, true, at)) continue;
         fit_one<V>(w, patch, false, at);

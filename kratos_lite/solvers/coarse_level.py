@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from kratos_lite.elements import (
 )
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
+from kratos_lite.records import record
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Rows
 
@@ -31,7 +31,7 @@ LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
 """The linear element of each linear shape."""
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LinearLevel:
     """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
 
