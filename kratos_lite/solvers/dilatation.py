@@ -7,7 +7,6 @@ modulus that is taken off the material, and A is the stiffness with what is left
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -22,6 +21,7 @@ from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.materials import LinearMaterial
+from kratos_lite.records import record, replace
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ KEPT = 2 / 3
 """Bulk over shear modulus that A keeps: λ = 0."""
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class SplitMatrix:
     """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied.
 
@@ -113,7 +113,7 @@ def is_split(group: ElementGroup) -> bool:
     return known and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class _Part:
     """A group, the bulk modulus taken off it, λ + 2μ that it keeps, and its dilatations (m, r, 3k)."""
 

@@ -96,7 +96,7 @@ class DisplacementPressure:
             limit = max(float(rounding), tolerance * norm_b)
             if left <= limit or stop or (exhausted and left > before / 2):
                 break
-            aim = min(aim, estimate * limit / left) / 2
+            aim = estimate * min(limit / left, 0.5)
             if exhausted:
                 x, before, space = found, left, _Directions(r)
         if share and left <= limit:

@@ -75,8 +75,9 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
     """
     if choice(method, "solver", METHODS) != "auto":
         return method, "asked for"
-    compiled = symmetric and kernels("multigrid") is not None
-    limit = COMPILED_DENSE_LIMIT if compiled else DENSE_LIMIT
+    few = unknowns <= COMPILED_DENSE_LIMIT  # no kernel needs to be loaded
+    compiled = not few and symmetric and kernels("multigrid") is not None
+    limit = COMPILED_DENSE_LIMIT if few or compiled else DENSE_LIMIT
     if unknowns <= limit and dofs <= 4 * DENSE_LIMIT:
         return "dense", f"{unknowns} unknowns ≤ {limit}: a full matrix is fastest"
     if compiled:
@@ -113,11 +114,17 @@ class LinearSolver:
     symmetric: bool = True
 
     def solve(
-        self, f: Array, tolerance: float, progress: Progress | None = None, prescribed: Array | None = None
+        self,
+        f: Array,
+        tolerance: float,
+        progress: Progress | None = None,
+        prescribed: Array | None = None,
+        start: Array | None = None,
     ) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
 
-        `prescribed` displacements (3n,) take the place of c of the constraint map.
+        `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
+        `start` (3n,), of which the free components count, if that is nearer than 0.
 
         Raises
         ------
@@ -126,18 +133,40 @@ class LinearSolver:
         """
         c = self.reduced.c if prescribed is None else prescribed
         b = self.reduced.reduce(f - self.K @ c)
+        if start is not None and self.method == "amg":
+            near = self.reduced.expand((start - c)[self.reduced.free], c)
+            left = self.reduced.reduce(f - self.K @ near)
+            size = float(np.linalg.norm(b))
+            if np.linalg.norm(left) <= size:
+                return self._continue(f, near, left, size, tolerance, progress)
         solution = self._solve(b, tolerance, progress) if len(b) else Solution(b, self.method, "", 0, 0.0)
         if not solution.reason:
             solution = replace(solution, reason=self.reason)
         return replace(solution, x=self.reduced.expand(solution.x, c))
 
-    def _solve(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
+    def _continue(
+        self, f: Array, near: Array, left: Array, size: float, tolerance: float, progress: Progress | None
+    ) -> Solution:
+        """Solve for what the displacements `near` leave of the load, whose norm is `size`."""
+        rest, rounding = float(np.linalg.norm(left)), 2 * float(np.finfo(float).eps)
+        aim = max(tolerance * size, rounding * (self.norm * float(np.linalg.norm(near)) + size))
+        found = Solution(np.zeros(len(left)), *self._iteration, 0, 0.0)
+        if rest > aim:
+            found = self._solve(left, aim / rest, progress, continued=True)
+        u = self.reduced.expand(found.x, near)
+        off, scale = self.reduced.reduce(f - self.K @ u), self.norm * np.abs(u).max() + np.abs(f).max()
+        error = float(np.abs(off).max() / scale) if scale > 0 else 0.0
+        return replace(found, x=u, backward_error=error)
+
+    def _solve(
+        self, b: Array, tolerance: float, progress: Progress | None, continued: bool = False
+    ) -> Solution:
         if self.method == "dense":
             q = self.factors.solve(b)
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
-            solution, why = self._iterate(b, tolerance, progress)
+            solution, why = self._iterate(b, tolerance, progress, continued)
             if not why:
                 return solution
             if len(b) > FALLBACK_LIMIT:
@@ -194,6 +223,12 @@ class LinearSolver:
             return DisplacementPressure(matrix, self._free, self.points, linear)
         return multigrid.multigrid(matrix, self._free, self.points, linear)
 
+    @property
+    def _iteration(self) -> tuple[str, str]:
+        """The method that iterates, and the reason for it."""
+        split = isinstance(self.K, SplitMatrix)
+        return ("displacement-pressure", SPLIT) if split else ("amg", self.reason)
+
     @cached_property
     def norm(self) -> float:
         """The largest row sum of |K|."""
@@ -203,12 +238,15 @@ class LinearSolver:
     def _norm(self) -> float:
         return self.norm if self._blocks is self.K else self._blocks.norm()
 
-    def _iterate(self, b: Array, tolerance: float, progress: Progress | None) -> tuple[Solution, str]:
+    def _iterate(
+        self, b: Array, tolerance: float, progress: Progress | None, continued: bool
+    ) -> tuple[Solution, str]:
         """Solve by multigrid; return also why it did not converge, or "" where it did."""
         free, rhs = self.reduced.free, np.zeros(len(self._free))
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorization.
-        aim = min(tolerance, ROUND_OFF) if len(b) <= DIRECT_LIMIT else tolerance
+        exact = len(b) <= DIRECT_LIMIT and not continued
+        aim = min(tolerance, ROUND_OFF) if exact else tolerance
         forecast = ConvergenceForecast(tolerance) if quick_to_factorize(len(b)) else None
         x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, forecast)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
@@ -216,9 +254,7 @@ class LinearSolver:
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
         if forecast and forecast.stopped:
             stopped += f", at a rate that takes more than {PATIENCE}: a factorization is faster"
-        split = isinstance(self.K, SplitMatrix)
-        method, reason = ("displacement-pressure", SPLIT) if split else ("amg", "")
-        return Solution(q, method, reason, iterations, error), "" if converged else stopped
+        return Solution(q, *self._iteration, iterations, error), "" if converged else stopped
 
 
 def quick_to_factorize(unknowns: int) -> bool:
