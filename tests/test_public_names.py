@@ -79,8 +79,8 @@ def lacks(doc, takes, raises, returns):
 
 def lacks_of_class(cls):
     """Say what the docstring of a class lacks: it describes the constructor, too."""
+    takes = arguments(cls) if "__init__" in vars(cls) else set(getattr(cls, "_fields", ()))
     makers = [vars(cls)[name] for name in ("__init__", "__post_init__") if name in vars(cls)]
-    takes = arguments(vars(cls)["__init__"]) if "__init__" in vars(cls) else set(getattr(cls, "_fields", ()))
     return list(lacks(cls.__doc__, takes, set().union(*map(raised, makers)), returns=False))
 
 

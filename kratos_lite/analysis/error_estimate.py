@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +12,7 @@ from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.model.loads import Load
 from kratos_lite.model.locking import NEAR_HALF
 from kratos_lite.model.structure import Structure
+from kratos_lite.records import field, record
 from kratos_lite.typing import Array
 
 
@@ -31,7 +31,7 @@ class Origin(Protocol):
         """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class ErrorEstimate:
     """How far a result is from the exact solution, in the energy norm ‖e‖² = ∫ e : C : e dV.
 
@@ -135,7 +135,7 @@ def _locks(group: ElementGroup) -> bool:
     return plain and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class QuantityError:
     """How far a quantity of a result is from that of the exact solution: Q(u) - Q(u_h).
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +11,11 @@ from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import at_gauss
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class GaussPoints:
     """The g Gauss points of m elements.
 

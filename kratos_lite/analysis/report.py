@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
+from kratos_lite.records import field, record
 from kratos_lite.typing import Array
 
 
@@ -25,7 +25,7 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else peak * 1024)
 
 
-@dataclass(frozen=True)
+@record(frozen=True)
 class RefinementStep:
     """One mesh on the way to the accuracy asked for.
 
@@ -47,7 +47,7 @@ class RefinementStep:
         return f"{self.error:.2%} with {self.unknowns} unknowns, {self.elements} {self.kinds}"
 
 
-@dataclass
+@record
 class Report:
     """What was solved, how, and how well.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
@@ -20,6 +19,7 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
+from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import function_or_none
@@ -44,7 +44,7 @@ class Phases:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LoadSet:
     """Loads, their nodal forces (n, 3) in N without and with initial stress, and the parts that they move."""
 
@@ -345,7 +345,7 @@ class StaticAnalysis:
         return skipped
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class _Origin:
     """An analysis with its loads, and the version of its model, when it was solved."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
 
@@ -45,7 +45,7 @@ def floats(values: Any) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class ElementGroup:
     """Elements that share class, rule and material.
 

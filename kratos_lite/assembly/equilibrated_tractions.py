@@ -15,7 +15,6 @@ Source: Ladevèze & Pelle, Mastering Calculations in Linear and Nonlinear Mechan
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -30,6 +29,7 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.topology import corners, equal_sets, faces_of
+from kratos_lite.records import record
 from kratos_lite.shapes import FACE_SHAPES
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -37,7 +37,7 @@ BALANCED = 1e-6
 """Relative force that may be left over around a node, from the solution of the equations."""
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class Sides:
     """Both sides of all faces: block after block, face after face of the cell, cell after cell.
 

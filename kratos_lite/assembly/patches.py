@@ -8,20 +8,22 @@ thick, those of its neighbors with the most elements, unless it has half as many
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.assembly.polynomial_fit import Lists, lists
+from kratos_lite.assembly.polynomial_fit import Lists, distinct, lists
 from kratos_lite.mesh import Block
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
+from kratos_lite.records import record
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
 from kratos_lite.typing import Ints, Mask
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Patches:
     """Patches of some elements, numbered 0 … m - 1.
 
@@ -57,12 +59,14 @@ def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists)
     around, outer = _around(blocks, corners, is_corner), outer & is_corner
     inside = ~outer[around.owner]
     wide_owner, wide = _neighborhoods(around, corners, outer, is_corner)
-    rows = np.concatenate([around.owner[inside], wide_owner])
+    number, rows = np.cumsum(is_corner) - 1, np.concatenate([around.owner[inside], wide_owner])
     own = np.concatenate([inside[inside], _contain(wide_owner, wide, corners)])
-    number, order = np.cumsum(is_corner) - 1, np.argsort(rows, kind="stable")
-    entries = np.concatenate([around.entries[inside], wide])[order]
-    elements = lists(number[rows[order]], entries, int(is_corner.sum()))
-    return Patches(elements, own[order], _patches_of_nodes(blocks, is_corner, number, hanging, masters))
+    entries = 2 * np.concatenate([around.entries[inside], wide]) + own
+    found = lists(number[rows], entries, int(is_corner.sum()))
+    elements = Lists(found.start, found.entries // 2)
+    return Patches(
+        elements, found.entries % 2 > 0, _patches_of_nodes(blocks, is_corner, number, hanging, masters)
+    )
 
 
 def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:
@@ -95,18 +99,16 @@ def _corners(blocks: Sequence[Block]) -> Ints:
 
 def _around(blocks: Sequence[Block], corners: Ints, is_corner: Mask) -> Lists:
     """Return the elements around each corner node, also those that have it in the middle of an edge."""
-    element, column = np.nonzero(corners >= 0)
-    nodes, elements, first = [corners[element, column]], [element], 0
+    at = np.flatnonzero((corners >= 0) & is_corner[corners])
+    nodes, elements, first = [corners.ravel()[at]], [at // corners.shape[1]], 0
     for block in blocks:
         c = block.shape.corners if block.shape else block.nodes.shape[1]
         rest = block.nodes[:, c:]
-        row, at = np.nonzero(is_corner[rest])
-        nodes.append(rest[row, at].astype(np.int64))
+        row, column = np.nonzero(is_corner[rest]) if rest.size else (NO_ROWS, NO_ROWS)
+        nodes.append(rest[row, column].astype(np.int64))
         elements.append(first + row)
         first += len(block)
-    node, element = np.concatenate(nodes), np.concatenate(elements)
-    known = is_corner[node]
-    return lists(node[known], element[known], len(is_corner))
+    return lists(np.concatenate(nodes), np.concatenate(elements), len(is_corner))
 
 
 def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -> tuple[Ints, Ints]:
@@ -120,15 +122,14 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     usable = (near >= 0) & is_corner[near]
     inner = usable & ~outer[near]
     # nodes inside count by the elements that they share, others by the elements around them
-    pair, at = np.nonzero(inner)
-    codes, count = _distinct(node[pair] * len(outer) + near[pair, at])
-    chosen = _largest(codes // len(outer), count, len(outer))
-    host, center = codes[chosen] // len(outer), codes[chosen] % len(outer)
+    at, c = np.flatnonzero(inner), corners.shape[1]
+    host, center, count = distinct(node[at // c], near.ravel()[at], len(outer))
+    chosen = _largest(host, count, len(outer))
+    host, center = host[chosen], center[chosen]
     without = np.ones(len(outer), dtype=bool)
     without[host] = False
-    pair, at = np.nonzero(usable & without[node][:, None])
-    codes, _ = _distinct(node[pair] * len(outer) + near[pair, at])
-    alone, other = codes // len(outer), codes % len(outer)
+    at = np.flatnonzero(usable & without[node][:, None])
+    alone, other, _ = distinct(node[at // c], near.ravel()[at], len(outer))
     size = around.lengths
     best = np.zeros(len(outer), dtype=np.int64)
     np.maximum.at(best, alone, size[other])
@@ -136,16 +137,8 @@ def _neighborhoods(around: Lists, corners: Ints, outer: Mask, is_corner: Mask) -
     chosen = np.where(enough, other == alone, size[other] == best[alone])
     host, center = np.concatenate([host, alone[chosen]]), np.concatenate([center, other[chosen]])
     patch = around.take(center)
-    found = np.concatenate([host[patch.owner] * len(corners) + patch.entries, node * len(corners) + element])
-    found, _ = _distinct(found)
-    return found // len(corners), found % len(corners)
-
-
-def _distinct(codes: Ints) -> tuple[Ints, Ints]:
-    """Return the distinct numbers, ascending, and how often each occurs; faster than NumPy's own way."""
-    codes = np.sort(codes)
-    first = np.flatnonzero(np.append(True, codes[1:] != codes[:-1])) if len(codes) else NO_ROWS
-    return codes[first], np.diff(np.append(first, len(codes)))
+    pairs = np.concatenate([host[patch.owner], node]), np.concatenate([patch.entries, element])
+    return distinct(*pairs, len(outer))[:2]
 
 
 def _largest(owner: Ints, count: Ints, n: int) -> Mask:
@@ -157,7 +150,10 @@ def _largest(owner: Ints, count: Ints, n: int) -> Mask:
 
 def _contain(owner: Ints, element: Ints, corners: Ints) -> Mask:
     """Return a mask of the elements that have the node as a corner."""
-    return (corners[element] == owner[:, None]).any(axis=1)
+    found = np.zeros(len(owner), dtype=bool)
+    for column in corners.T.copy():
+        found |= column[element] == owner
+    return found
 
 
 def _patches_of_nodes(
@@ -172,10 +168,12 @@ def _patches_of_nodes(
     done[hanging] = True
     for block in blocks:
         for a, support in enumerate(_supports(block)):
-            new, first = np.unique(block.nodes[:, a], return_index=True)
-            new, first = new[~done[new]], first[~done[new]]
+            left = np.flatnonzero(~done[block.nodes[:, a]])
+            if not len(left):
+                continue
+            new, first = np.unique(block.nodes[left, a], return_index=True)
             done[new] = True
-            at = block.nodes[first][:, support]
+            at = block.nodes[left[first]][:, support]
             known = is_corner[at]
             owner.append(np.repeat(new, known.sum(axis=1)))
             entries.append(number[at[known]])
@@ -184,9 +182,13 @@ def _patches_of_nodes(
 
 def _supports(block: Block) -> list[list[int]]:
     """Return the corners of the edge, face or cell in which each node of a cell lies."""
-    shape = block.shape
-    if shape is None:
+    if block.shape is None:
         return [[a] for a in range(block.nodes.shape[1])]
+    return _supports_in(block.shape)
+
+
+@remembered
+def _supports_in(shape: type[Shape]) -> list[list[int]]:
     linear = shape.linear()
     if linear is None:
         return [[a] if a < shape.corners else list(range(shape.corners)) for a in range(len(shape.nodes))]

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kratos_lite.assembly.element_groups import floats
 from kratos_lite.native import kernels
+from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints, Mask, Numbers
 
-TERMS = 20
-"""Monomials up to degree 3."""
+MONOMIALS = (1, 4, 10, 20)
+"""Their number up to each degree."""
 DEPENDENT, NOTHING, FLAT, ALIGNED = 1e-3, 1e-6, 1e-12, 1e-6
 """See ``native/recovery.hpp``."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Lists:
     """Rows of numbers of any length, one after another: row i is ``entries[start[i] : start[i + 1]]``."""
 
@@ -38,6 +37,8 @@ class Lists:
 
     def take(self, rows: Ints) -> Lists:
         """Return some of the rows."""
+        if module := kernels("recovery"):
+            return Lists(*module.taken(*map(_integers, (self.start, self.entries, rows))))
         lengths = self.lengths[rows]
         start = np.concatenate([[0], np.cumsum(lengths)])
         within = np.arange(start[-1]) - np.repeat(start[:-1], lengths)
@@ -46,11 +47,27 @@ class Lists:
 
 def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
     """Return entries as rows, by the row of each, in their order."""
+    if module := kernels("recovery"):
+        return Lists(*module.dealt(_integers(owner), _integers(entries), n))
     start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=n))])
     return Lists(start, entries[np.argsort(owner, kind="stable")])
 
 
-@dataclass(frozen=True, eq=False)
+def distinct(owner: Numbers, entries: Numbers, n: int) -> tuple[Ints, Ints, Ints]:
+    """Return row and entry of the distinct entries of n rows, ascending, and how often each occurs."""
+    if module := kernels("recovery"):
+        rows, found, count = module.distinct(_integers(owner), _integers(entries), n)
+        return rows, found, count
+    most = int(entries.max(initial=0)) + 1
+    codes, count = np.unique(owner * most + entries, return_counts=True)
+    return codes // most, codes % most, count
+
+
+def _integers(numbers: Numbers) -> Ints:
+    return np.ascontiguousarray(numbers, dtype=np.int64)
+
+
+@record(frozen=True, eq=False)
 class Samples:
     """Values at points of elements.
 
@@ -66,14 +83,14 @@ class Samples:
     offset: Ints
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Polynomials:
     """Fitted polynomials.
 
     Attributes
     ----------
     frame : (p, 12) origin in m, and the rows of the map to local coordinates in 1/m.
-    terms : (p, 20, 6) coefficients of the monomials in local coordinates, by degree.
+    terms : (p, t, 6) coefficients of the monomials in local coordinates, by degree.
     """
 
     frame: Array
@@ -83,11 +100,11 @@ class Polynomials:
         """Return at each place (n, 3) the mean of some of the polynomials there, (n, 6)."""
         if module := kernels("recovery"):
             return module.evaluate(
-                self.frame, self.terms, floats(places), _int32(chosen.start), _int32(chosen.entries)
+                self.frame, self.terms, floats(places), as_rows(chosen.start), as_rows(chosen.entries)
             )
         owner, rows = chosen.owner, chosen.entries
         y = _local(self.frame[rows], places[owner][:, None])
-        values = (_monomials(y, 3) @ self.terms[rows])[:, 0]
+        values = (_monomials(y, MONOMIALS.index(self.terms.shape[1])) @ self.terms[rows])[:, 0]
         total = np.zeros((len(places), 6))
         np.add.at(total, owner, values)
         return total / np.maximum(chosen.lengths, 1)[:, None]
@@ -109,25 +126,26 @@ def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: I
     A monomial that the points of a patch cannot tell from those before it is left out.
     """
     if module := kernels("recovery"):
-        numbers = (_int32(samples.offset), _int32(patches.start), _int32(patches.entries))
-        tables = (floats(weights), _int32(degree), _int32(means))
+        numbers = (as_rows(samples.offset), as_rows(patches.start), as_rows(patches.entries))
+        tables = (floats(weights), as_rows(degree), as_rows(means))
         return Polynomials(*module.fit(floats(samples.places), floats(samples.values), *numbers, *tables))
-    frame, terms = np.zeros((len(patches), 12)), np.zeros((len(patches), TERMS, 6))
+    frame, terms = _nothing(len(patches), degree)
     left = np.ones(len(patches), dtype=bool)
     if means.any():
         chosen = np.flatnonzero(means)
         found = _fit(
             _means(samples), patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen]
         )
-        frame[chosen], terms[chosen] = found[:2]
+        frame[chosen], terms[chosen, : found[1].shape[1]] = found[:2]
         left[chosen] = ~found[2]
     chosen = np.flatnonzero(left)
     every = _fit(samples, patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen])
-    frame[chosen], terms[chosen] = every[:2]
+    frame[chosen], terms[chosen, : every[1].shape[1]] = every[:2]
     return Polynomials(frame, terms)
 
 
-def _int32(numbers: Ints) -> Ints:
+def as_rows(numbers: Numbers) -> Ints:
+    """Return row numbers as kernels take them."""
     return np.ascontiguousarray(numbers, dtype=np.int32)
 
 
@@ -154,7 +172,7 @@ def _fit(samples: Samples, patches: Lists, weights: Array, degree: Ints) -> tupl
     weight = np.repeat(weights, counts)
     sizes = np.bincount(patches.owner, weights=counts, minlength=len(patches)).astype(int)
     points = Lists(np.concatenate([[0], np.cumsum(sizes)]), np.arange(len(rows)))
-    frame, terms = np.zeros((len(patches), 12)), np.zeros((len(patches), TERMS, 6))
+    frame, terms = _nothing(len(patches), degree)
     complete = np.zeros(len(patches), dtype=bool)
     for size, order in sorted(set(zip(sizes.tolist(), degree.tolist(), strict=True))):
         alike = np.flatnonzero((sizes == size) & (degree == order))
@@ -167,6 +185,11 @@ def _fit(samples: Samples, patches: Lists, weights: Array, degree: Ints) -> tupl
             found, complete[part] = _solve(weighted @ P, weighted @ samples.values[rows[at]])
             terms[part, : found.shape[1]] = found
     return frame, terms, complete
+
+
+def _nothing(n: int, degree: Ints) -> tuple[Array, Array]:
+    """Return frames and coefficients of n patches, to be filled."""
+    return np.zeros((n, 12)), np.zeros((n, MONOMIALS[degree.max(initial=0)], 6))
 
 
 def _frames(X: Array) -> Array:

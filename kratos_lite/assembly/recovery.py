@@ -6,7 +6,6 @@ Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,7 +14,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.patches import Patches, outer_corners, patches
-from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
+from kratos_lite.assembly.polynomial_fit import Lists, Samples, as_rows, fit, lists
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import STRAIN
@@ -24,11 +23,12 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
+from kratos_lite.records import record, replace
 from kratos_lite.registry import remembered
-from kratos_lite.typing import Array, Ints
+from kratos_lite.typing import Array, Ints, Numbers
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Sampling:
     """Where the values of an element are taken, and what is fitted to them.
 
@@ -77,7 +77,7 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     return Sampling(N, T, min(degree, 3), simple, far)
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Region:
     """Elements of one material, over which stresses are smooth.
 
@@ -99,28 +99,36 @@ class Region:
         ways = [sampling(group.element, group.rule) for group in self.groups]
         places, sampled = [], []
         for group, way, value in zip(self.groups, ways, values, strict=True):
-            places.append((way.N @ points[group.nodes]).reshape(-1, 3))
-            sampled.append((value if way.from_gauss is None else way.from_gauss @ value).reshape(-1, 6))
-        sizes = [len(group) for group in self.groups]
-        names = ("count", "degree", "means", "far")
-        counts, degrees, means, far = (
-            np.repeat([getattr(way, name) for way in ways], sizes) for name in names
-        )
-        samples = Samples(
-            np.concatenate(places), np.concatenate(sampled), np.concatenate([[0], np.cumsum(counts)])
-        )
+            T = way.from_gauss
+            places.append(_combined(way.N, points, group.nodes).reshape(-1, 3))
+            sampled.append((value if T is None else _from_points(T, value)).reshape(-1, 6))
+        counts = np.repeat([way.count for way in ways], [len(group) for group in self.groups])
+        samples = Samples(_joined(places), _joined(sampled), np.concatenate([[0], counts.cumsum()]))
+        degree = self._of_patches([way.degree for way in ways], np.minimum)
+        simple = self._of_patches([int(way.means) for way in ways], np.maximum)
+        far = self._of_entries([way.far for way in ways])
+        around = self.patches
+        fitted = fit(samples, around.elements, np.where(around.own, 1.0, far), degree, simple)
+        return fitted.at(points[self.nodes], around.of)
+
+    def _of_entries(self, values: Sequence[float]) -> Array:
+        """Return a value of each group for all entries of the patches."""
+        if len(set(values)) == 1:
+            return np.full(len(self.patches.elements.entries), values[0])
+        return np.repeat(values, [len(group) for group in self.groups])[self.patches.elements.entries]
+
+    def _of_patches(self, values: Sequence[int], least: np.ufunc) -> Ints:
+        """Return the least, or the largest, value of the groups in each patch."""
         elements = self.patches.elements
-        degree = np.minimum.reduceat(degrees[elements.entries], elements.start[:-1])
-        simple = np.maximum.reduceat(means[elements.entries], elements.start[:-1])
-        weights = np.where(self.patches.own, 1.0, far[elements.entries])
-        fitted = fit(samples, elements, weights, degree, simple)
-        return fitted.at(points[self.nodes], self.patches.of)
+        if len(set(values)) == 1:
+            return np.full(len(elements), values[0])
+        return np.asarray(least.reduceat(self._of_entries(values), elements.start[:-1]))
 
     def averaged(self, values: Sequence[Array]) -> Array:
         """Return the same, extrapolated to the nodes of each element and averaged there."""
         total, count = np.zeros((len(self.nodes), 6)), np.zeros(len(self.nodes))
         for group, cells, value in zip(self.groups, self.cells, values, strict=True):
-            add_nodal(total, cells, extrapolation(group.element, group.rule) @ value)
+            total += _sum(_from_points(extrapolation(group.element, group.rule), value), cells, len(total))
             count += np.bincount(cells.ravel(), minlength=len(count))
         return total / count[:, None]
 
@@ -227,7 +235,7 @@ class Recovery:
             N, _ = tabulate(group.element.shape, group.rule)
             dV, S = volumes(self.points, group), floats(np.linalg.inv(group.material.C))
             for row, values in zip(found, nodal, strict=True):
-                row[group.rows] = _squares(values, nodes, N, value, dV, S)
+                row[group.rows] = _products((values, value), (values, value), nodes, N, dV, S)
         return found[0], found[1]
 
     def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Ints, Array, Array, Array]]:
@@ -254,10 +262,38 @@ def _compared_at(group: ElementGroup) -> ElementGroup:
     return replace(group, rule=rule_for(shape.cell, 2 * shape.degree))
 
 
-def _squares(nodal: Array, cells: Ints, N: Array, value: Array, dV: Array, S: Array) -> Array:
-    """Return ∫ (N σ* - σ) : S : (N σ* - σ) dV of each element, (m,)."""
+def _joined(parts: Sequence[Array]) -> Array:
+    """Return arrays one after another; a single one is not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _products(
+    first: tuple[Array, Array], second: tuple[Array, Array], nodes: Ints, N: Array, dV: Array, S: Array
+) -> Array:
+    """Return ∫ (N σ* - σ) : S : (N σ*' - σ') dV of each element, (m,), of two pairs of σ* and σ."""
     if module := kernels("recovery"):
-        rows = np.ascontiguousarray(cells, dtype=np.int32)
-        return module.differences(nodal, rows, floats(N), floats(value), floats(dV), floats(S))
-    off = N @ nodal[cells] - value
-    return (((off @ S) * off).sum(axis=-1) * dV).sum(axis=1)
+        return module.products(*map(floats, (*first, *second)), as_rows(nodes), *map(floats, (N, dV, S)))
+    one, other = (N @ nodal[nodes] - raw for nodal, raw in (first, second))
+    return (((one @ S) * other).sum(axis=-1) * dV).sum(axis=1)
+
+
+def _sum(values: Array, nodes: Ints, n: int) -> Array:
+    """Return the sums at nodes (n, 6) of values (m, k, 6) of elements."""
+    if module := kernels("recovery"):
+        return module.summed(floats(values), as_rows(nodes), n)
+    total = np.zeros((n, 6))
+    add_nodal(total, nodes, values)
+    return total
+
+
+def _combined(table: Array, values: Array, rows: Numbers) -> Array:
+    """Return rows (m, k) of values (n, c) combined by a table (s, k), as (m, s, c)."""
+    if module := kernels("recovery"):
+        return module.combined(floats(table), floats(values), as_rows(rows))
+    return table @ values[rows]
+
+
+def _from_points(table: Array, values: Array) -> Array:
+    """Return values (m, g, c) at the points of each element combined by a table (s, g), as (m, s, c)."""
+    m, g, c = values.shape
+    return _combined(table, values.reshape(-1, c), np.arange(m * g, dtype=np.int32).reshape(m, g))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.records import replace
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
 from functools import cached_property
 from itertools import product
 from sys import float_info
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, MaterialError
+from kratos_lite.records import names_of
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
@@ -58,13 +58,13 @@ class LinearMaterial:
         MATERIALS.add(cls.__name__, cls, cls.__dict__.get("aliases", ()))
 
     def __post_init__(self) -> None:
-        if is_dataclass(self):
-            for item in fields(self):
-                value = getattr(self, item.name)
-                if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-                    raise MaterialError(f"{self._name(item.name)} must be a number; got {value!r}")
-                if not abs(value) <= MAX_FLOAT:
-                    raise MaterialError(f"{self._name(item.name)} must be finite; got {value}")
+        for name in names_of(type(self)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise MaterialError(f"{self._name(name)} must be a number; got {value!r}")
+            size: Any = abs(value)
+            if not size <= MAX_FLOAT:
+                raise MaterialError(f"{self._name(name)} must be finite; got {value}")
         if self.density < 0:
             raise MaterialError(
                 f"{self._name('density')} {self.density:g} must be ≥ 0 kg/m³; reverse gravity instead"
@@ -212,7 +212,7 @@ class LinearMaterial:
             If a variable is missing or outside its bounds.
         """
         given = {field: values[name] for field, name in cls.variables.items() if name in values}
-        needed = {item.name for item in fields(cls) if item.name != "density"}  # type: ignore[arg-type]
+        needed = {name for name in names_of(cls) if name != "density"}
         missing = [cls.variables.get(field, field) for field in sorted(needed - given.keys())]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
+from kratos_lite.records import field, names_of, record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
@@ -18,7 +18,7 @@ from kratos_lite.validation import instance, read_only, short, whole_numbers
 NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record(frozen=True, eq=False)
 class Block:
     """Cells of one kind: elements, or the conditions that carry loads; its arrays are read-only.
 
@@ -82,7 +82,7 @@ class Block:
         return len(self.nodes)
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies are read-only as well
-        return Block, tuple(getattr(self, column.name) for column in fields(self))
+        return Block, tuple(getattr(self, name) for name in names_of(type(self)))
 
     def take(self, chosen: Ints | Mask) -> Block:
         """Return the block of some of the cells.
@@ -108,7 +108,7 @@ def _column(
     return read_only(whole_numbers(values, f"block {name}: {what}", shape, dtype=dtype, error=MeshError))
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Part:
     """A named part (Kratos: SubModelPart): rows of what belongs to it, in read-only arrays.
 
@@ -142,7 +142,7 @@ class Part:
             vars(self)[name] = read_only(whole_numbers(getattr(self, name), what, ("k",), error=MeshError))
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies are read-only as well
-        return Part, tuple(getattr(self, column.name) for column in fields(self))
+        return Part, tuple(getattr(self, name) for name in names_of(type(self)))
 
     def __str__(self) -> str:
         sizes = {"nodes": self.nodes, "elements": self.elements, "conditions": self.conditions}

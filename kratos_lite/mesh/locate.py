@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from kratos_lite.mesh.blocks import NO_ROWS, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.nearest import nearest_element
+from kratos_lite.records import record
 from kratos_lite.shapes import Shape, inverse_map
 from kratos_lite.shapes.inverse import outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -35,7 +35,7 @@ STARTS = 4
 """Points near nodes of such a cell, those nearest to the point, from which Newton starts again."""
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Located:
     """Points (...) in a mesh: the element that contains each, and where in it the point lies.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -24,6 +23,7 @@ from kratos_lite.mesh.selection import (
     find_part,
 )
 from kratos_lite.mesh.topology import inverted, mirror
+from kratos_lite.records import replace
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
 

@@ -10,7 +10,6 @@ Sources: Hughes, The Finite Element Method (1987), ch. 4; MacNeal, IJNME 24 (198
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.mesh import Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
+from kratos_lite.records import names_of, record
 from kratos_lite.typing import Array, Ints, Mask
 
 STIFF = 0.1
@@ -91,7 +91,7 @@ def _better(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str
 # ---- in bending ----------------------------------------------------------------------------------------
 
 
-@dataclass
+@record
 class Walls:
     """Outer faces of elements, and the wall behind each: up to the outer face opposite.
 
@@ -112,7 +112,7 @@ class Walls:
 
     def take(self, chosen: Mask | Ints) -> Walls:
         """Return some of the walls."""
-        return Walls(*(getattr(self, item.name)[chosen] for item in fields(self)))
+        return Walls(*(getattr(self, name)[chosen] for name in names_of(type(self))))
 
 
 def _has_two_sides(kind: type[KinematicLinear]) -> bool:

@@ -6,7 +6,6 @@ Source: Solfec-1.0 theory, shape mass_properties; Goldstein, Classical Mechanics
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
+from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
@@ -24,7 +24,7 @@ SINGULAR = 1e-15
 """Ratio of the smallest to the largest eigenvalue down to which a tensor counts as positive definite."""
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record(frozen=True, eq=False)
 class MassProperties:
     """Mass properties of one body, or of many through leading axes (...) that broadcast.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +12,7 @@ from kratos_lite.mesh import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Fixing
 from kratos_lite.quadrature import Rule
+from kratos_lite.records import replace
 
 S = TypeVar("S", bound=Structure)
 

@@ -7,8 +7,6 @@ and joints are the equations that these must meet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
@@ -16,6 +14,7 @@ from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_s
 from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.supports import Supports
+from kratos_lite.records import record
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
@@ -101,7 +100,7 @@ def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) 
     return np.where(found.part >= 0, group_of[found.part], -1)
 
 
-@dataclass(frozen=True)
+@record(frozen=True)
 class _Constraints:
     """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight."""
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
+from kratos_lite.records import record, replace
 from kratos_lite.solvers.constraint_map import (
     ConstraintMap,
     MultiPointConstraint,
@@ -38,7 +38,7 @@ def axis_numbers(axes: str) -> list[int]:
     return [AXES.index(a) for a in axes]
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class PrescribedMotion:
     """The displacement of nodes along an axis as a function of time.
 
@@ -56,7 +56,7 @@ class PrescribedMotion:
     given: object
 
 
-@dataclass(frozen=True, eq=False)
+@record(frozen=True, eq=False)
 class Fixing:
     """One call of `Structure.fix`, from which a finer mesh is fixed alike.
 

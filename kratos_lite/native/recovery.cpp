@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "nodal_fields.hpp"
 #include "recovery.hpp"
+#include "rows.hpp"
 
 namespace {
 
@@ -27,19 +29,18 @@ py::tuple fitted(Numbers X, Numbers values, Indices offset, Indices start, Indic
     require(weights.size() == elements.size(), "weights must be those of the elements of the patches");
     require(degree.size() == patches && means.size() == patches, "degree and means must be (p)");
     require(are_rows(degree, 4), "degrees run from 0 to 3");
-    Array<double> frame({static_cast<py::ssize_t>(patches), py::ssize_t{12}});
-    Array<double> terms({static_cast<py::ssize_t>(patches), py::ssize_t{TERMS}, py::ssize_t{6}});
+    const int highest = patches ? *std::max_element(degree.data(), degree.data() + patches) : 0;
+    const int most = monomials(highest);
+    Array<double> frame({patches, int64_t{12}}), terms({patches, int64_t{most}, int64_t{6}});
     const int64_t m = offset.size() - 1;
-    const bool simple = std::any_of(means.data(), means.data() + patches, [](int32_t mean) { return mean != 0; });
-    std::vector<double> mean(simple ? 9 * m : 0);
-    const Fit fit{X.data(),       values.data(), offset.data(), start.data(), elements.data(),        weights.data(),
-                  degree.data(), means.data(),  mean.data(),   frame.mutable_data(), terms.mutable_data()};
+    std::vector<double> summary(SUMMARY * m);
+    const Fit fit{X.data(),      values.data(), offset.data(),  start.data(),         elements.data(),      weights.data(),
+                  degree.data(), means.data(),  summary.data(), frame.mutable_data(), terms.mutable_data(), most};
     {
         py::gil_scoped_release release;
-        if (simple)
-            parallel_ranges(m, 8 * GRAIN, [&](int64_t first, int64_t last) {
-                for (int64_t e = first; e < last; ++e) mean_samples(fit, e, mean.data() + 9 * e);
-            });
+        parallel_ranges(m, 8 * GRAIN, [&](int64_t first, int64_t last) {
+            for (int64_t e = first; e < last; ++e) summarize(fit, e, summary.data() + SUMMARY * e);
+        });
         parallel_ranges(patches, GRAIN, [&](int64_t first, int64_t last) { fit_patches({&fit, first, last}); });
     }
     return py::make_tuple(frame, terms);
@@ -48,7 +49,9 @@ py::tuple fitted(Numbers X, Numbers values, Indices offset, Indices start, Indic
 Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, Indices patches) {
     const int64_t n = X.shape(0), p = frame.shape(0);
     require(has_shape(frame, p, 12), "frame must be (p, 12)");
-    require(terms.size() == p * TERMS * 6, "terms must be (p, 20, 6)");
+    require(terms.ndim() == 3 && terms.shape(0) == p && terms.shape(2) == 6, "terms must be (p, t, 6)");
+    const int count = static_cast<int>(terms.shape(1)), degree = degree_of(count);
+    require(count == monomials(degree), "terms must be all up to a degree");
     require(has_shape(X, n, 3) && start.size() == n + 1, "places must be (n, 3), start (n + 1)");
     require_rows(start, patches.size(), "start must be (n + 1)");
     require(are_rows(patches, p), "patches must be rows of the fits");
@@ -63,9 +66,9 @@ Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, 
             for (int32_t k = from[node]; k < from[node + 1]; ++k) {
                 double y[3], monomial[TERMS];
                 local(frames + 12 * int64_t{rows[k]}, at + 3 * node, y);
-                powers(y, 3, monomial);
-                const double* term = coefficients + 6 * TERMS * int64_t{rows[k]};
-                for (int i = 0; i < TERMS; ++i)
+                powers(y, degree, monomial);
+                const double* term = coefficients + 6 * count * int64_t{rows[k]};
+                for (int i = 0; i < count; ++i)
                     for (int c = 0; c < 6; ++c) sum[c] += monomial[i] * term[6 * i + c];
             }
             for (int c = 0; c < 6; ++c) to[6 * node + c] = sum[c] / std::max(from[node + 1] - from[node], 1);
@@ -74,47 +77,119 @@ Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, 
     return out;
 }
 
-// ∫ (σ* - σ) S (σ* - σ) dV of each element, with σ* = Σ N_a of nodal values.
-Array<double> differences(Numbers nodal, Indices nodes, Numbers N, Numbers stress, Numbers volume, Numbers S) {
-    const int64_t m = nodes.shape(0), k = nodes.shape(1), g = N.shape(0);
-    require(nodal.ndim() == 2 && nodal.shape(1) == 6, "nodal values must be (n, 6)");
-    require(nodes.ndim() == 2 && are_rows(nodes, nodal.shape(0)), "nodes must be rows of nodal values");
-    require(has_shape(N, g, k), "N must be (g, k)");
-    require(stress.size() == m * g * 6, "stress must be (m, g, 6)");
-    require(has_shape(volume, m, g) && has_shape(S, 6, 6), "volume must be (m, g), S (6, 6)");
-    Array<double> out(m);
-    double* to = out.mutable_data();
-    const double *values = nodal.data(), *shape = N.data(), *raw = stress.data(), *dV = volume.data(), *s = S.data();
-    const int32_t* rows = nodes.data();
+// Rows of values combined by a table: (m, s, c).
+Array<double> combined(Numbers table, Numbers values, Indices rows) {
+    require(table.ndim() == 2 && rows.ndim() == 2 && rows.shape(1) == table.shape(1), "rows must be (m, k)");
+    require(values.ndim() == 2, "values must be (n, c)");
+    const int64_t m = rows.shape(0), s = table.shape(0), c = values.shape(1);
+    require(c == 3 || c == 6, "values must have three or six components");
+    require(are_rows(rows, values.shape(0)), "rows must be those of the values");
+    Array<double> out({m, s, c});
+    const Combination every{table.data(), values.data(), rows.data(), s, rows.shape(1), out.mutable_data(), 0, m};
     py::gil_scoped_release release;
-    parallel_ranges(m, GRAIN, [&](int64_t first, int64_t last) {
-        for (int64_t e = first; e < last; ++e) {
-            double total = 0;
-            for (int64_t q = 0; q < g; ++q) {
-                double off[6], density = 0;
-                for (int c = 0; c < 6; ++c) off[c] = -raw[(e * g + q) * 6 + c];
-                for (int64_t a = 0; a < k; ++a) {
-                    const double weight = shape[q * k + a], *value = values + 6 * int64_t{rows[e * k + a]};
-                    for (int c = 0; c < 6; ++c) off[c] += weight * value[c];
-                }
-                for (int i = 0; i < 6; ++i)
-                    for (int j = 0; j < 6; ++j) density += off[i] * s[6 * i + j] * off[j];
-                total += density * dV[e * g + q];
-            }
-            to[e] = total;
-        }
+    parallel_ranges(m, 4 * GRAIN, [&](int64_t first, int64_t last) {
+        Combination task = every;
+        task.first = first;
+        task.last = last;
+        c == 3 ? combine_3(task) : combine_6(task);
     });
     return out;
+}
+
+// Sums at nodes of values (m, k, 6) of elements.
+Array<double> summed(Numbers values, Indices nodes, int64_t n) {
+    require(n >= 0 && are_rows(nodes, n), "nodes must be rows");
+    require(values.size() == 6 * nodes.size(), "values must be (m, k, 6)");
+    Array<double> total({n, int64_t{6}});
+    double* to = total.mutable_data();
+    const double* from = values.data();
+    const int32_t* rows = nodes.data();
+    py::gil_scoped_release release;
+    std::fill_n(to, 6 * n, 0.0);
+    for (int64_t a = 0; a < nodes.size(); ++a)
+        for (int c = 0; c < 6; ++c) to[6 * int64_t{rows[a]} + c] += from[6 * a + c];
+    return total;
+}
+
+// ∫ (σ* - σ) S (σ*' - σ') dV of each element, with σ* = Σ N_a of nodal values.
+Array<double> multiplied(Numbers nodal, Numbers raw, Numbers others, Numbers other_raw, Indices nodes, Numbers N,
+                         Numbers dV, Numbers S) {
+    const int64_t n = nodal.shape(0), m = nodes.shape(0), k = nodes.shape(1), g = N.shape(0);
+    require(has_shape(nodal, n, 6) && has_shape(others, n, 6), "nodal values must be (n, 6)");
+    require(nodes.ndim() == 2 && are_rows(nodes, n), "nodes must be rows of nodal values");
+    require(has_shape(N, g, k), "N must be (g, k)");
+    require(raw.size() == m * g * 6 && other_raw.size() == m * g * 6, "stresses must be (m, g, 6)");
+    require(has_shape(dV, m, g) && has_shape(S, 6, 6), "volumes must be (m, g), S (6, 6)");
+    Array<double> out(m);
+    const Differences every{nodal.data(), raw.data(), others.data(), other_raw.data(), nodes.data(), N.data(),
+                            dV.data(),    S.data(),   k,             g,                out.mutable_data(), 0, m};
+    py::gil_scoped_release release;
+    parallel_ranges(m, 4 * GRAIN, [&](int64_t first, int64_t last) {
+        Differences task = every;
+        task.first = first;
+        task.last = last;
+        products(task);
+    });
+    return out;
+}
+
+using Integers = const Array<int64_t>&;
+
+void require_members(Integers numbers, int64_t n, const char* what) {
+    const int64_t* number = numbers.data();
+    bool inside = true;
+    for (int64_t i = 0; i < numbers.size(); ++i) inside &= 0 <= number[i] && number[i] < n;
+    require(inside, what);
+}
+
+Array<int64_t> copied(const std::vector<int64_t>& numbers) {
+    return Array<int64_t>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+}
+
+py::tuple dealt(Integers owner, Integers entries, int64_t n) {
+    require(n >= 0 && owner.size() == entries.size(), "each entry must have an owner");
+    require_members(owner, n, "owners must be rows");
+    Array<int64_t> start(n + 1), out(entries.size());
+    deal(owner.data(), entries.data(), owner.size(), n, start.mutable_data(), out.mutable_data());
+    return py::make_tuple(start, out);
+}
+
+py::tuple distinct(Integers owner, Integers entries, int64_t n) {
+    const py::tuple rows = dealt(owner, entries, n);
+    auto start = rows[0].cast<Array<int64_t>>(), all = rows[1].cast<Array<int64_t>>();
+    const Distinct found(start.data(), all.mutable_data(), n);
+    return py::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
+}
+
+py::tuple taken(Integers start, Integers entries, Integers rows) {
+    const int64_t n = start.size() - 1, *from = start.data();
+    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == entries.size(),
+            "start must rise from 0 to the number of entries");
+    require_members(rows, n, "rows must be there");
+    Array<int64_t> first(rows.size() + 1);
+    int64_t* to = first.mutable_data();
+    to[0] = 0;
+    for (int64_t i = 0; i < rows.size(); ++i) to[i + 1] = to[i] + from[rows.data()[i] + 1] - from[rows.data()[i]];
+    Array<int64_t> out(to[rows.size()]);
+    for (int64_t i = 0; i < rows.size(); ++i)
+        std::copy_n(entries.data() + from[rows.data()[i]], to[i + 1] - to[i], out.mutable_data() + to[i]);
+    return py::make_tuple(first, out);
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_recovery, m) {
     common(m);
-    define(m, "fit", fitted, "frames (p, 12) and coefficients (p, 20, 6) of the polynomials of patches", "places",
+    define(m, "fit", fitted, "frames (p, 12) and coefficients (p, t, 6) of the polynomials of patches", "places",
            "values", "offset", "start", "elements", "weights", "degree", "means");
     define(m, "evaluate", evaluated, "mean of some polynomials at each place, (n, 6)", "frame", "terms", "places",
            "start", "patches");
-    define(m, "differences", differences, "∫ (σ* - σ) S (σ* - σ) dV (m)", "nodal", "nodes", "N", "stress", "volume",
-           "S");
+    define(m, "dealt", dealt, "start (n + 1) and entries of n rows, by their owners", "owner", "entries", py::arg("n"));
+    define(m, "distinct", distinct, "owner, entry and count of the distinct entries of n rows", "owner", "entries",
+           py::arg("n"));
+    define(m, "taken", taken, "some of the rows", "start", "entries", "rows");
+    define(m, "combined", combined, "rows of values combined by a table, (m, s, c)", "table", "values", "rows");
+    define(m, "summed", summed, "sums at n nodes of values (m, k, 6) of elements", "values", "nodes", py::arg("n"));
+    define(m, "products", multiplied, "∫ (σ* - σ) S (σ*' - σ') dV (m)", "nodal", "raw", "others", "other_raw",
+           "nodes", "N", "dV", "S");
 }

@@ -28,12 +28,15 @@ struct Fit {
     const double* weights;   // their weights
     const int32_t* degree;   // (p) of the polynomials
     const int32_t* means;    // (p) 1 where means of elements are fitted if there are enough of them
-    const double* mean;      // (m, 9) mean place and values of each element, if there are any such
+    const double* summary;   // (m, SUMMARY) of each element
     double* frame;           // (p, 12) origin, and rows of the map to local coordinates
-    double* terms;           // (p, TERMS, 6)
+    double* terms;           // (p, most, 6)
+    int most;                // monomials of the highest degree
 };
 
 inline int monomials(int degree) { return (degree + 1) * (degree + 2) * (degree + 3) / 6; }
+
+inline int degree_of(int count) { return count <= 1 ? 0 : count <= 4 ? 1 : count <= 10 ? 2 : 3; }
 
 // 1 x y z xx yy zz xy yz zx xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz
 KL_INLINE void powers(const double* y, int degree, double* p) {
@@ -67,9 +70,10 @@ inline void principal_axes(double (&A)[3][3], double (&R)[3][3], double (&spread
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) R[i][j] = i == j;
     const double size = A[0][0] + A[1][1] + A[2][2];
+    for (int i = 0; i < 3; ++i) spread[i] = std::sqrt(A[i][i]);
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-            if (i != j && std::fabs(A[i][j]) <= ALIGNED * std::sqrt(A[i][i] * A[j][j])) A[i][j] = 0;
+            if (i != j && std::fabs(A[i][j]) <= ALIGNED * spread[i] * spread[j]) A[i][j] = 0;
     for (int sweep = 0; sweep < 30; ++sweep)
         for (int p = 0; p < 2; ++p)
             for (int q = p + 1; q < 3; ++q) {
@@ -101,94 +105,150 @@ inline void principal_axes(double (&A)[3][3], double (&R)[3][3], double (&spread
         for (int j = 0; j < 3; ++j) R[i][j] = sorted[i][j];
 }
 
-// The samples of a patch one after another, or the means of its elements: f(place, values, weight).
-template <class F>
-KL_INLINE void samples(const Fit& w, int64_t patch, bool means, const F& f) {
-    for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
-        const int32_t first = w.offset[w.elements[at]], last = w.offset[w.elements[at] + 1];
-        if (!means) {
-            for (int32_t s = first; s < last; ++s) f(w.X + 3 * int64_t{s}, w.values + 6 * int64_t{s}, w.weights[at]);
-            continue;
-        }
-        const double* mean = w.mean + 9 * int64_t{w.elements[at]};
-        f(mean, mean + 3, w.weights[at]);
-    }
-}
+// What a patch needs of an element: mean place and values of its samples, and Σ (x - mean) (x - mean)^T.
+constexpr int SUMMARY = 15;
 
-inline void mean_samples(const Fit& w, int64_t element, double* mean) {
+inline void summarize(const Fit& w, int64_t element, double* out) {
     const int32_t first = w.offset[element], last = w.offset[element + 1];
-    for (int i = 0; i < 9; ++i) mean[i] = 0;
+    for (int i = 0; i < SUMMARY; ++i) out[i] = 0;
     for (int32_t s = first; s < last; ++s) {
-        for (int i = 0; i < 3; ++i) mean[i] += w.X[3 * int64_t{s} + i] / (last - first);
-        for (int i = 0; i < 6; ++i) mean[3 + i] += w.values[6 * int64_t{s} + i] / (last - first);
+        for (int i = 0; i < 3; ++i) out[i] += w.X[3 * int64_t{s} + i];
+        for (int i = 0; i < 6; ++i) out[3 + i] += w.values[6 * int64_t{s} + i];
     }
+    if (last - first < 2) return;
+    for (int i = 0; i < 9; ++i) out[i] /= last - first;
+    for (int32_t s = first; s < last; ++s)
+        for (int i = 0, c = 9; i < 3; ++i)
+            for (int j = i; j < 3; ++j)
+                out[c++] += (w.X[3 * int64_t{s} + i] - out[i]) * (w.X[3 * int64_t{s} + j] - out[j]);
 }
 
 inline void place(const Fit& w, int64_t patch, bool means, double* frame) {
     double sum[3] = {}, A[3][3] = {}, R[3][3], spread[3], n = 0;
-    samples(w, patch, means, [&](const double* x, const double*, double) {
-        ++n;
-        for (int i = 0; i < 3; ++i) sum[i] += x[i];
+    const auto each = [&](const auto& f) {
+        for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
+            const int64_t e = w.elements[at];
+            f(w.summary + SUMMARY * e, means ? 1.0 : static_cast<double>(w.offset[e + 1] - w.offset[e]));
+        }
+    };
+    each([&](const double* element, double count) {
+        n += count;
+        for (int i = 0; i < 3; ++i) sum[i] += count * element[i];
     });
     for (int i = 0; i < 3; ++i) frame[i] = sum[i] / n;
-    samples(w, patch, means, [&](const double* x, const double*, double) {
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) A[i][j] += (x[i] - frame[i]) * (x[j] - frame[j]) / n;
+    each([&](const double* element, double count) {
+        for (int i = 0, c = 9; i < 3; ++i)
+            for (int j = i; j < 3; ++j, ++c)
+                A[i][j] += (means ? 0.0 : element[c]) + count * (element[i] - frame[i]) * (element[j] - frame[j]);
     });
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j) A[j][i] = A[i][j] /= n;
     principal_axes(A, R, spread);
     for (int i = 0; i < 3; ++i) {
         const double least = std::fmax(spread[i], FLAT * spread[0]);
-        for (int j = 0; j < 3; ++j) frame[3 + 3 * i + j] = least > 0 ? R[i][j] / std::sqrt(least) : 0.0;
+        const double scale = least > 0 ? 1 / std::sqrt(least) : 0.0;
+        for (int j = 0; j < 3; ++j) frame[3 + 3 * i + j] = scale * R[i][j];
     }
 }
 
-// Solves the normal equations in rows of M, which hold six right-hand sides behind the matrix; false if a
-// monomial had to be left out.
-inline bool solve(double (&M)[TERMS][ROW], int n, double* terms) {
-    bool used[TERMS], all = true;
-    double diagonal[TERMS];
-    for (int i = 0; i < n; ++i) diagonal[i] = M[i][i];
-    for (int i = 0; i < n; ++i) {  // M = L D L^T, from the left; rows below are reduced at once
-        used[i] = M[i][i] > DEPENDENT * std::fmax(diagonal[i], NOTHING * diagonal[0]);
-        all &= used[i];
-        if (!used[i]) continue;
-        for (int k = i + 1; k < n; ++k) {
-            const double factor = M[i][k] / M[i][i];
-            for (int j = k; j < n; ++j) M[k][j] -= factor * M[i][j];
-            for (int j = TERMS; j < TERMS + 6; ++j) M[k][j] -= factor * M[i][j];
+// The equations of one patch: a row of monomials and values for each sample, the same monomials times the
+// weight, and the normal equations with six right-hand sides behind the matrix, above its diagonal.
+struct Equations {
+    double *rows, *weighted;  // (samples, ROW), (samples, TERMS)
+    double* weights;          // (samples)
+    double (*M)[ROW];         // (TERMS)
+    int64_t samples;
+    int n, width;  // monomials; columns in use, a multiple of 8
+};
+
+inline void fill(const Fit& w, int64_t patch, bool means, const double* frame, Equations& to) {
+    to.samples = 0;
+    const auto add = [&](const double* x, const double* values, double weight) {
+        double y[3], *row = to.rows + ROW * to.samples;
+        local(frame, x, y);
+        powers(y, w.degree[patch], row);
+        for (int c = 0; c < 6; ++c) row[to.n + c] = values[c];
+        to.weights[to.samples++] = weight;
+    };
+    for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
+        const int64_t e = w.elements[at];
+        const double* mean = w.summary + SUMMARY * e;
+        if (means)
+            add(mean, mean + 3, w.weights[at]);
+        else
+            for (int64_t s = w.offset[e]; s < w.offset[e + 1]; ++s)
+                add(w.X + 3 * s, w.values + 6 * s, w.weights[at]);
+    }
+    for (int64_t s = 0; s < to.samples; ++s)  // once the rows have left the store buffer
+        for (int i = 0; i < (to.n + 3) / 4 * 4; ++i) to.weighted[TERMS * s + i] = to.weights[s] * to.rows[ROW * s + i];
+}
+
+// Rows [i, i + 4) and COUNT vectors of columns of the normal equations.
+template <int V, int COUNT>
+KL_INLINE void accumulate(const Equations& at, int i, int column) {
+    typedef vec<double, V> Vec;
+    Vec sum[4][COUNT] = {};
+    for (int64_t s = 0; s < at.samples; ++s) {
+        const double *row = at.rows + ROW * s + column, *left = at.weighted + TERMS * s + i;
+        for (int r = 0; r < 4; ++r)
+            for (int v = 0; v < COUNT; ++v) sum[r][v] += left[r] * *reinterpret_cast<const Vec*>(row + V * v);
+    }
+    for (int r = 0; r < 4; ++r)
+        for (int v = 0; v < COUNT; ++v) *reinterpret_cast<Vec*>(at.M[i + r] + column + V * v) = sum[r][v];
+}
+
+template <int V>
+KL_INLINE void accumulate(const Equations& at) {
+    for (int i = 0; i < at.n; i += 4) {
+        int column = i / V * V;
+        for (; column + 2 * V <= at.width; column += 2 * V) accumulate<V, 2>(at, i, column);
+        if (column < at.width) accumulate<V, 1>(at, i, column);
+    }
+}
+
+// False if a monomial had to be left out.
+template <int V>
+KL_INLINE bool solve(const Equations& at, double* terms) {
+    typedef vec<double, V> Vec;
+    double(*M)[ROW] = at.M;
+    double diagonal[TERMS], inverse[TERMS];
+    bool all = true;
+    for (int i = 0; i < at.n; ++i) diagonal[i] = M[i][i];
+    for (int i = 0; i < at.n; ++i) {  // M = L D L^T, from the left; rows below are reduced at once
+        const bool used = M[i][i] > DEPENDENT * std::fmax(diagonal[i], NOTHING * diagonal[0]);
+        all &= used;
+        inverse[i] = used ? 1 / M[i][i] : 0.0;
+        if (!used) continue;
+        for (int k = i + 1; k < at.n; ++k) {
+            const double factor = M[i][k] * inverse[i];
+            for (int j = k / V * V; j < at.width; j += V)
+                *reinterpret_cast<Vec*>(M[k] + j) -= factor * *reinterpret_cast<const Vec*>(M[i] + j);
         }
     }
-    for (int i = n - 1; i >= 0; --i)
-        for (int c = 0; c < 6; ++c) {
-            double sum = M[i][TERMS + c];
-            for (int k = i + 1; k < n; ++k) sum -= M[i][k] * terms[6 * k + c];
-            terms[6 * i + c] = used[i] ? sum / M[i][i] : 0.0;
-        }
-    for (int i = 6 * n; i < 6 * TERMS; ++i) terms[i] = 0;
+    constexpr int PAD = 8;
+    double right[TERMS * PAD] = {};
+    for (int i = 0; i < at.n; ++i)
+        for (int c = 0; c < 6; ++c) right[PAD * i + c] = M[i][at.n + c];
+    for (int i = at.n - 1; i >= 0; --i) {
+        Vec x[PAD / V];
+        for (int v = 0; v < PAD / V; ++v) x[v] = inverse[i] * *reinterpret_cast<Vec*>(right + PAD * i + V * v);
+        for (int c = 0; c < 6; ++c) terms[6 * i + c] = x[c / V][c % V];
+        for (int k = 0; k < i; ++k)
+            for (int v = 0; v < PAD / V; ++v) *reinterpret_cast<Vec*>(right + PAD * k + V * v) -= M[k][i] * x[v];
+    }
     return all;
 }
 
 template <int V>
-KL_INLINE bool fit_one(const Fit& w, int64_t patch, bool means) {
-    typedef vec<double, V> Vec;
-    double *frame = w.frame + 12 * patch, *terms = w.terms + 6 * TERMS * patch;
+KL_INLINE bool fit_one(const Fit& w, int64_t patch, bool means, Equations& at) {
+    double *frame = w.frame + 12 * patch, *terms = w.terms + 6 * w.most * patch;
     place(w, patch, means, frame);
-    const int n = monomials(w.degree[patch]);
-    double M[TERMS][ROW] = {};
-    samples(w, patch, means, [&](const double* x, const double* values, double weight) KL_INLINE_LAMBDA {
-        double y[3], row[ROW] = {};
-        local(frame, x, y);
-        powers(y, w.degree[patch], row);
-        for (int c = 0; c < 6; ++c) row[TERMS + c] = values[c];
-        for (int i = 0; i < n; ++i) {
-            const double factor = weight * row[i];
-            for (int v = 0; v < ROW / V; ++v) {
-                if (V * v >= n && V * (v + 1) <= TERMS) continue;
-                *reinterpret_cast<Vec*>(M[i] + V * v) += factor * *reinterpret_cast<const Vec*>(row + V * v);
-            }
-        }
-    });
-    return solve(M, n, terms);
+    at.n = monomials(w.degree[patch]);
+    at.width = (at.n + 6 + 7) / 8 * 8;
+    fill(w, patch, means, frame, at);
+    accumulate<V>(at);
+    std::fill(terms + 6 * at.n, terms + 6 * w.most, 0.0);
+    return solve<V>(at, terms);
 }
 
 struct FitRange {
@@ -198,9 +258,20 @@ struct FitRange {
 
 template <int V>
 KL_INLINE void fit_body(const FitRange& range) {
+    const Fit& w = *range.fit;
+    int64_t most = 0;
     for (int64_t patch = range.first; patch < range.last; ++patch) {
-        if (range.fit->means[patch] && fit_one<V>(*range.fit, patch, true)) continue;
-        fit_one<V>(*range.fit, patch, false);
+        int64_t count = 0;
+        for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at)
+            count += w.offset[w.elements[at] + 1] - w.offset[w.elements[at]];
+        most = std::max(most, count);
+    }
+    Workspace space(TERMS * ROW + (ROW + TERMS + 1) * most);
+    double *M = space.data(), *rows = M + TERMS * ROW, *weighted = rows + ROW * most;
+    Equations at{rows, weighted, weighted + TERMS * most, reinterpret_cast<double(*)[ROW]>(M), 0, 0, 0};
+    for (int64_t patch = range.first; patch < range.last; ++patch) {
+        if (w.means[patch] && fit_one<V>(w, patch, true, at)) continue;
+        fit_one<V>(w, patch, false, at);
     }
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from kratos_lite.elements import (
     KinematicLinear3D6N,
     KinematicLinear3D8N,
 )
+from kratos_lite.records import record
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Rows
 
@@ -28,7 +28,7 @@ LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
 """The linear element of each linear shape."""
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LinearLevel:
     """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
+from kratos_lite.records import record, replace
 from kratos_lite.solvers import direct, multigrid
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import ConstraintMap
@@ -37,7 +37,7 @@ ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
 
 
-@dataclass(frozen=True)
+@record(frozen=True)
 class Solution:
     """The solution of A x = b and how it was found.
 
@@ -84,7 +84,7 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
     return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class LinearSolver:
     """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c).
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import fields
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -17,6 +16,7 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.prescribed_motion import Kinematics
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
+from kratos_lite.records import names_of
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
 
@@ -95,7 +95,7 @@ class ModelIntegrator(ABC):
         """
 
     def __str__(self) -> str:
-        numbers = [f"{getattr(self, field.name):g}" for field in fields(self)]  # type: ignore[arg-type]
+        numbers = [f"{getattr(self, name):g}" for name in names_of(type(self))]
         return f"{self.name}({', '.join(numbers)})" if numbers else self.name
 
 

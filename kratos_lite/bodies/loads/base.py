@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -14,6 +13,7 @@ from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Gravity, Load, TimeDependentLoad
+from kratos_lite.records import record
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 
@@ -29,7 +29,7 @@ def no_potential(q: Array) -> Array:
     return np.zeros(q.shape[:-1])
 
 
-@dataclass(eq=False)
+@record(eq=False)
 class AppliedLoad:
     """A load as it acts on one body.
 

@@ -15,7 +15,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
+from kratos_lite.records import field, record
 from kratos_lite.validation import free_memory
 
 SECONDS = 30.0
@@ -39,7 +39,7 @@ OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 Numbers = NDArray[Any]
 
 
-@dataclass
+@record
 class Cells:
     """Cells of one type of meshio: rows (m, k) of the points; (m, 0) where their number of nodes differs."""
 
@@ -48,7 +48,7 @@ class Cells:
     data: Numbers
 
 
-@dataclass
+@record
 class Found:
     """What meshio finds in a file; data that are no numbers are None.  `output` is what meshio says."""
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from kratos_lite.io.atomic import refuse_nan, replacing
 from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.formats.foreign import Found, check_ending, guarded, read_foreign
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
+from kratos_lite.records import replace
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.typing import Ints
 

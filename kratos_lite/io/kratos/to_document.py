@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields as constants_of
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +15,7 @@ from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import Gravity, TimeDependentLoad
+from kratos_lite.records import names_of, replace
 from kratos_lite.shapes import Point1
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Ints
@@ -102,7 +101,7 @@ def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[
     name = type(material).__name__
     if name not in KRATOS_LAW:
         raise InputError(f"material {name} has no name in Kratos; model files hold {', '.join(KRATOS_LAW)}")
-    constants = [item.name for item in constants_of(material)]  # type: ignore[arg-type]
+    constants = names_of(type(material))
     values: dict[str, Any] = {material.variables[c]: float(getattr(material, c)) for c in constants}
     values["CONSTITUTIVE_LAW"] = KRATOS_LAW[name]
     if values["CONSTITUTIVE_LAW"] == USER_LAW:

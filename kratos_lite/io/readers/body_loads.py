@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from kratos_lite import bodies
@@ -13,9 +12,10 @@ from kratos_lite.io.readers.values import Read, number_or_series, part, points
 from kratos_lite.io.settings import Settings
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
+from kratos_lite.records import record
 
 
-@dataclass(frozen=True)
+@record(frozen=True)
 class Kind:
     """A type of load or constraint: its class, and the keys that it needs and takes."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.readers.values import number_or_series
 from kratos_lite.io.settings import Settings, find_file, is_number, shown
 from kratos_lite.model.loads import Load, ScaledLoad
+from kratos_lite.records import names_of
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def integrator_of(name: str, numbers: list[float]) -> ModelIntegrator:
         hint = nearest(name, INTEGRATORS)
         raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
     make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
-    counts = sorted({0, len(fields(INTEGRATORS[name]))})  # type: ignore[arg-type]
+    counts = sorted({0, len(names_of(INTEGRATORS[name]))})
     if len(numbers) not in counts:
         raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
     return make(*numbers)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +11,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import Mesh
+from kratos_lite.records import names_of
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 
@@ -49,7 +49,7 @@ def read_material(section: Settings) -> LinearMaterial:
     """Return the material of an object with the name of its law and its constants."""
     law = section.text("law", "Isotropic3D")
     kind = section.placed("law", MATERIALS.__getitem__, law)
-    names = [item.name for item in fields(kind)]  # type: ignore[arg-type]
+    names = names_of(kind)
     section.check_keys(["law", *names])
     missing = [name for name in names if name not in section and name != "density"]
     if missing:
