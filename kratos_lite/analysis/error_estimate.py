@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.model.loads import Load
-from kratos_lite.model.locking import NEAR_HALF
+from kratos_lite.model.locking import NEAR_HALF, better_element
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import field, record
 from kratos_lite.typing import Array
@@ -102,11 +102,12 @@ def energy_error(
 def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup]) -> list[str]:
     """Return what speaks against trusting an estimate."""
     warnings, total = [], float(recovered.sum())
-    locked = sorted({group.element.__name__ for group in groups if _locks(group)})
+    plain = sorted({group.element.__name__: group.element for group in groups if _locks(group)}.items())
+    locked = {name: better_element(element, "BBar") for name, element in plain}
     if locked:
         warnings.append(
-            f"{', '.join(locked)} lock near ν = ½, and the estimated error may be several times too small; "
-            "take formulation='non_locking'"
+            f"{', '.join(locked)} may lock near ν = ½, and the estimated error may be several times too "
+            f"small; take {', '.join(sorted(set(locked.values())))}"
         )
     if total > COARSE**2 * float(averaged.sum()):
         warnings.append(

@@ -66,7 +66,7 @@ class Report:
     skipped : what this solution did without, as it would have changed nothing.
     kernels : what computed, compiled kernels and their threads or NumPy.
     formulation : which one of the elements was chosen and why; "" where their names say it.
-    error : relative error at most, of a solution to a requested accuracy.
+    error : relative error, as estimated on the safe side, of a solution to a requested accuracy.
     error_of : what has that error.
     history : the meshes that it took, the last one of the result.
     motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
@@ -115,8 +115,6 @@ class Report:
             rows.append(("seconds", ", ".join(f"{name} {s:.3f}" for name, s in self.seconds.items())))
         rows += [("peak memory", f"{self.peak_memory / 1e6:.0f} MB"), ("kernels", self.kernels)]
         rows += self.motion_rows()
-        if self.error is not None:
-            rows.append(("error", f"{self.error:.2%} of {self.error_of} at most"))
         rows += [("refinement", str(step)) for step in self.history if len(self.history) > 1]
         if self.skipped:
             rows.append(("skipped", "; ".join(self.skipped)))

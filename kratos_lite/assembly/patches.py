@@ -2,7 +2,8 @@
 
 The patch of a node inside the body are the elements around it.  A node on the surface takes those of its
 nearest nodes inside, in which its own elements weigh more; where there are none, as in a mesh one element
-thick, those of its neighbors with the most elements, unless it has half as many itself.
+thick, those of its neighbors with the most elements, unless it has half as many itself.  Among linear
+hexahedra, whose stresses are good at one point alone, it takes the elements around these as well.
 """
 
 from __future__ import annotations
@@ -11,16 +12,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.polynomial_fit import Lists, distinct, lists
+from kratos_lite.assembly.polynomial_fit import Lists, distinct, integers, lists
 from kratos_lite.mesh import Block
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
+from kratos_lite.native import kernels
 from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask
+
+ENOUGH = 27
+"""Elements of a patch that tell a polynomial of one degree more: three along each axis."""
+DECAY = 4
+"""Power of the distance, in radii of an element, with which its weight in such a patch falls."""
 
 
 @record(frozen=True, eq=False)
@@ -30,21 +37,24 @@ class Patches:
     Attributes
     ----------
     elements : those of each patch.
-    own : whether each of these contains the node.
+    weights : of each of these, 1 for those that contain the node.
+    wide : (p,) whether a patch has a second layer, and can tell a polynomial of one degree more.
     of : the patches whose mean counts at each node; none at nodes without elements.
     """
 
     elements: Lists
-    own: Mask
+    weights: Array
+    wide: Mask
     of: Lists
 
 
-def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists) -> Patches:
+def patches(blocks: Sequence[Block], points: Array, outer: Mask, hanging: Ints, masters: Lists) -> Patches:
     """Return the patches of blocks of elements.
 
     Parameters
     ----------
     blocks : the elements, numbered through the blocks.
+    points : (n, 3) m.
     outer : (n,) whether a node is a corner of a face on the surface.
     hanging : nodes that others interpolate.
     masters : those of each.
@@ -58,15 +68,66 @@ def patches(blocks: Sequence[Block], outer: Mask, hanging: Ints, masters: Lists)
     hanging, masters = hanging[held], masters.take(np.flatnonzero(held))
     around, outer = _around(blocks, corners, is_corner), outer & is_corner
     inside = ~outer[around.owner]
-    wide_owner, wide = _neighborhoods(around, corners, outer, is_corner)
-    number, rows = np.cumsum(is_corner) - 1, np.concatenate([around.owner[inside], wide_owner])
-    own = np.concatenate([inside[inside], _contain(wide_owner, wide, corners)])
-    entries = 2 * np.concatenate([around.entries[inside], wide]) + own
-    found = lists(number[rows], entries, int(is_corner.sum()))
-    elements = Lists(found.start, found.entries // 2)
-    return Patches(
-        elements, found.entries % 2 > 0, _patches_of_nodes(blocks, is_corner, number, hanging, masters)
-    )
+    far = np.repeat([_far(block) for block in blocks], [len(block) for block in blocks])
+    is_wide, owner, element, weights = _outside(points, around, corners, far, outer, is_corner)
+    rows = np.concatenate([around.owner[inside], owner])
+    weights = np.concatenate([np.ones(int(inside.sum())), weights])
+    number, n = np.cumsum(is_corner) - 1, int(is_corner.sum())
+    found = lists(number[rows], np.arange(len(rows)), n)
+    elements = Lists(found.start, np.concatenate([around.entries[inside], element])[found.entries])
+    of = _patches_of_nodes(blocks, is_corner, number, hanging, masters)
+    return Patches(elements, weights[found.entries], is_wide[is_corner], of)
+
+
+def _far(block: Block) -> float:
+    """Return the weight of elements that do not contain the node; 0 where it falls with the distance."""
+    if block.shape is None or (block.shape.degree == 1 and block.shape.cell != "hexahedron"):
+        return 1.0
+    if block.shape.degree == 1:
+        return 0.0
+    return 0.05 if block.shape.cell in ("hexahedron", "tetrahedron") else 0.5
+
+
+def _outside(
+    points: Array, around: Lists, corners: Ints, far: Array, outer: Mask, is_corner: Mask
+) -> tuple[Mask, Ints, Ints, Array]:
+    """Return which patches are wide, and node, element and weight of all pairs of those on the surface."""
+    owner, element = _neighborhoods(around, corners, outer, is_corner)
+    grows = outer.copy()
+    grows[owner[far[element] > 0]] = False
+    more = _second_layer(owner[grows[owner]], element[grows[owner]], around, corners, len(outer))
+    is_wide = np.bincount(more[0], minlength=len(outer)) >= ENOUGH
+    kept, added = ~is_wide[owner], is_wide[more[0]]
+    owner = np.concatenate([owner[kept], more[0][added]])
+    element = np.concatenate([element[kept], more[1][added]])
+    weights = np.where(_contain(owner, element, corners), 1.0, far[element])
+    near = np.flatnonzero(weights == 0)
+    weights[near] = _decayed(points, owner[near], element[near], corners)
+    return is_wide, owner, element, weights
+
+
+def _second_layer(owner: Ints, element: Ints, around: Lists, corners: Ints, n: int) -> tuple[Ints, Ints]:
+    """Return the pairs of node and element with the elements around those."""
+    if module := kernels("recovery"):
+        rows, found = module.grown(*map(integers, (owner, element, corners, around.start, around.entries)), n)
+        return rows, found
+    known = corners[element]
+    pair, at = np.nonzero(known >= 0)
+    owner, near, _ = distinct(owner[pair], known[pair, at], n)
+    more = around.take(near)
+    return distinct(owner[more.owner], more.entries, n)[:2]
+
+
+def _decayed(points: Array, owner: Ints, element: Ints, corners: Ints) -> Array:
+    """Return weights of linear hexahedra (k,) by their distance from a node each."""
+    used = np.zeros(len(corners), dtype=bool)
+    used[element] = True
+    X = points[corners[used, :8]]
+    center = X.mean(axis=1)
+    radius = np.sqrt(((X - center[:, None]) ** 2).sum(axis=(1, 2)) / 8)
+    at = (np.cumsum(used) - 1)[element]
+    distance = np.linalg.norm(center[at] - points[owner], axis=1)
+    return np.asarray(np.minimum(1.0, radius[at] / distance) ** DECAY)
 
 
 def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:

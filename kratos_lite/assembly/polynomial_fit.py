@@ -11,7 +11,7 @@ from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 MONOMIALS = (1, 4, 10, 20)
 """Their number up to each degree."""
-DEPENDENT, NOTHING, FLAT, ALIGNED = 1e-3, 1e-6, 1e-12, 1e-6
+DEPENDENT, NOTHING, UNTOLD, FLAT, ALIGNED = 1e-3, 1e-6, 1e-2, 1e-12, 1e-6
 """See ``native/recovery.hpp``."""
 
 
@@ -38,7 +38,7 @@ class Lists:
     def take(self, rows: Ints) -> Lists:
         """Return some of the rows."""
         if module := kernels("recovery"):
-            return Lists(*module.taken(*map(_integers, (self.start, self.entries, rows))))
+            return Lists(*module.taken(*map(integers, (self.start, self.entries, rows))))
         lengths = self.lengths[rows]
         start = np.concatenate([[0], np.cumsum(lengths)])
         within = np.arange(start[-1]) - np.repeat(start[:-1], lengths)
@@ -48,7 +48,7 @@ class Lists:
 def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
     """Return entries as rows, by the row of each, in their order."""
     if module := kernels("recovery"):
-        return Lists(*module.dealt(_integers(owner), _integers(entries), n))
+        return Lists(*module.dealt(integers(owner), integers(entries), n))
     start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=n))])
     return Lists(start, entries[np.argsort(owner, kind="stable")])
 
@@ -56,14 +56,15 @@ def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
 def distinct(owner: Numbers, entries: Numbers, n: int) -> tuple[Ints, Ints, Ints]:
     """Return row and entry of the distinct entries of n rows, ascending, and how often each occurs."""
     if module := kernels("recovery"):
-        rows, found, count = module.distinct(_integers(owner), _integers(entries), n)
+        rows, found, count = module.distinct(integers(owner), integers(entries), n)
         return rows, found, count
     most = int(entries.max(initial=0)) + 1
     codes, count = np.unique(owner * most + entries, return_counts=True)
     return codes // most, codes % most, count
 
 
-def _integers(numbers: Numbers) -> Ints:
+def integers(numbers: Numbers) -> Ints:
+    """Return numbers of rows as kernels that make rows take them."""
     return np.ascontiguousarray(numbers, dtype=np.int64)
 
 
@@ -102,12 +103,34 @@ class Polynomials:
             return module.evaluate(
                 self.frame, self.terms, floats(places), as_rows(chosen.start), as_rows(chosen.entries)
             )
+        return self._mean(places[:, None], chosen)[:, 0]
+
+    def residuals(self, places: Array, values: Array, E: Array, nodes: Ints, chosen: Lists) -> Array:
+        """Return what values in elements leave of the polynomials, extrapolated to the nodes, (m, k, 6).
+
+        Parameters
+        ----------
+        places : (m, s, 3) m in each element.
+        values : (m, s, 6) there.
+        E : (k, s) values at the nodes of an element from those at the places.
+        nodes : (m, k) of the elements.
+        chosen : the polynomials whose mean counts at each node.
+        """
+        if module := kernels("recovery"):
+            tables = (floats(places), floats(values), floats(E), as_rows(nodes))
+            return module.residuals(
+                self.frame, self.terms, *tables, as_rows(chosen.start), as_rows(chosen.entries)
+            )
+        rest = [values - self._mean(places, chosen.take(column)) for column in nodes.T]
+        return np.stack([row @ off for row, off in zip(E, rest, strict=True)], axis=1)
+
+    def _mean(self, places: Array, chosen: Lists) -> Array:
+        """Return the mean of the polynomials chosen for each row of places (m, s, 3), (m, s, 6)."""
         owner, rows = chosen.owner, chosen.entries
-        y = _local(self.frame[rows], places[owner][:, None])
-        values = (_monomials(y, MONOMIALS.index(self.terms.shape[1])) @ self.terms[rows])[:, 0]
-        total = np.zeros((len(places), 6))
-        np.add.at(total, owner, values)
-        return total / np.maximum(chosen.lengths, 1)[:, None]
+        y = _local(self.frame[rows], places[owner])
+        total = np.zeros((*places.shape[:2], 6))
+        np.add.at(total, owner, _monomials(y, MONOMIALS.index(self.terms.shape[1])) @ self.terms[rows])
+        return total / np.maximum(chosen.lengths, 1)[:, None, None]
 
 
 def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: Ints) -> Polynomials:
@@ -119,29 +142,18 @@ def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: I
     patches : the elements of each patch.
     weights : of each of these.
     degree : (p,) of the polynomials, 0 … 3.
-    means : (p,) 1 for patches that take the means of their elements where there are enough of them.
+    means : (p,) 1 for patches that take the means of their elements as far as they tell.
 
     Notes
     -----
-    A monomial that the points of a patch cannot tell from those before it is left out.
+    A monomial that the points of a patch cannot tell from those before it is left out.  What means cannot
+    tell, as across a single layer, is then fitted to what they leave of all samples.
     """
     if module := kernels("recovery"):
         numbers = (as_rows(samples.offset), as_rows(patches.start), as_rows(patches.entries))
         tables = (floats(weights), as_rows(degree), as_rows(means))
         return Polynomials(*module.fit(floats(samples.places), floats(samples.values), *numbers, *tables))
-    frame, terms = _nothing(len(patches), degree)
-    left = np.ones(len(patches), dtype=bool)
-    if means.any():
-        chosen = np.flatnonzero(means)
-        found = _fit(
-            _means(samples), patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen]
-        )
-        frame[chosen], terms[chosen, : found[1].shape[1]] = found[:2]
-        left[chosen] = ~found[2]
-    chosen = np.flatnonzero(left)
-    every = _fit(samples, patches.take(chosen), weights[_positions(patches, chosen)], degree[chosen])
-    frame[chosen], terms[chosen, : every[1].shape[1]] = every[:2]
-    return Polynomials(frame, terms)
+    return _fit(samples, patches, weights, degree, means)
 
 
 def as_rows(numbers: Numbers) -> Ints:
@@ -149,47 +161,52 @@ def as_rows(numbers: Numbers) -> Ints:
     return np.ascontiguousarray(numbers, dtype=np.int32)
 
 
-def _positions(rows: Lists, chosen: Ints) -> Ints:
-    """Return the positions of the entries of some rows."""
-    return Lists(rows.start, np.arange(len(rows.entries))).take(chosen).entries
-
-
-def _means(samples: Samples) -> Samples:
-    """Return one sample for each element."""
-    first, count = samples.offset[:-1], np.diff(samples.offset)[:, None]
-    places, values = (np.add.reduceat(v, first) / count for v in (samples.places, samples.values))
-    return Samples(places, values, np.arange(len(first) + 1))
-
-
 # ---- the reference of the kernel -----------------------------------------------------------------------
 
 
-def _fit(samples: Samples, patches: Lists, weights: Array, degree: Ints) -> tuple[Array, Array, Mask]:
-    """Return frames, coefficients, and whether no monomial was left out, for patches of all sizes."""
+def _fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: Ints) -> Polynomials:
+    """Return the polynomials of patches of all sizes."""
     every = Lists(samples.offset, np.arange(len(samples.places)))
-    counts = every.lengths[patches.entries]
-    rows = every.take(patches.entries).entries
-    weight = np.repeat(weights, counts)
-    sizes = np.bincount(patches.owner, weights=counts, minlength=len(patches)).astype(int)
-    points = Lists(np.concatenate([[0], np.cumsum(sizes)]), np.arange(len(rows)))
-    frame, terms = _nothing(len(patches), degree)
-    complete = np.zeros(len(patches), dtype=bool)
-    for size, order in sorted(set(zip(sizes.tolist(), degree.tolist(), strict=True))):
-        alike = np.flatnonzero((sizes == size) & (degree == order))
+    centers = [np.add.reduceat(v, every.start[:-1]) for v in (samples.places, samples.values)]
+    count = every.lengths
+    sizes = np.bincount(patches.owner, weights=count[patches.entries], minlength=len(patches))
+    kinds = np.column_stack([sizes.astype(int), patches.lengths, degree, means])
+    frame, terms = np.zeros((len(patches), 12)), np.zeros((len(patches), MONOMIALS[degree.max(initial=0)], 6))
+    for kind in sorted(set(map(tuple, kinds.tolist()))):
+        alike = np.flatnonzero((kinds == kind).all(axis=1))
+        size, members, order, simple = kind
         for part in np.array_split(alike, 1 + len(alike) * size // 100_000):
-            at = points.take(part).entries.reshape(len(part), size)
-            X = samples.places[rows[at]]
-            frame[part] = _frames(X)
-            P = _monomials(_local(frame[part], X), order)
-            weighted = np.swapaxes(P, 1, 2) * weight[at][:, None, :]
-            found, complete[part] = _solve(weighted @ P, weighted @ samples.values[rows[at]])
-            terms[part, : found.shape[1]] = found
-    return frame, terms, complete
+            at = patches.start[part, None] + np.arange(members)
+            elements, weight = patches.entries[at], weights[at]
+            rows = every.take(elements.ravel()).entries.reshape(len(part), size)
+            frame[part] = _frames(samples.places[rows])
+            fits = _Fits(frame[part], order)
+            if simple:
+                X, values = (v[elements] / count[elements][..., None] for v in centers)
+                fits.add(X, values, weight, UNTOLD)
+            weight = np.repeat(weight.ravel(), count[elements.ravel()]).reshape(len(part), size)
+            fits.add(samples.places[rows], samples.values[rows], weight, DEPENDENT * NOTHING)
+            terms[part, : MONOMIALS[order]] = fits.terms
+    return Polynomials(frame, terms)
 
 
-def _nothing(n: int, degree: Ints) -> tuple[Array, Array]:
-    """Return frames and coefficients of n patches, to be filled."""
-    return np.zeros((n, 12)), np.zeros((n, MONOMIALS[degree.max(initial=0)], 6))
+class _Fits:
+    """Coefficients of patches of the same size, and which are known."""
+
+    def __init__(self, frame: Array, degree: int) -> None:
+        self.frame, self.degree = frame, degree
+        self.terms = np.zeros((len(frame), MONOMIALS[degree], 6))
+        self.known = np.zeros(self.terms.shape[:2], dtype=bool)
+
+    def add(self, X: Array, values: Array, weight: Array, nothing: float) -> None:
+        """Fit the monomials not yet known to what is left of values (p, s, 6) at places (p, s, 3)."""
+        if self.known.all():
+            return
+        P = _monomials(_local(self.frame, X), self.degree)
+        weighted = np.swapaxes(P, 1, 2) * weight[:, None]
+        found, used = _solve(weighted @ P, weighted @ (values - P @ self.terms), nothing, self.known)
+        self.terms += found
+        self.known |= used
 
 
 def _frames(X: Array) -> Array:
@@ -227,14 +244,14 @@ def _monomials(y: Array, degree: int) -> Array:
     return np.stack(p, axis=-1)
 
 
-def _solve(M: Array, b: Array) -> tuple[Array, Mask]:
-    """Return the solutions of normal equations (p, n, n), and whether all monomials were used."""
+def _solve(M: Array, b: Array, nothing: float, known: Mask) -> tuple[Array, Mask]:
+    """Return the solutions of normal equations (p, n, n) for monomials not yet known, and which were used."""
     M, b, n = M.copy(), b.copy(), M.shape[1]
     diagonal = np.einsum("pii->pi", M).copy()
     used = np.zeros(M.shape[:2], dtype=bool)
     for i in range(n):
-        least = np.maximum(diagonal[:, i], NOTHING * diagonal[:, 0])
-        used[:, i] = M[:, i, i] > DEPENDENT * least
+        least = np.maximum(DEPENDENT * diagonal[:, i], nothing * diagonal[:, 0])
+        used[:, i] = ~known[:, i] & (M[:, i, i] > least)
         inverse = np.where(used[:, i], 1 / np.where(used[:, i], M[:, i, i], 1.0), 0.0)
         factor = M[:, i, i + 1 :] * inverse[:, None]
         M[:, i + 1 :, i + 1 :] -= factor[:, :, None] * M[:, i, None, i + 1 :]
@@ -243,4 +260,4 @@ def _solve(M: Array, b: Array) -> tuple[Array, Mask]:
     for i in range(n - 1, -1, -1):
         rest = b[:, i] - (M[:, i, None, i + 1 :] @ x[:, i + 1 :])[:, 0]
         x[:, i] = np.where(used[:, i, None], rest / np.where(used[:, i], M[:, i, i], 1.0)[:, None], 0.0)
-    return x, np.asarray(used.all(axis=1))
+    return x, used

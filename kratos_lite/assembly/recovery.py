@@ -6,6 +6,7 @@ Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -14,7 +15,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, floats
 from kratos_lite.assembly.gauss_point_fields import at_gauss, volumes
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.patches import Patches, outer_corners, patches
-from kratos_lite.assembly.polynomial_fit import Lists, Samples, as_rows, fit, lists
+from kratos_lite.assembly.polynomial_fit import Lists, Polynomials, Samples, as_rows, fit, lists
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import STRAIN
@@ -36,16 +37,16 @@ class Sampling:
     ----------
     N : (s, k) shape functions at the samples.
     from_gauss : (s, g) values there from those at the Gauss points; None where they are the Gauss points.
+    to_nodes : (k, s) share of the nodes in what polynomials leave of the samples; (k, 1) of their mean.
     degree : of the polynomials.
-    means : whether means of elements are better than the samples, where there are enough of them.
-    far : weight of elements in the patch of a node on the surface that do not contain this node.
+    means : whether means of elements are better than the samples, as far as they tell a polynomial.
     """
 
     N: Array
     from_gauss: Array | None
+    to_nodes: Array
     degree: int
     means: bool
-    far: float
 
     @property
     def count(self) -> int:
@@ -59,22 +60,22 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
 
     Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer. Meth.
     Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points.  In linear
-    hexahedra and wedges without further modes they lie at the center.  One degree above that of the element
-    is fitted, but in tetrahedra, which have no such points.
+    hexahedra and wedges they lie at the center.  One degree above that of the element is fitted elsewhere,
+    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes.
     """
-    shape, T = element.shape, None
-    simple = element.formulation != "enhanced" and shape.degree == 1 and shape.cell in ("hexahedron", "wedge")
-    points = rule.points
+    shape, T, points = element.shape, None, rule.points
+    corner = shape.linear() or shape
+    means = shape.degree == 1 and shape.cell in ("hexahedron", "wedge")
     if shape.cell == "hexahedron" and shape.degree > 1 and len(rule) > 8:
         points = hexahedron(degree=3).points
-        corner = shape.linear() or shape
-        at_gauss, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (rule.points, points))
+        at_gauss = np.array([corner.N(xi) for xi in rule.points])
         weighted = at_gauss.T * rule.weights
-        T = at_samples @ np.linalg.solve(weighted @ at_gauss, weighted)
+        T = np.array([corner.N(xi) for xi in points]) @ np.linalg.solve(weighted @ at_gauss, weighted)
     N = np.array([shape.N(xi) for xi in points])
-    degree = shape.degree + (0 if simple or shape.cell == "tetrahedron" else 1)
-    far = 1.0 if shape.degree == 1 else 0.05 if shape.cell in ("hexahedron", "tetrahedron") else 0.5
-    return Sampling(N, T, min(degree, 3), simple, far)
+    degree = shape.degree + (0 if means or shape.cell == "tetrahedron" else 1)
+    at_nodes, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (shape.nodes, points))
+    to_nodes = at_nodes @ np.linalg.pinv(at_samples) * (0.5 if shape.cell == "tetrahedron" else 1.0)
+    return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)
 
 
 @record(frozen=True, eq=False)
@@ -100,37 +101,43 @@ class Region:
         places, sampled = [], []
         for group, way, value in zip(self.groups, ways, values, strict=True):
             T = way.from_gauss
-            places.append(_combined(way.N, points, group.nodes).reshape(-1, 3))
-            sampled.append((value if T is None else _from_points(T, value)).reshape(-1, 6))
-        counts = np.repeat([way.count for way in ways], [len(group) for group in self.groups])
-        samples = Samples(_joined(places), _joined(sampled), np.concatenate([[0], counts.cumsum()]))
-        degree = self._of_patches([way.degree for way in ways], np.minimum)
-        simple = self._of_patches([int(way.means) for way in ways], np.maximum)
-        far = self._of_entries([way.far for way in ways])
-        around = self.patches
-        fitted = fit(samples, around.elements, np.where(around.own, 1.0, far), degree, simple)
-        return fitted.at(points[self.nodes], around.of)
+            places.append(_combined(way.N, points, group.nodes))
+            sampled.append(value if T is None else _from_points(T, value))
+        fitted = self._fitted(ways, places, sampled)
+        rest = np.zeros((len(self.nodes), 6))
+        for way, cells, *both in zip(ways, self.cells, places, sampled, strict=True):
+            X, value = (_means(v) if way.means else v for v in both)
+            rest += _sum(fitted.residuals(X, value, way.to_nodes, cells, self.patches.of), cells, len(rest))
+        return fitted.at(points[self.nodes], self.patches.of) + rest / self.held[:, None]
 
-    def _of_entries(self, values: Sequence[float]) -> Array:
-        """Return a value of each group for all entries of the patches."""
-        if len(set(values)) == 1:
-            return np.full(len(self.patches.elements.entries), values[0])
-        return np.repeat(values, [len(group) for group in self.groups])[self.patches.elements.entries]
+    def _fitted(self, ways: list[Sampling], places: list[Array], sampled: list[Array]) -> Polynomials:
+        """Return the polynomials of the patches, from places (m, s, 3) and values (m, s, 6) of the groups."""
+        counts = np.repeat([way.count for way in ways], [len(group) for group in self.groups])
+        X, values = _joined([v.reshape(-1, 3) for v in places]), _joined([v.reshape(-1, 6) for v in sampled])
+        samples = Samples(X, values, np.concatenate([[0], counts.cumsum()]))
+        degree = self._of_patches([way.degree for way in ways], np.minimum) + self.patches.wide
+        means = self._of_patches([int(way.means) for way in ways], np.maximum)
+        return fit(samples, self.patches.elements, self.patches.weights, degree, means)
 
     def _of_patches(self, values: Sequence[int], least: np.ufunc) -> Ints:
         """Return the least, or the largest, value of the groups in each patch."""
         elements = self.patches.elements
         if len(set(values)) == 1:
             return np.full(len(elements), values[0])
-        return np.asarray(least.reduceat(self._of_entries(values), elements.start[:-1]))
+        every = np.repeat(values, [len(group) for group in self.groups])
+        return np.asarray(least.reduceat(every[elements.entries], elements.start[:-1]))
+
+    @cached_property
+    def held(self) -> Ints:
+        """How many elements hold each node."""
+        return np.bincount(np.concatenate([c.ravel() for c in self.cells]), minlength=len(self.nodes))
 
     def averaged(self, values: Sequence[Array]) -> Array:
         """Return the same, extrapolated to the nodes of each element and averaged there."""
-        total, count = np.zeros((len(self.nodes), 6)), np.zeros(len(self.nodes))
+        total = np.zeros((len(self.nodes), 6))
         for group, cells, value in zip(self.groups, self.cells, values, strict=True):
             total += _sum(_from_points(extrapolation(group.element, group.rule), value), cells, len(total))
-            count += np.bincount(cells.ravel(), minlength=len(count))
-        return total / count[:, None]
+        return total / self.held[:, None]
 
 
 _KNOWN: WeakKeyDictionary[Mesh, tuple[Ints, Ints, list[tuple[Ints, Patches]]]] = WeakKeyDictionary()
@@ -176,7 +183,7 @@ def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints,
         every = Lists(mesh.hanging.start, mesh.hanging.masters).take(np.flatnonzero(here))
         kept = used[every.entries]
         masters = lists(every.owner[kept], number[every.entries[kept]], len(hanging))
-    return nodes, patches(blocks, on_surface[nodes], hanging, masters)
+    return nodes, patches(blocks, mesh.points[nodes], on_surface[nodes], hanging, masters)
 
 
 class Recovery:
@@ -218,40 +225,55 @@ class Recovery:
         if free:
             self._last = u, found
 
-    def differences(self, u: Array) -> Iterator[tuple[ElementGroup, Array]]:
-        """Yield each group with recovered minus own stresses at its points, (m, g, 6) in Pa.
+    def products(self, u: Array, z: Array, n_elements: int) -> Array:
+        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
 
-        The groups have no prestress, which is given and no part of the error, and rules that are good for the
-        square of the difference.
+        Prestress is given and no part of the error.  σ* is kept for the first of them alone.
         """
-        for group, nodes, value, nodal, _ in self._compared(u):
-            N, _ = tabulate(group.element.shape, group.rule)
-            yield group, N @ nodal[nodes] - value
+        found = np.zeros(n_elements)
+        both = zip(self.regions, self._recovered(u), self._recovered(z, keep=False), strict=True)
+        for region, (values, nodal), (others, other_nodal) in both:
+            for group, nodes, value, other in zip(region.groups, region.cells, values, others, strict=True):
+                fine, N, dV, S = self._tables(group)
+                pairs = [
+                    (star, raw if fine is group else at_gauss(self.points, fine, field))
+                    for star, raw, field in ((nodal, value, u), (other_nodal, other, z))
+                ]
+                found[group.rows] = _products(pairs[0], pairs[1], nodes, N, dV, S)
+        return found
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
         found = np.zeros((2, n_elements))
-        for group, nodes, value, *nodal in self._compared(u):
-            N, _ = tabulate(group.element.shape, group.rule)
-            dV, S = volumes(self.points, group), floats(np.linalg.inv(group.material.C))
-            for row, values in zip(found, nodal, strict=True):
-                row[group.rows] = _products((values, value), (values, value), nodes, N, dV, S)
+        for region, (values, nodal) in zip(self.regions, self._recovered(u), strict=True):
+            averaged = region.averaged(values)
+            for group, nodes, value in zip(region.groups, region.cells, values, strict=True):
+                fine, N, dV, S = self._tables(group)
+                raw = value if fine is group else at_gauss(self.points, fine, u)
+                for row, star in zip(found, (nodal, averaged), strict=True):
+                    row[group.rows] = _products((star, raw), (star, raw), nodes, N, dV, S)
         return found[0], found[1]
 
-    def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Ints, Array, Array, Array]]:
-        """Yield each group, its nodes in the region, C ε at its points, and this recovered and averaged."""
-        known = self._last[1] if self._last is not None and self._last[0] is u else []
+    def _recovered(self, u: Array, keep: bool = True) -> list[tuple[list[Array], Array]]:
+        """Return C ε at the points of the groups, and recovered at the nodes, of each region."""
+        known = self._last[1] if self._last is not None and self._last[0] is u else None
         found = []
         for i, region in enumerate(self.regions):
-            plain = [replace(group, prestress=None) for group in region.groups]
-            values = [at_gauss(self.points, group, u) for group in plain]
-            nodal = known[i] if known else region.at_nodes(self.points, values)
-            averaged = region.averaged(values)
-            found.append(nodal)
-            for group, nodes, value in zip(plain, region.cells, values, strict=True):
-                fine = _compared_at(group)
-                yield fine, nodes, value if fine is group else at_gauss(self.points, fine, u), nodal, averaged
-        self._last = u, found
+            values = [at_gauss(self.points, _plain(group), u) for group in region.groups]
+            found.append((values, known[i] if known else region.at_nodes(self.points, values)))
+        if keep:
+            self._last = u, [nodal for _, nodal in found]
+        return found
+
+    def _tables(self, group: ElementGroup) -> tuple[ElementGroup, Array, Array, Array]:
+        """Return a group without prestress and with a rule for squared errors, its N and volumes, and C⁻¹."""
+        fine = _compared_at(group)
+        N, _ = tabulate(fine.element.shape, fine.rule)
+        return fine, N, volumes(self.points, fine), floats(np.linalg.inv(fine.material.C))
+
+
+def _plain(group: ElementGroup) -> ElementGroup:
+    return group if group.prestress is None else replace(group, prestress=None)
 
 
 def _compared_at(group: ElementGroup) -> ElementGroup:
@@ -259,7 +281,7 @@ def _compared_at(group: ElementGroup) -> ElementGroup:
     shape = group.element.shape
     if group.rule.degree >= 2 * shape.degree or not group.element.inherits(*GEOMETRY, *STRAIN, "stress"):
         return group
-    return replace(group, rule=rule_for(shape.cell, 2 * shape.degree))
+    return replace(group, prestress=None, rule=rule_for(shape.cell, 2 * shape.degree))
 
 
 def _joined(parts: Sequence[Array]) -> Array:
@@ -291,6 +313,12 @@ def _combined(table: Array, values: Array, rows: Numbers) -> Array:
     if module := kernels("recovery"):
         return module.combined(floats(table), floats(values), as_rows(rows))
     return table @ values[rows]
+
+
+def _means(values: Array) -> Array:
+    """Return the mean (m, 1, c) of values (m, s, c) in each element."""
+    s = values.shape[1]
+    return _from_points(np.full((1, s), 1 / s), values)
 
 
 def _from_points(table: Array, values: Array) -> Array:

@@ -107,6 +107,7 @@ def _take_modes(case: Case, options: Namespace) -> None:
         raise InputError("--modes and --time: give one of them")
     if options.output or options.json or options.picture or options.state:
         raise InputError("--modes prints a table; it writes no files")
+    _refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
     case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
 
 

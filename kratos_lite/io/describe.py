@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.elements.formulations import is_unnamed
+from kratos_lite.elements.formulations import element_of, is_unnamed
 from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.mesh import Block
@@ -73,7 +73,7 @@ def _blocks(title: str, blocks: Sequence[Block], known: bool = False) -> Iterabl
             if known and name not in ELEMENTS:
                 remark = ", an element that kratos_lite cannot solve"
             elif known and is_unnamed(name):
-                remark = ", solved by elements that do not lock"
+                remark = f", which names no formulation: solved as {element_of(name, None, None).__name__}"
             elif known and ELEMENTS[name].__name__ != name:
                 remark = f", solved as {ELEMENTS[name].__name__}"
             yield f"{title:<12}{count} {name}{remark}"

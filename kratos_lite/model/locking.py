@@ -56,7 +56,7 @@ def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     for kind, C in ((group.element, group.material.C) for group in groups):
         plain = kind.inherits(*MECHANICS) and kind.formulation == "standard"
         if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
-            found[kind.__name__] = _better(kind, "BBar")
+            found[kind.__name__] = better_element(kind, "BBar")
     if not found:
         return []
     names, better = ", ".join(sorted(found)), ", ".join(sorted(set(found.values())))
@@ -78,7 +78,7 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
     ]
 
 
-def _better(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:
+def better_element(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:
     """Return the name of the element to take in place of one that locks."""
     known = formulations_of(kind.shape)
     if "enhanced" in known:
@@ -140,13 +140,15 @@ def _in_bending(
         ]
     single = walls.layers == 1
     if kind.formulation == "b_bar" and single.any():
-        place, better = _place(mesh, walls, np.where(single, ratio, 0.0)), _better(kind)
+        place, better = _place(mesh, walls, np.where(single, ratio, 0.0)), better_element(kind)
         wrong = "far too easily in short cells, too stiffly in long ones"
         return [f"{name} alone through a thickness, {place}, may bend {wrong}; take {better}"]
     excess = modulus[walls.element] * ratio**2
     if (excess > STIFF).any():
         place, most = _place(mesh, walls, excess), 1 + float(excess.max())
-        return [f"{name} may come out {most:.2g} times too stiff in bending, {place}; take {_better(kind)}"]
+        return [
+            f"{name} may come out {most:.2g} times too stiff in bending, {place}; take {better_element(kind)}"
+        ]
     return []
 
 

@@ -77,6 +77,32 @@ Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, 
     return out;
 }
 
+// E (values - mean of some polynomials) at the nodes of each element, from points in it: (m, k, 6).
+Array<double> residuals(Numbers frame, Numbers terms, Numbers X, Numbers values, Numbers E, Indices nodes,
+                        Indices start, Indices patches) {
+    const int64_t m = nodes.shape(0), k = nodes.shape(1), s = E.shape(1), p = frame.shape(0);
+    require(has_shape(frame, p, 12), "frame must be (p, 12)");
+    require(terms.ndim() == 3 && terms.shape(0) == p && terms.shape(2) == 6, "terms must be (p, t, 6)");
+    const int count = static_cast<int>(terms.shape(1)), degree = degree_of(count);
+    require(count == monomials(degree), "terms must be all up to a degree");
+    require(X.size() == m * s * 3 && values.size() == m * s * 6, "places must be (m, s, 3), values (m, s, 6)");
+    require(has_shape(E, k, s), "E must be (k, s)");
+    require_rows(start, patches.size(), "start must be (n + 1)");
+    require(are_rows(nodes, start.size() - 1), "nodes must be rows of start");
+    require(are_rows(patches, p), "patches must be rows of the fits");
+    Array<double> out({m, k, int64_t{6}});
+    const Residuals every{frame.data(), terms.data(), X.data(),     values.data(),  E.data(),           nodes.data(),
+                          start.data(), patches.data(), count, degree, k, s, out.mutable_data(), 0, m};
+    py::gil_scoped_release release;
+    parallel_ranges(m, GRAIN, [&](int64_t first, int64_t last) {
+        Residuals task = every;
+        task.first = first;
+        task.last = last;
+        leave(task);
+    });
+    return out;
+}
+
 // Rows of values combined by a table: (m, s, c).
 Array<double> combined(Numbers table, Numbers values, Indices rows) {
     require(table.ndim() == 2 && rows.ndim() == 2 && rows.shape(1) == table.shape(1), "rows must be (m, k)");
@@ -161,10 +187,29 @@ py::tuple distinct(Integers owner, Integers entries, int64_t n) {
     return py::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
 }
 
+void require_rises(Integers start, int64_t size) {
+    const int64_t n = start.size() - 1, *from = start.data();
+    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == size,
+            "start must rise from 0 to the number of entries");
+}
+
+py::tuple grown(Integers owner, Integers cells, Integers corners, Integers from, Integers around, int64_t n) {
+    require(corners.ndim() == 2, "corners must be (m, c)");
+    const int64_t m = corners.shape(0), nodes = from.size() - 1;
+    const py::tuple rows = dealt(owner, cells, n);
+    const auto start = rows[0].cast<Array<int64_t>>(), mine = rows[1].cast<Array<int64_t>>();
+    require_members(mine, m, "cells must be there");
+    require_rises(from, around.size());
+    require_members(around, m, "cells around corners must be there");
+    for (int64_t i = 0; i < corners.size(); ++i) require(corners.data()[i] < nodes, "corners must be nodes");
+    const Grown found(start.data(), mine.data(), n, corners.data(), m, corners.shape(1), from.data(), around.data(),
+                      nodes);
+    return py::make_tuple(copied(found.owner), copied(found.entries));
+}
+
 py::tuple taken(Integers start, Integers entries, Integers rows) {
     const int64_t n = start.size() - 1, *from = start.data();
-    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == entries.size(),
-            "start must rise from 0 to the number of entries");
+    require_rises(start, entries.size());
     require_members(rows, n, "rows must be there");
     Array<int64_t> first(rows.size() + 1);
     int64_t* to = first.mutable_data();
@@ -184,9 +229,13 @@ PYBIND11_MODULE(_recovery, m) {
            "values", "offset", "start", "elements", "weights", "degree", "means");
     define(m, "evaluate", evaluated, "mean of some polynomials at each place, (n, 6)", "frame", "terms", "places",
            "start", "patches");
+    define(m, "residuals", residuals, "E (values - mean of some polynomials) (m, k, 6)", "frame", "terms", "places",
+           "values", "E", "nodes", "start", "patches");
     define(m, "dealt", dealt, "start (n + 1) and entries of n rows, by their owners", "owner", "entries", py::arg("n"));
     define(m, "distinct", distinct, "owner, entry and count of the distinct entries of n rows", "owner", "entries",
            py::arg("n"));
+    define(m, "grown", grown, "owner and cell of rows of cells with those around their corners", "owner", "cells",
+           "corners", "start", "around", py::arg("n"));
     define(m, "taken", taken, "some of the rows", "start", "entries", "rows");
     define(m, "combined", combined, "rows of values combined by a table, (m, s, c)", "table", "values", "rows");
     define(m, "summed", summed, "sums at n nodes of values (m, k, 6) of elements", "values", "nodes", py::arg("n"));

@@ -2,12 +2,14 @@
 //
 // Coordinates of a patch are those along the principal axes of its points, in units of their spread, so
 // that a fit depends neither on the unit of length nor on how the body lies.  Monomials stand by degree; one
-// that the points of a patch cannot tell from those before it is left out.
+// that the points of a patch cannot tell from those before it is left out.  What means of elements cannot tell,
+// as across a single layer, is then fitted to what they leave of the samples.
 
 #pragma once
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "isa.hpp"
 
@@ -16,6 +18,7 @@ namespace kl {
 constexpr int TERMS = 20, ROW = 32;  // monomials up to degree 3; these and six values, padded
 constexpr double DEPENDENT = 1e-3;   // share of a monomial that those before it leave
 constexpr double NOTHING = 1e-6;      // sum of squares of a monomial / that of 1, below which it is rounding
+constexpr double UNTOLD = 1e-2;       // the same for means of elements, below which samples tell it
 constexpr double FLAT = 1e-12;       // least spread along an axis / largest, squared
 constexpr double ALIGNED = 1e-6;     // share of a product of inertia that counts as rounding
 
@@ -27,7 +30,7 @@ struct Fit {
     const int32_t* elements; // its elements
     const double* weights;   // their weights
     const int32_t* degree;   // (p) of the polynomials
-    const int32_t* means;    // (p) 1 where means of elements are fitted if there are enough of them
+    const int32_t* means;    // (p) 1 where means of elements are fitted as far as they tell
     const double* summary;   // (m, SUMMARY) of each element
     double* frame;           // (p, 12) origin, and rows of the map to local coordinates
     double* terms;           // (p, most, 6)
@@ -123,12 +126,12 @@ inline void summarize(const Fit& w, int64_t element, double* out) {
                 out[c++] += (w.X[3 * int64_t{s} + i] - out[i]) * (w.X[3 * int64_t{s} + j] - out[j]);
 }
 
-inline void place(const Fit& w, int64_t patch, bool means, double* frame) {
+inline void place(const Fit& w, int64_t patch, double* frame) {
     double sum[3] = {}, A[3][3] = {}, R[3][3], spread[3], n = 0;
     const auto each = [&](const auto& f) {
         for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
             const int64_t e = w.elements[at];
-            f(w.summary + SUMMARY * e, means ? 1.0 : static_cast<double>(w.offset[e + 1] - w.offset[e]));
+            f(w.summary + SUMMARY * e, static_cast<double>(w.offset[e + 1] - w.offset[e]));
         }
     };
     each([&](const double* element, double count) {
@@ -139,7 +142,7 @@ inline void place(const Fit& w, int64_t patch, bool means, double* frame) {
     each([&](const double* element, double count) {
         for (int i = 0, c = 9; i < 3; ++i)
             for (int j = i; j < 3; ++j, ++c)
-                A[i][j] += (means ? 0.0 : element[c]) + count * (element[i] - frame[i]) * (element[j] - frame[j]);
+                A[i][j] += element[c] + count * (element[i] - frame[i]) * (element[j] - frame[j]);
     });
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j) A[j][i] = A[i][j] /= n;
@@ -158,16 +161,19 @@ struct Equations {
     double* weights;          // (samples)
     double (*M)[ROW];         // (TERMS)
     int64_t samples;
-    int n, width;  // monomials; columns in use, a multiple of 8
+    int n, width;             // monomials; columns in use, a multiple of 8
+    bool known[TERMS];        // monomials that are found
 };
 
-inline void fill(const Fit& w, int64_t patch, bool means, const double* frame, Equations& to) {
+inline void fill(const Fit& w, int64_t patch, bool means, const double* frame, const double* terms, Equations& to) {
     to.samples = 0;
     const auto add = [&](const double* x, const double* values, double weight) {
         double y[3], *row = to.rows + ROW * to.samples;
         local(frame, x, y);
         powers(y, w.degree[patch], row);
         for (int c = 0; c < 6; ++c) row[to.n + c] = values[c];
+        for (int i = 0; to.known[0] && i < to.n; ++i)
+            for (int c = 0; c < 6; ++c) row[to.n + c] -= row[i] * terms[6 * i + c];
         to.weights[to.samples++] = weight;
     };
     for (int32_t at = w.start[patch]; at < w.start[patch + 1]; ++at) {
@@ -206,17 +212,18 @@ KL_INLINE void accumulate(const Equations& at) {
     }
 }
 
-// False if a monomial had to be left out.
+// Adds the terms not yet known; false if one had to be left out.
 template <int V>
-KL_INLINE bool solve(const Equations& at, double* terms) {
+KL_INLINE bool solve(Equations& at, double nothing, double* terms) {
     typedef vec<double, V> Vec;
     double(*M)[ROW] = at.M;
     double diagonal[TERMS], inverse[TERMS];
     bool all = true;
     for (int i = 0; i < at.n; ++i) diagonal[i] = M[i][i];
     for (int i = 0; i < at.n; ++i) {  // M = L D L^T, from the left; rows below are reduced at once
-        const bool used = M[i][i] > DEPENDENT * std::fmax(diagonal[i], NOTHING * diagonal[0]);
-        all &= used;
+        const bool used = !at.known[i] && M[i][i] > std::fmax(DEPENDENT * diagonal[i], nothing * diagonal[0]);
+        at.known[i] |= used;
+        all &= at.known[i];
         inverse[i] = used ? 1 / M[i][i] : 0.0;
         if (!used) continue;
         for (int k = i + 1; k < at.n; ++k) {
@@ -232,7 +239,7 @@ KL_INLINE bool solve(const Equations& at, double* terms) {
     for (int i = at.n - 1; i >= 0; --i) {
         Vec x[PAD / V];
         for (int v = 0; v < PAD / V; ++v) x[v] = inverse[i] * *reinterpret_cast<Vec*>(right + PAD * i + V * v);
-        for (int c = 0; c < 6; ++c) terms[6 * i + c] = x[c / V][c % V];
+        for (int c = 0; c < 6; ++c) terms[6 * i + c] += x[c / V][c % V];
         for (int k = 0; k < i; ++k)
             for (int v = 0; v < PAD / V; ++v) *reinterpret_cast<Vec*>(right + PAD * k + V * v) -= M[k][i] * x[v];
     }
@@ -242,13 +249,11 @@ KL_INLINE bool solve(const Equations& at, double* terms) {
 template <int V>
 KL_INLINE bool fit_one(const Fit& w, int64_t patch, bool means, Equations& at) {
     double *frame = w.frame + 12 * patch, *terms = w.terms + 6 * w.most * patch;
-    place(w, patch, means, frame);
     at.n = monomials(w.degree[patch]);
     at.width = (at.n + 6 + 7) / 8 * 8;
-    fill(w, patch, means, frame, at);
+    fill(w, patch, means, frame, terms, at);
     accumulate<V>(at);
-    std::fill(terms + 6 * at.n, terms + 6 * w.most, 0.0);
-    return solve<V>(at, terms);
+    return solve<V>(at, means ? UNTOLD : NOTHING * DEPENDENT, terms);
 }
 
 struct FitRange {
@@ -268,13 +273,67 @@ KL_INLINE void fit_body(const FitRange& range) {
     }
     Workspace space(TERMS * ROW + (ROW + TERMS + 1) * most);
     double *M = space.data(), *rows = M + TERMS * ROW, *weighted = rows + ROW * most;
-    Equations at{rows, weighted, weighted + TERMS * most, reinterpret_cast<double(*)[ROW]>(M), 0, 0, 0};
+    Equations at{rows, weighted, weighted + TERMS * most, reinterpret_cast<double(*)[ROW]>(M), 0, 0, 0, {}};
     for (int64_t patch = range.first; patch < range.last; ++patch) {
+        place(w, patch, w.frame + 12 * patch);
+        std::fill_n(w.terms + 6 * w.most * patch, 6 * w.most, 0.0);
+        std::fill_n(at.known, TERMS, false);
         if (w.means[patch] && fit_one<V>(w, patch, true, at)) continue;
         fit_one<V>(w, patch, false, at);
     }
 }
 
 KL_DISPATCH(fit_patches, fit_body, const FitRange&)
+
+struct Residuals {
+    const double *frames, *terms, *X, *values, *E;
+    const int32_t *nodes, *start, *patches;
+    int count, degree;  // of the monomials
+    int64_t k, s;       // nodes and points of an element
+    double* out;        // (m, k, 6)
+    int64_t first, last;
+};
+
+// Values (s, 6) of a polynomial at the points of an element.
+KL_INLINE void at_points(const Residuals& w, int64_t element, int32_t patch, double* out) {
+    const double* terms = w.terms + 6 * w.count * int64_t{patch};
+    for (int64_t q = 0; q < w.s; ++q, out += 6) {
+        double y[3], monomial[TERMS], sum[6] = {};
+        local(w.frames + 12 * int64_t{patch}, w.X + 3 * (element * w.s + q), y);
+        powers(y, w.degree, monomial);
+        for (int i = 0; i < w.count; ++i)
+            for (int c = 0; c < 6; ++c) sum[c] += monomial[i] * terms[6 * i + c];
+        for (int c = 0; c < 6; ++c) out[c] = sum[c];
+    }
+}
+
+template <int V>
+KL_INLINE void leave_body(const Residuals& w) {
+    std::vector<int32_t> met;
+    std::vector<double> fitted;  // the polynomials met in an element, at its points
+    for (int64_t e = w.first; e < w.last; ++e) {
+        met.clear();
+        for (int64_t a = 0; a < w.k; ++a) {
+            const int32_t node = w.nodes[e * w.k + a], first = w.start[node], last = w.start[node + 1];
+            double sum[6] = {};
+            for (int64_t q = 0; q < w.s; ++q)
+                for (int c = 0; c < 6; ++c) sum[c] += w.E[a * w.s + q] * w.values[6 * (e * w.s + q) + c];
+            for (int32_t j = first; j < last; ++j) {
+                const size_t known = std::find(met.begin(), met.end(), w.patches[j]) - met.begin();
+                if (known == met.size()) {
+                    met.push_back(w.patches[j]);
+                    if (fitted.size() < 6 * w.s * met.size()) fitted.resize(6 * w.s * met.size());
+                    at_points(w, e, w.patches[j], fitted.data() + 6 * w.s * known);
+                }
+                const double *value = fitted.data() + 6 * w.s * known, share = 1.0 / (last - first);
+                for (int64_t q = 0; q < w.s; ++q)
+                    for (int c = 0; c < 6; ++c) sum[c] -= share * w.E[a * w.s + q] * value[6 * q + c];
+            }
+            for (int c = 0; c < 6; ++c) w.out[6 * (e * w.k + a) + c] = sum[c];
+        }
+    }
+}
+
+KL_DISPATCH(leave, leave_body, const Residuals&)
 
 }  // namespace kl

@@ -27,6 +27,7 @@ UNITS = {
     "REACTION": "N",
     "FORCE": "N",
     "TEMPERATURE": "K",
+    "ENERGY NORM": "√J",
 }
 MANY = 20000
 """Faces from which their edges are no longer drawn, and facets to aim at."""
@@ -188,6 +189,7 @@ def _outline(mesh: Mesh) -> Array:
 def _rulers(axes: Any, X: Array, moved: Array) -> None:
     """Draw the extent of the body along x, y and z beside its lower and left edges, clear of `moved`."""
     low, high = X.min(axis=0), X.max(axis=0)
+    rounding = 1e-12 * np.abs([low, high]).max()
     beyond = max(0.0, float((low - moved.min(axis=0)).max()), float((moved.max(axis=0) - high).max()))
     away = 0.06 * np.linalg.norm(high - low) + beyond
     starts = [low, [high[0], low[1], low[2]], low]
@@ -198,7 +200,8 @@ def _rulers(axes: Any, X: Array, moved: Array) -> None:
         end[i] = high[i]
         line = np.array([start, end]) @ ISOMETRIC[:2].T + away * np.array(side)
         axes.plot(*line.T, color="0.35", lw=0.8, marker=".", ms=4)
-        text = f"{'xyz'[i]}  {low[i]:.4g} … {high[i]:.4g} m"
+        ends = [0.0 if abs(place) < rounding else place for place in (low[i], high[i])]
+        text = f"{'xyz'[i]}  {ends[0]:.4g} … {ends[1]:.4g} m"
         axes.text(
             *(line.mean(axis=0) + 0.3 * away * np.array(side)), text, ha=ha, va=va, size=9, color="0.25"
         )

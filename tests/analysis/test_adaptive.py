@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.io.writers.results import summary
 from kratos_lite.verification import scenes
 from kratos_lite.verification.concentrations import hole
 from kratos_lite.verification.errors import norms
@@ -69,6 +70,10 @@ def test_the_history_is_in_the_report_and_the_model_stays():
     assert history[-1].error == result.report.error <= 0.15
     rows = result.table()
     assert sum(label == "refinement" for label, _ in rows) == len(history)
+    assert [value for label, value in rows if label == "estimated error"] == [
+        f"{history[-1].error:.2%} of the energy norm, from {len(history)} meshes"
+    ]
+    assert summary(result)["requested_error"]["history"][-1]["error"] == result.report.error
     assert abs(result.report.total_reaction[2] + 1.0) < 1e-9
 
 
@@ -167,7 +172,7 @@ def test_a_quantity_is_as_accurate_as_asked_for(quantity, reference):
     exact = quantity.value(reference)
     assert abs(quantity.value(result) / exact - 1) <= result.report.error + 1e-3  # of the reference
     assert result.report.error <= 0.02
-    assert str(quantity) in dict(result.table())["error"]
+    assert str(quantity) in dict(result.table())["estimated error"]
 
 
 def test_a_quantity_of_node_rows_is_refused_before_anything_is_solved():

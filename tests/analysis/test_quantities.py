@@ -206,7 +206,7 @@ COOK_TIP, COOK_REACTION = 9.5703, 1208.9
 """m and N: u_y of the upper corner and the reaction of one face, of 40 x 40 cells of 27 nodes."""
 
 
-@pytest.mark.parametrize(("kind", "n", "low"), [("8N", 8, 0.5), ("4N", 12, 0.7), ("27N", 6, 0.3)])
+@pytest.mark.parametrize(("kind", "n", "low"), [("8N", 8, 0.5), ("4N", 12, 0.7), ("27N", 6, 0.25)])
 def test_cook(kind, n, low):
     """Stresses have no limit in a corner of the support, which costs part of the estimate."""
     result = scenes.cook(kind, n).model.solve()

@@ -336,6 +336,7 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
         (("--time", "1:3", "--rayleigh", "-1,0"), ("--rayleigh: ALPHA,BETA",)),
         (("--time", "1:3", "--restart", "no.npz"), ("no.npz: there is no such file",)),
         (("--time", "1:3", "--modes", "2"), ("--modes and --time: give one of them",)),
+        (("--modes", "2", "--error", "1%"), ("--error is for statics",)),
         (("--time", "1:3", "--solver", "amg"), ("--solver is for statics",)),
         (("--time", "1:3", "--json", "a.csv"), ("a.csv: the ending must be .json",)),
         (("--time", "1:3", "-o", "a.vtu"), ("states in time are written as .pvd",)),

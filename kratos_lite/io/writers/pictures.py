@@ -22,7 +22,7 @@ from kratos_lite.validation import short
 
 NAMES = {
     "VON_MISES_STRESS": "von Mises stress",
-    "ENERGY_NORM_ERROR": "estimated error in the energy norm, √J of an element",
+    "ENERGY_NORM_ERROR": "estimated error of each element in the energy norm",
 }
 """Titles where the words of the variable do not do."""
 
@@ -46,7 +46,8 @@ def draw(
     thing : a mesh; or a result, whose displacement is drawn if no other is given.
     displacement : (n, 3) m; the undeformed edges are drawn thin.
     values : (n,) numbers on the nodes that color the surface; of a result also the name of a nodal field,
-        ``VON_MISES_STRESS`` if nothing is given; ``ENERGY_NORM_ERROR`` draws the estimated error.
+        ``VON_MISES_STRESS`` if nothing is given.  ``CAUCHY_STRESS_VECTOR`` is drawn as that, too; of other
+        vectors the length; ``ENERGY_NORM_ERROR`` is the estimated error.
     title : first line above the picture.
     unit : of `values`, at the color bar; found from the title if it names a variable that we know.
     scale : factor on the displacement; by default at least 1, the largest being a tenth of the body.

@@ -73,6 +73,10 @@ def summary(result: Result) -> dict[str, Any]:
     top = int(length.argmax())
     energy, mises, row = result.totals()
     error = result.error()
+    asked = {}
+    if report.error is not None:
+        history = [vars(step) for step in report.history]
+        asked = {"requested_error": {"relative": report.error, "of": report.error_of, "history": history}}
     return {
         "nodes": mesh.n_nodes,
         "elements": element_counts(mesh, result.groups, report.formulation),
@@ -88,6 +92,7 @@ def summary(result: Result) -> dict[str, Any]:
             "method": error.method,
             "warnings": error.warnings,
         },
+        **asked,
         "largest_von_mises_stress": {"value": mises, "element": int(mesh.element_ids[row])},
         "solver": report.solver,
         "reason": report.reason,

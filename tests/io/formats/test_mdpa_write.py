@@ -11,6 +11,7 @@ import pytest
 from meshes import with_block
 from scenes import case, present
 
+import kratos_lite as kl
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document, Properties
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
@@ -246,3 +247,11 @@ def test_kratos_itself_reads_the_same(tmp_path):
     }
     assert (found["weights"], found["constant"]) == ([0.1, 1 / 3], 0.7)
     assert (found["slave"], found["masters"]) == ([8], [9, 17])
+
+
+def test_elements_without_a_formulation_are_written_as_plain_ones_with_a_note(tmp_path):
+    notes = kl.write(tmp_path / "box.mdpa", kl.box((1, 1, 1), (2, 1, 1)))
+    assert [str(note) for note in notes if "Element3D8N, which names no formulation" in str(note)]
+    assert "SmallDisplacementElement3D8N" in (tmp_path / "box.mdpa").read_text()
+    named = kl.box((1, 1, 1), (2, 1, 1), element="KinematicLinear3D8N")
+    assert not any("names no formulation" in str(note) for note in kl.write(tmp_path / "box.mdpa", named))

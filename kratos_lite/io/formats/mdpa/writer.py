@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
@@ -41,7 +42,8 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
     Returns
     -------
     list of Note
-        Elements and conditions that are written though Kratos does not know them.
+        Elements and conditions that are written though Kratos does not know them, and elements without a
+        formulation, which get the plain one.
 
     Raises
     ------
@@ -66,7 +68,8 @@ def write_mdpa(path: str | Path, document: Document) -> list[Note]:
 
         data = gzip.compress(data, mtime=0)
     write_whole(path, data)
-    return _unknown_to_kratos(document)
+    keep = _has_initial_state(document)
+    return _unknown_to_kratos(document, keep) + ([] if keep else _made_plain(document))
 
 
 def _has_initial_state(document: Document) -> bool:
@@ -78,9 +81,9 @@ def _has_initial_state(document: Document) -> bool:
     )
 
 
-def _unknown_to_kratos(document: Document) -> list[Note]:
+def _unknown_to_kratos(document: Document, keep: bool) -> list[Note]:
     """Note what would stop Kratos: contact faces and names of 2008, and elements that users defined."""
-    counts, keep = Counter[str](), _has_initial_state(document)
+    counts = Counter[str]()
     blocks = [(block, keep) for block in document.mesh.blocks]
     for block, kept in [*blocks, *((block, False) for block in document.mesh.conditions)]:
         name = block.name if kept else kratos_name(block.name)
@@ -90,6 +93,16 @@ def _unknown_to_kratos(document: Document) -> list[Note]:
             counts[name] += len(block)
     text = "{} {} are written, but Kratos 10 does not know them"
     return [Note(0, text.format(n, name)) for name, n in counts.items() if n]
+
+
+def _made_plain(document: Document) -> list[Note]:
+    """Note elements without a formulation, which the file gives one."""
+    names = sorted({block.name for block in document.mesh.blocks if len(block) and is_unnamed(block.name)})
+    text = (
+        "{}, which names no formulation, is written as {}, the plain element; to solve by another, ask for {}"
+    )
+    how = "formulation='non_locking' (--formulation non_locking)"
+    return [Note(0, text.format(name, kratos_name(name), how)) for name in names]
 
 
 def _lines(document: Document) -> Lines:
