@@ -126,7 +126,8 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
 
 def _in_the_worst(squares: Array) -> float:
     """Return the sum over the hundredth of elements with the largest values."""
-    return float(np.sort(squares)[-max(WORST, len(squares) // 100) :].sum())
+    count = max(WORST, len(squares) // 100)
+    return float(np.partition(squares, -count)[-count:].sum())
 
 
 def _locks(group: ElementGroup) -> bool:
