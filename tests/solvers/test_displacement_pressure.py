@@ -77,7 +77,7 @@ def to_the_tolerance(monkeypatch):
 # ---- iterations ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("nu", [0.49, 0.499, 0.4999, 0.499999])
+@pytest.mark.parametrize("nu", [0.495, 0.499, 0.4999, 0.499999])
 @pytest.mark.parametrize("element", CELLS)
 def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
@@ -144,7 +144,7 @@ def test_a_rubber_with_fibers_is_nearly_incompressible():
 
 
 def test_compressible_bodies_have_no_pressures():
-    assert body("BBar3D27N", rubber(0.45)).solve("amg").report.solver == "amg"
+    assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
 
 # ---- the matrix ------------------------------------------------------------------------------------------
