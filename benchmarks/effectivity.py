@@ -43,7 +43,7 @@ itself: nodes between materials have the mean of both. `result.stress("averaged"
 each element and averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of
 each element. With two elements along a side, averaged stresses can be closer than recovered ones.
 
-**Reported error.** The difference to recovered stresses is raised by 1.6, that to averaged ones by 1.8,
+**Reported error.** The difference to recovered stresses is raised by 1.7, that to averaged ones by 1.8,
 and the smaller counts. The table shows reported over true error, which is to lie between 1 and 2. A
 star marks a warning: plain elements near ν = ½ lock, and their estimate is too small; coarse meshes,
 few elements and singular corners are named, too. A proven bound, larger and more expensive, is

@@ -62,7 +62,7 @@ class ErrorEstimate:
         return f"{self.relative:.2%} in the energy norm ({self.absolute:.4e} √J, by {self.method})"
 
 
-SAFETY = {"recovery": 1.6, "averaging": 1.8}
+SAFETY = {"recovery": 1.7, "averaging": 1.8}
 """Factors by which the differences of the elements' stresses to smooth ones are raised to errors."""
 
 NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
