@@ -17,7 +17,6 @@ import numpy as np
 
 from kratos_lite.analysis.error_estimate import SAFETY, Origin, QuantityError
 from kratos_lite.analysis.quantities import Quantity, Solved
-from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.recovery import Recovery
 from kratos_lite.errors import ModelError
 from kratos_lite.model.supports import AXES
@@ -51,12 +50,7 @@ def error_of(
                 f"{quantity}: multi-point constraints tie the part to nodes beside it, so that its reaction "
                 "is that of no support; take the whole of what is tied together"
             )
-    mesh = result.mesh
-    shares = np.zeros(mesh.n_elements)
-    both = zip(recovery.differences(strained), recovery.differences(z), strict=True)
-    for (group, first), (_, second) in both:
-        density = ((first @ np.linalg.inv(group.material.C)) * second).sum(axis=-1)
-        shares[group.rows] = (density * volumes(mesh.points, group)).sum(axis=1)
+    shares = recovery.products(strained, z, result.mesh.n_elements)
     local = quantity.local(result)
     raised = SAFETY["recovery"]
     absolute = float(raised**2 * np.abs(shares).sum() + raised * np.abs(local).sum())

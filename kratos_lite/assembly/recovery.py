@@ -225,40 +225,55 @@ class Recovery:
         if free:
             self._last = u, found
 
-    def differences(self, u: Array) -> Iterator[tuple[ElementGroup, Array]]:
-        """Yield each group with recovered minus own stresses at its points, (m, g, 6) in Pa.
+    def products(self, u: Array, z: Array, n_elements: int) -> Array:
+        """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
 
-        The groups have no prestress, which is given and no part of the error, and rules that are good for the
-        square of the difference.
+        Prestress is given and no part of the error.  σ* is kept for the first of them alone.
         """
-        for group, nodes, value, nodal, _ in self._compared(u):
-            N, _ = tabulate(group.element.shape, group.rule)
-            yield group, N @ nodal[nodes] - value
+        found = np.zeros(n_elements)
+        both = zip(self.regions, self._recovered(u), self._recovered(z, keep=False), strict=True)
+        for region, (values, nodal), (others, other_nodal) in both:
+            for group, nodes, value, other in zip(region.groups, region.cells, values, others, strict=True):
+                fine, N, dV, S = self._tables(group)
+                pairs = [
+                    (star, raw if fine is group else at_gauss(self.points, fine, field))
+                    for star, raw, field in ((nodal, value, u), (other_nodal, other, z))
+                ]
+                found[group.rows] = _products(pairs[0], pairs[1], nodes, N, dV, S)
+        return found
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
         found = np.zeros((2, n_elements))
-        for group, nodes, value, *nodal in self._compared(u):
-            N, _ = tabulate(group.element.shape, group.rule)
-            dV, S = volumes(self.points, group), floats(np.linalg.inv(group.material.C))
-            for row, values in zip(found, nodal, strict=True):
-                row[group.rows] = _products((values, value), (values, value), nodes, N, dV, S)
+        for region, (values, nodal) in zip(self.regions, self._recovered(u), strict=True):
+            averaged = region.averaged(values)
+            for group, nodes, value in zip(region.groups, region.cells, values, strict=True):
+                fine, N, dV, S = self._tables(group)
+                raw = value if fine is group else at_gauss(self.points, fine, u)
+                for row, star in zip(found, (nodal, averaged), strict=True):
+                    row[group.rows] = _products((star, raw), (star, raw), nodes, N, dV, S)
         return found[0], found[1]
 
-    def _compared(self, u: Array) -> Iterator[tuple[ElementGroup, Ints, Array, Array, Array]]:
-        """Yield each group, its nodes in the region, C ε at its points, and this recovered and averaged."""
-        known = self._last[1] if self._last is not None and self._last[0] is u else []
+    def _recovered(self, u: Array, keep: bool = True) -> list[tuple[list[Array], Array]]:
+        """Return C ε at the points of the groups, and recovered at the nodes, of each region."""
+        known = self._last[1] if self._last is not None and self._last[0] is u else None
         found = []
         for i, region in enumerate(self.regions):
-            plain = [replace(group, prestress=None) for group in region.groups]
-            values = [at_gauss(self.points, group, u) for group in plain]
-            nodal = known[i] if known else region.at_nodes(self.points, values)
-            averaged = region.averaged(values)
-            found.append(nodal)
-            for group, nodes, value in zip(plain, region.cells, values, strict=True):
-                fine = _compared_at(group)
-                yield fine, nodes, value if fine is group else at_gauss(self.points, fine, u), nodal, averaged
-        self._last = u, found
+            values = [at_gauss(self.points, _plain(group), u) for group in region.groups]
+            found.append((values, known[i] if known else region.at_nodes(self.points, values)))
+        if keep:
+            self._last = u, [nodal for _, nodal in found]
+        return found
+
+    def _tables(self, group: ElementGroup) -> tuple[ElementGroup, Array, Array, Array]:
+        """Return a group without prestress and with a rule for squared errors, its N and volumes, and C⁻¹."""
+        fine = _compared_at(group)
+        N, _ = tabulate(fine.element.shape, fine.rule)
+        return fine, N, volumes(self.points, fine), floats(np.linalg.inv(fine.material.C))
+
+
+def _plain(group: ElementGroup) -> ElementGroup:
+    return group if group.prestress is None else replace(group, prestress=None)
 
 
 def _compared_at(group: ElementGroup) -> ElementGroup:
@@ -266,7 +281,7 @@ def _compared_at(group: ElementGroup) -> ElementGroup:
     shape = group.element.shape
     if group.rule.degree >= 2 * shape.degree or not group.element.inherits(*GEOMETRY, *STRAIN, "stress"):
         return group
-    return replace(group, rule=rule_for(shape.cell, 2 * shape.degree))
+    return replace(group, prestress=None, rule=rule_for(shape.cell, 2 * shape.degree))
 
 
 def _joined(parts: Sequence[Array]) -> Array:

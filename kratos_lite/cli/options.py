@@ -48,6 +48,19 @@ COMMANDS = {"march": "solve, with --time STEP:STEPS", "run": "solve"}
 """Words for which a command of another name does what is likely meant."""
 
 
+class Formatter(argparse.RawDescriptionHelpFormatter):
+    """Looks for the width of the terminal when help is shown, not for each option that is added."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=80)
+
+    def format_help(self) -> str:
+        """Return the text for this terminal."""
+        fitting = argparse.HelpFormatter(self._prog)
+        self._width, self._max_help_position = fitting._width, fitting._max_help_position
+        return super().format_help()
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors name what was likely meant."""
 
@@ -81,7 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog="kratos-lite",
         description="Finite elements for solids: from an input file to displacements and stresses.",
         epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=Formatter,
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -108,7 +121,7 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
         help=text,
         description=text[0].upper() + text[1:] + ".",
         epilog=f"examples:\n  {EXAMPLES[name]}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=Formatter,
     )
     # "-1,0,0" and "-z:30" are values, not options
     command._negative_number_matcher = re.compile(r"-([\d.]|[xyz]:)")

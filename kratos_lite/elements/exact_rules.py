@@ -59,10 +59,11 @@ def degree_of(shape: type[Shape]) -> int:
     >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
     (2, 1)
     """
-    found, t = 0, np.cos(np.pi * (np.arange(MOST + 2) + 0.5) / (MOST + 2))
+    found, k = 0, np.arange(MOST + 2)
+    T = np.cos(np.outer(k, np.pi * (k + 0.5) / (MOST + 2)))  # Chebyshev polynomials at the zeros of the last
     for start, end in np.array(_LINES[shape.cell]):
-        N = np.array([shape.N(xi) for xi in start + (1 + t[:, None]) / 2 * (end - start)], dtype=float)
-        size = np.abs(np.polynomial.chebyshev.chebfit(t, N, MOST + 1)).max(axis=1)
+        N = np.asarray(shape.N(start + (1 + T[1][:, None]) / 2 * (end - start)), dtype=float)
+        size = np.abs(T @ N).max(axis=1)  # of the coefficients
         found = max(found, int(np.flatnonzero(size > 1e-10 * size.max())[-1]))
     return found if found <= MOST else shape.degree
 

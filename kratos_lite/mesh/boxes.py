@@ -27,13 +27,15 @@ def cell_boxes(points: Array, block: Block) -> tuple[Array, Array]:
     """
     shape = block.shape
     assert shape is not None
-    X = points[block.nodes]
-    corners = X[:, : shape.corners]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low = high = points[block.nodes[:, 0]]
+    for a in range(1, shape.corners):  # one after the other: faster than along an axis
+        corner = points[block.nodes[:, a]]
+        low, high = np.minimum(low, corner), np.maximum(high, corner)
     if len(shape.nodes) > shape.corners:
-        bulge = BULGE * np.abs(_deviations(shape, X)).max(axis=1)
+        bulge = BULGE * np.abs(_deviations(shape, points[block.nodes])).max(axis=1)
         low, high = low - bulge, high + bulge
-    size = (high - low).max(axis=1, keepdims=True)
+    x, y, z = (high - low).T
+    size = np.maximum(np.maximum(x, y), z)[:, None]
     margin = 1e-8 * size + 8 * np.finfo(float).eps * np.maximum(np.abs(low), np.abs(high))
     return low - margin, high + margin
 

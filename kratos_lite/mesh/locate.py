@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 POINTS_AT_ONCE = 2**14
 """Points that are searched for together, so that candidates take little memory."""
+FEW = 8
+"""Points whose boxes are found sooner one by one than by a tree."""
 NEAR_EDGE = 1e-6
 """Points this near the boundary of their cell, in reference coordinates, may lie in another as well."""
 CURVED = 0.1
@@ -176,7 +179,25 @@ class _Search:
                 low[at], high[at] = cell_boxes(mesh.points, block)
                 self.middle[at] = (low[at] + high[at]) / 2
         self.size = (high - low).max(axis=1, initial=0.0)
-        self.tree = BoxTree(low, high)
+        self.boxes = low, high
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """The tree of all boxes."""
+        return BoxTree(*self.boxes)
+
+    def around(self, x: Array) -> tuple[Ints, Ints]:
+        """Return pairs of points and elements in whose boxes they lie; a few points need no tree."""
+        if len(x) > FEW:
+            return self.tree.around(x)
+        low, high = self.boxes
+        x_inside = (low[:, 0] <= x[:, :1]) & (x[:, :1] <= high[:, 0])
+        rows = []
+        for point, inside in zip(x, x_inside, strict=True):
+            near = np.flatnonzero(inside)
+            rows.append(near[((low[near] <= point) & (point <= high[near])).all(axis=1)])
+        none = np.zeros(0, dtype=np.int64)
+        return np.repeat(np.arange(len(x)), [len(r) for r in rows]), np.concatenate([none, *rows])
 
     def block_of(self, rows: Ints) -> Ints:
         """Return the number of the block of each element row."""
@@ -184,7 +205,7 @@ class _Search:
 
     def find(self, x: Array) -> tuple[Ints, Array]:
         """Return element rows (m,) and xi (m, 3) of points (m, 3); -1 and nan outside."""
-        at, row = self.tree.around(x)
+        at, row = self.around(x)
         distance = ((x[at] - self.middle[row]) ** 2).sum(axis=1) / self.size[row] ** 2
         order = np.lexsort((row, distance, at))
         at, row = at[order], row[order]

@@ -71,8 +71,9 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
     """
     if choice(method, "solver", METHODS) != "auto":
         return method, "asked for"
-    compiled = symmetric and kernels("multigrid") is not None
-    limit = COMPILED_DENSE_LIMIT if compiled else DENSE_LIMIT
+    few = unknowns <= COMPILED_DENSE_LIMIT  # no kernel needs to be loaded
+    compiled = not few and symmetric and kernels("multigrid") is not None
+    limit = COMPILED_DENSE_LIMIT if few or compiled else DENSE_LIMIT
     if unknowns <= limit and dofs <= 4 * DENSE_LIMIT:
         return "dense", f"{unknowns} unknowns ≤ {limit}: a full matrix is fastest"
     if compiled:
