@@ -116,7 +116,7 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
         )
     if len(recovered) < FEW:
         warnings.append(f"{len(recovered)} elements are too few to estimate their error by one another")
-    elif len(recovered) >= 20 * WORST and _in_the_worst(recovered) > FOCUS * total:
+    elif in_few_elements(recovered):
         warnings.append(
             f"a large share of the error lies in few elements, most in row {int(recovered.argmax())}: near a "
             "re-entrant corner, the edge of a support or a concentrated load stresses have no limit"
@@ -124,9 +124,10 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
     return warnings
 
 
-def _in_the_worst(squares: Array) -> float:
-    """Return the sum over the hundredth of elements with the largest values."""
-    return float(np.sort(squares)[-max(WORST, len(squares) // 100) :].sum())
+def in_few_elements(shares: Array) -> bool:
+    """Return whether the hundredth of elements with the largest shares holds much of their sum."""
+    worst = np.sort(shares)[-max(WORST, len(shares) // 100) :]
+    return len(shares) >= 20 * WORST and float(worst.sum()) > FOCUS * float(shares.sum())
 
 
 def _locks(group: ElementGroup) -> bool:
@@ -147,7 +148,8 @@ class QuantityError:
     value : Q(u_h), in its unit.
     signed : the best guess of Q(u) - Q(u_h); value + signed is a better value.
     absolute : on the safe side: the sum of the sizes of what the elements contribute, as if nothing canceled,
-        with the factors of the energy norm for both errors of the product.
+        with the factors of the energy norm for both errors of the product; no less than `signed` by averaged
+        stresses with theirs.
     per_element : (m,) what each element contributes to `signed`.
     unit : of all these.
     warnings : why it cannot be trusted; empty where nothing speaks against it.

@@ -1,5 +1,8 @@
 """Recovered nodal values: stresses or strains of patches of elements, fitted by polynomials.
 
+Coarse and curved meshes, and nodes on the surface, are where a polynomial cannot follow the samples of the
+elements at its node: the mean of what it leaves of them, extrapolated to the node, is added.
+
 Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superconvergent patch recovery.
 """
 
@@ -225,22 +228,25 @@ class Recovery:
         if free:
             self._last = u, found
 
-    def products(self, u: Array, z: Array, n_elements: int) -> Array:
+    def products(self, u: Array, z: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
 
-        Prestress is given and no part of the error.  σ* is kept for the first of them alone.
+        With recovered and with averaged σ*.  Prestress is given and no part of the error.  σ* is kept for the
+        first of them alone.
         """
-        found = np.zeros(n_elements)
+        found = np.zeros((2, n_elements))
         both = zip(self.regions, self._recovered(u), self._recovered(z, keep=False), strict=True)
         for region, (values, nodal), (others, other_nodal) in both:
+            stars = (nodal, other_nodal), (region.averaged(values), region.averaged(others))
             for group, nodes, value, other in zip(region.groups, region.cells, values, others, strict=True):
                 fine, N, dV, S = self._tables(group)
-                pairs = [
-                    (star, raw if fine is group else at_gauss(self.points, fine, field))
-                    for star, raw, field in ((nodal, value, u), (other_nodal, other, z))
-                ]
-                found[group.rows] = _products(pairs[0], pairs[1], nodes, N, dV, S)
-        return found
+                raw, other_raw = (
+                    known if fine is group else at_gauss(self.points, fine, field)
+                    for known, field in ((value, u), (other, z))
+                )
+                for row, (star, other_star) in zip(found, stars, strict=True):
+                    row[group.rows] = _products((star, raw), (other_star, other_raw), nodes, N, dV, S)
+        return found[0], found[1]
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
