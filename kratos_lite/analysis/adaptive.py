@@ -43,6 +43,10 @@ FLAT = 0.05
 """Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
 DEPTH = 2
 """Times that elements around a singular point are cut at once."""
+ROUGH, ROUGH_SHARE = 1e-5, 1e-3
+"""Relative residual of the meshes on the way at most, and as a share of the error asked for."""
+FAIR = 1e-3
+"""Share of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
 UNKNOWNS = 400_000
@@ -97,16 +101,16 @@ def solve_to(
     steps: list[Finer] = []
     history: list[RefinementStep] = []
     missed, keep = "", None
+    rough = max(tolerance, min(ROUGH, ROUGH_SHARE * aim))
     while True:
         start = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
-        result, before = analysis.solve(), level
+        result, before = _solved(analysis, _started(level, steps), rough), level
         level = Level(model, result, steps, before)
         if quantity is not None:
             level = QuantityLevel(model, result, steps, before, quantity)
             level.check_value()
         history.append(level.step(perf_counter() - start))
-        analysis.release()
         if before is not None:
             before.before = None  # the meshes before it are needed no more
         if level.reported <= aim and level.is_settled:
@@ -121,6 +125,10 @@ def solve_to(
             missed = f"{STEPS} meshes did not suffice"
         if missed:
             break
+        analysis.release()
+    if result.report.iterations and rough > tolerance:
+        result = analysis.solve(start=result.u)
+    analysis.release()
     if missed:
         result.report.warnings.append(
             f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
@@ -128,6 +136,23 @@ def solve_to(
     result.report.history, result.report.error = history, level.reported
     result.report.error_of = "the energy norm" if quantity is None else str(quantity)
     return result
+
+
+def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Result:
+    """Return a solution to a rough tolerance, or to the full one if equilibrium needs it."""
+    result = analysis.solve(start=start, tolerance=rough)
+    good = (result.report.force_error or 0.0) <= FAIR
+    return result if good else analysis.solve(start=result.u)
+
+
+def _started(level: Level | None, steps: Sequence[Finer]) -> Array | None:
+    """Return the solution of a level on the next mesh, or None without one."""
+    if level is None:
+        return None
+    u = level.result.u
+    for step in steps:
+        u = step.interpolate(u)
+    return u
 
 
 def check_quantity(quantity: Quantity | None) -> None:

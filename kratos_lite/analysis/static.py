@@ -22,7 +22,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
-from kratos_lite.validation import function_or_none
+from kratos_lite.validation import finite, function_or_none
 
 ADJOINT_TOLERANCE = 1e-5
 """Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
@@ -101,12 +101,22 @@ class StaticAnalysis:
         self._phase = Phases()
         self._prepare()
 
-    def solve(self, loads: Load | Sequence[Load] | None = None) -> Result:
+    def solve(
+        self,
+        loads: Load | Sequence[Load] | None = None,
+        *,
+        start: Array | None = None,
+        tolerance: float | None = None,
+    ) -> Result:
         """Solve for some loads, or for those of the model.
 
         Parameters
         ----------
         loads : one or several, in place of those of the model.
+        start : (n, 3) m, displacements near the solution, such as those of a similar load, at which an
+            iteration begins.
+        tolerance : relative residual at which this iteration stops, in place of that of the analysis; how
+            far the result is from equilibrium is in its report, and no error then.
 
         Returns
         -------
@@ -121,7 +131,11 @@ class StaticAnalysis:
         """
         self._follow()
         case = self._load(self.model.loads if loads is None else loads)
-        return self._solve(case, case.moving)
+        if tolerance is not None:
+            check_arguments(self.solver, tolerance, self.progress)
+        if start is not None:
+            start = finite(start, "start", (self.model.mesh.n_nodes, 3))
+        return self._solve(case, case.moving, tolerance, start)
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
@@ -209,6 +223,7 @@ class StaticAnalysis:
                 tolerance=self.tolerance,
                 patterns=model.patterns,
                 progress=self.progress,
+                hanging=model.mesh.hanging,
             )
             self._prescribed = None
             self._still = sum(map(len, every)) - sum(map(len, groups))
@@ -217,7 +232,9 @@ class StaticAnalysis:
 
     # ---- one solution ------------------------------------------------------------------------------
 
-    def _solve(self, case: LoadSet, moving: Mask) -> Result:
+    def _solve(
+        self, case: LoadSet, moving: Mask, tolerance: float | None = None, start: Array | None = None
+    ) -> Result:
         """Solve for a load set with the equations of all parts in `moving`."""
         model, phase = self.model, case.phase
         warnings = self.warnings + checks.check_loads(case.loads, self.groups, case.forces, model.supports)
@@ -228,7 +245,7 @@ class StaticAnalysis:
                 system = self._system_of(moving)
                 noise = float(np.finfo(float).eps * system.norm)
             with phase("solve"):
-                u, solution = system.solve(case.forces, self._prescribed)
+                u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
                 u = self._complete(u, system, case.moving)
                 noise *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):
@@ -240,7 +257,8 @@ class StaticAnalysis:
             inner = model.supports.on_masters(stress_load(model, self.groups, u))
             rounding = count * max(noise, self._initial_noise(case.forces))
             balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
-            judge(solution, u, balance)
+            if tolerance is None:
+                judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
         report = self._report(case, solution, reactions, balance, warnings)

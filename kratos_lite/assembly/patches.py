@@ -12,12 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.polynomial_fit import Lists, distinct, lists
+from kratos_lite.assembly.polynomial_fit import Lists, distinct, integers, lists
 from kratos_lite.mesh import Block
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
+from kratos_lite.native import kernels
 from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
@@ -101,26 +102,32 @@ def _outside(
     element = np.concatenate([element[kept], more[1][added]])
     weights = np.where(_contain(owner, element, corners), 1.0, far[element])
     near = np.flatnonzero(weights == 0)
-    weights[near] = _decayed(points, owner[near], corners[element[near], :8])
+    weights[near] = _decayed(points, owner[near], element[near], corners)
     return is_wide, owner, element, weights
 
 
 def _second_layer(owner: Ints, element: Ints, around: Lists, corners: Ints, n: int) -> tuple[Ints, Ints]:
     """Return the pairs of node and element with the elements around those."""
+    if module := kernels("recovery"):
+        rows, found = module.grown(*map(integers, (owner, element, corners, around.start, around.entries)), n)
+        return rows, found
     known = corners[element]
     pair, at = np.nonzero(known >= 0)
     owner, near, _ = distinct(owner[pair], known[pair, at], n)
-    found = around.take(near)
-    return distinct(owner[found.owner], found.entries, n)[:2]
+    more = around.take(near)
+    return distinct(owner[more.owner], more.entries, n)[:2]
 
 
-def _decayed(points: Array, owner: Ints, hexahedra: Ints) -> Array:
-    """Return weights of hexahedra (k, 8) by their distance from a node each."""
-    X = points[hexahedra]
+def _decayed(points: Array, owner: Ints, element: Ints, corners: Ints) -> Array:
+    """Return weights of linear hexahedra (k,) by their distance from a node each."""
+    used = np.zeros(len(corners), dtype=bool)
+    used[element] = True
+    X = points[corners[used, :8]]
     center = X.mean(axis=1)
     radius = np.sqrt(((X - center[:, None]) ** 2).sum(axis=(1, 2)) / 8)
-    distance = np.linalg.norm(center - points[owner], axis=1)
-    return np.minimum(1.0, radius / distance) ** DECAY
+    at = (np.cumsum(used) - 1)[element]
+    distance = np.linalg.norm(center[at] - points[owner], axis=1)
+    return np.asarray(np.minimum(1.0, radius[at] / distance) ** DECAY)
 
 
 def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:

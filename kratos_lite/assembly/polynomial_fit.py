@@ -38,7 +38,7 @@ class Lists:
     def take(self, rows: Ints) -> Lists:
         """Return some of the rows."""
         if module := kernels("recovery"):
-            return Lists(*module.taken(*map(_integers, (self.start, self.entries, rows))))
+            return Lists(*module.taken(*map(integers, (self.start, self.entries, rows))))
         lengths = self.lengths[rows]
         start = np.concatenate([[0], np.cumsum(lengths)])
         within = np.arange(start[-1]) - np.repeat(start[:-1], lengths)
@@ -48,7 +48,7 @@ class Lists:
 def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
     """Return entries as rows, by the row of each, in their order."""
     if module := kernels("recovery"):
-        return Lists(*module.dealt(_integers(owner), _integers(entries), n))
+        return Lists(*module.dealt(integers(owner), integers(entries), n))
     start = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=n))])
     return Lists(start, entries[np.argsort(owner, kind="stable")])
 
@@ -56,14 +56,15 @@ def lists(owner: Numbers, entries: Ints, n: int) -> Lists:
 def distinct(owner: Numbers, entries: Numbers, n: int) -> tuple[Ints, Ints, Ints]:
     """Return row and entry of the distinct entries of n rows, ascending, and how often each occurs."""
     if module := kernels("recovery"):
-        rows, found, count = module.distinct(_integers(owner), _integers(entries), n)
+        rows, found, count = module.distinct(integers(owner), integers(entries), n)
         return rows, found, count
     most = int(entries.max(initial=0)) + 1
     codes, count = np.unique(owner * most + entries, return_counts=True)
     return codes // most, codes % most, count
 
 
-def _integers(numbers: Numbers) -> Ints:
+def integers(numbers: Numbers) -> Ints:
+    """Return numbers of rows as kernels that make rows take them."""
     return np.ascontiguousarray(numbers, dtype=np.int64)
 
 

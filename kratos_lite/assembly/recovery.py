@@ -109,7 +109,7 @@ class Region:
         fitted = self._fitted(ways, places, sampled)
         rest = np.zeros((len(self.nodes), 6))
         for way, cells, *both in zip(ways, self.cells, places, sampled, strict=True):
-            X, value = (v.mean(axis=1, keepdims=True) if way.means else v for v in both)
+            X, value = (_means(v) if way.means else v for v in both)
             rest += _sum(fitted.residuals(X, value, way.to_nodes, cells, self.patches.of), cells, len(rest))
         return fitted.at(points[self.nodes], self.patches.of) + rest / self.held[:, None]
 
@@ -319,6 +319,12 @@ def _combined(table: Array, values: Array, rows: Numbers) -> Array:
     if module := kernels("recovery"):
         return module.combined(floats(table), floats(values), as_rows(rows))
     return table @ values[rows]
+
+
+def _means(values: Array) -> Array:
+    """Return the mean (m, 1, c) of values (m, s, c) in each element."""
+    s = values.shape[1]
+    return _from_points(np.full((1, s), 1 / s), values)
 
 
 def _from_points(table: Array, values: Array) -> Array:

@@ -49,6 +49,25 @@ class HangingNodes:
         for node, first, last in zip(self.nodes.tolist(), self.start, self.start[1:], strict=False):
             yield node, self.masters[first:last], self.weights[first:last]
 
+    def among(self, nodes: Ints, n_nodes: int) -> HangingNodes:
+        """Return those among some nodes (a,) of all, numbered by these; other masters are left out."""
+        if len(nodes) == n_nodes:
+            return self
+        number = np.full(n_nodes, -1)
+        number[nodes] = np.arange(len(nodes))
+        owner = np.repeat(np.arange(len(self)), np.diff(self.start))
+        there = number[self.nodes] >= 0
+        kept = there[owner] & (number[self.masters] >= 0)
+        counts = np.bincount(owner[kept], minlength=len(self))[there]
+        return replace(
+            self,
+            nodes=number[self.nodes[there]],
+            start=np.concatenate([[0], np.cumsum(counts)]),
+            masters=number[self.masters[kept]],
+            weights=self.weights[kept],
+            around=self.around[there],
+        )
+
     def interpolate(self, values: Array) -> Array:
         """Return nodal values (n, ...) in which hanging nodes take what their masters give them."""
         values = values.copy()

@@ -1,9 +1,10 @@
 // Clusters of nodes close together on a stretched mesh (lines across thin elements, planes across
 // long ones).  Stiffness couples their nodes far more than others, so that only a smoother which
-// solves each cluster exactly, and aggregates of whole clusters, serve conjugate gradients there.
+// solves each cluster exactly, and aggregates of whole clusters, serve conjugate gradients there; or,
+// where clusters are too large to be solved, aggregates of nodes within each of them alone.
 //
-// Source of block smoothing along strong couplings: Trottenberg, Oosterlee & Schüller, Multigrid
-// (2001), section 5.1.  The tests on distances are our own.
+// Source of block smoothing along strong couplings, and of coarsening along them alone: Trottenberg,
+// Oosterlee & Schüller, Multigrid (2001), section 5.1.  The tests on distances are our own.
 
 #pragma once
 #include <cmath>
@@ -13,9 +14,10 @@
 
 namespace kl {
 
-constexpr double NEAR = 9, FAR = 16;     // squares of distances, to that of the nearest node
+constexpr double NEAR = 9, FAR = 10;     // squares of distances, to that of the nearest node
+constexpr double REACH = 12.5;           // that of linked nodes in cubes of 27 nodes is 12
 constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
-constexpr double FILL = 4;               // nodes in the envelope of a cluster, to its blocks in A
+constexpr double FILL = 1;               // nodes in the envelopes of clusters, to their blocks in A
 constexpr double CONTRAST = 1e3;           // largest stiffness of one node to that of another
 constexpr int64_t SAMPLE = 2000;         // nodes that show whether a mesh is stretched
 
@@ -43,7 +45,7 @@ inline bool is_stretched(const Graph& g, const double* X) {
     int64_t seen = 0, stretched = 0;
     for (int64_t i = 0; i < g.rows; i += step, ++seen) {
         const auto [low, high] = extent(g, X, i);
-        stretched += high > FAR * low;
+        stretched += high > REACH * low;
     }
     return 20 * stretched > seen;
 }
@@ -52,6 +54,7 @@ inline bool is_stretched(const Graph& g, const double* X) {
 class Clusters {
 public:
     Ints of, starts, members;  // cluster of each node; nodes of each cluster in the order of its factor
+    Bytes near;                // links that aggregate, where there are no clusters as they would be too large
     Skyline<double> exact;     // while setting up
     Skyline<float> factor;
 
@@ -216,7 +219,7 @@ Ints components(const Graph& g, const F& joins) {
     return label;
 }
 
-// Links of each node by length, and how many of each length each component has.
+// Links of each node by length, and how many of each length leave each component.
 struct Lengths {
     Bytes near;
     Ints label, size, far, between;
@@ -243,13 +246,14 @@ inline Lengths lengths(const Graph& g, const double* X) {
         const int32_t c = out.label[i];
         ++out.size[c];
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-            if (!out.near[k]) ++(ratio(i, k) > FAR ? out.far : out.between)[c];
+            if (out.label[g.indices[k]] != c) ++(ratio(i, k) > FAR ? out.far : out.between)[c];
     }
     return out;
 }
 
 // The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
-// clusters that a gap sets apart from the links between them, and that are cheap to factorize.
+// clusters that a gap sets apart from the links between them, and near links alone unless these are
+// cheap to factorize.
 inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta) {
     if (!is_stretched(g, X)) return {};
     const Lengths links = lengths(g, X);
@@ -266,21 +270,22 @@ inline Clusters find_clusters(const Graph& g, const double* A, int b, const doub
     Clusters found;
     found.collect(g, label);
     Ints position(g.rows);
-    Bytes cheap(found.count());
-    int64_t joined = 0;
+    int64_t envelope = 0, blocks = 0;
     for (int64_t c = 0; c < found.count(); ++c) {
-        int64_t blocks = 0;
+        if (found.starts[c + 1] - found.starts[c] == 1) continue;
+        envelope += found.envelope(g, c, position);
         for (int32_t p = found.starts[c]; p < found.starts[c + 1]; ++p)
             blocks += g.indptr[found.members[p] + 1] - g.indptr[found.members[p]];
-        const int32_t size = found.starts[c + 1] - found.starts[c];
-        cheap[c] = size > 1 && found.envelope(g, c, position) <= FILL * blocks;
-        joined += cheap[c] ? size : 0;
     }
-    if (2 * joined < g.rows) return {};
+    if (envelope > FILL * blocks) {
+        Clusters none;
+        none.near = links.near;
+        return none;
+    }
     const Doubles own = diagonal_norms(g, A, b * b);
     label = components(g, [&](int32_t i, int32_t k) {  // a stiffness contrast parts them
         const int32_t j = g.indices[k];
-        return links.near[k] && found.of[i] == found.of[j] && cheap[found.of[i]] &&
+        return links.near[k] && found.of[i] == found.of[j] &&
                squared_norm(A + int64_t{k} * b * b, b * b) >= theta * theta * own[i] * own[j];
     });
     found.collect(g, label);

@@ -34,6 +34,7 @@ public:
     void add_linear(const Graph& g, const double* data, Bytes fixed, Transfer transfer,
                     const Bytes& fine_fixed, Doubles points) {
         levels.back().clusters.exact = {};
+        levels.back().clusters.near = {};
         transfer.weights = true;
         transfer.fine_fixed = fine_fixed;
         transfer.coarse_fixed = fixed;
@@ -72,6 +73,7 @@ public:
         inverse.clear();
         inverse.shrink_to_fit();
         levels.back().clusters.exact = {};
+        levels.back().clusters.near = {};
     }
 
     // z = M r, the V-cycle on a right side of any size.
@@ -167,9 +169,12 @@ private:
             excluded[i] = 1;
             for (int c = 0; c < b; ++c) excluded[i] &= fixed[i * b + c];
         }
-        const Bytes strong = strong_links(g, data, b * b, settings.theta);
+        Bytes strong = strong_links(g, data, b * b, settings.theta);
         Ints of;
         Clusters& clusters = levels.back().clusters;
+        if (strong.empty()) strong.swap(clusters.near);
+        for (size_t k = 0; k < clusters.near.size(); ++k) strong[k] &= clusters.near[k];
+        clusters.near = {};
         const int32_t count = clusters.empty() ? aggregate(g, excluded, strong, of)
                                                : aggregate_clusters<b>(g, data, clusters, excluded, strong, of);
         if (count == 0 || count * MODES > 0.9 * b * g.rows) return 0;

@@ -187,10 +187,29 @@ py::tuple distinct(Integers owner, Integers entries, int64_t n) {
     return py::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
 }
 
+void require_rises(Integers start, int64_t size) {
+    const int64_t n = start.size() - 1, *from = start.data();
+    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == size,
+            "start must rise from 0 to the number of entries");
+}
+
+py::tuple grown(Integers owner, Integers cells, Integers corners, Integers from, Integers around, int64_t n) {
+    require(corners.ndim() == 2, "corners must be (m, c)");
+    const int64_t m = corners.shape(0), nodes = from.size() - 1;
+    const py::tuple rows = dealt(owner, cells, n);
+    const auto start = rows[0].cast<Array<int64_t>>(), mine = rows[1].cast<Array<int64_t>>();
+    require_members(mine, m, "cells must be there");
+    require_rises(from, around.size());
+    require_members(around, m, "cells around corners must be there");
+    for (int64_t i = 0; i < corners.size(); ++i) require(corners.data()[i] < nodes, "corners must be nodes");
+    const Grown found(start.data(), mine.data(), n, corners.data(), m, corners.shape(1), from.data(), around.data(),
+                      nodes);
+    return py::make_tuple(copied(found.owner), copied(found.entries));
+}
+
 py::tuple taken(Integers start, Integers entries, Integers rows) {
     const int64_t n = start.size() - 1, *from = start.data();
-    require(n >= 0 && from[0] == 0 && std::is_sorted(from, from + n + 1) && from[n] == entries.size(),
-            "start must rise from 0 to the number of entries");
+    require_rises(start, entries.size());
     require_members(rows, n, "rows must be there");
     Array<int64_t> first(rows.size() + 1);
     int64_t* to = first.mutable_data();
@@ -215,6 +234,8 @@ PYBIND11_MODULE(_recovery, m) {
     define(m, "dealt", dealt, "start (n + 1) and entries of n rows, by their owners", "owner", "entries", py::arg("n"));
     define(m, "distinct", distinct, "owner, entry and count of the distinct entries of n rows", "owner", "entries",
            py::arg("n"));
+    define(m, "grown", grown, "owner and cell of rows of cells with those around their corners", "owner", "cells",
+           "corners", "start", "around", py::arg("n"));
     define(m, "taken", taken, "some of the rows", "start", "entries", "rows");
     define(m, "combined", combined, "rows of values combined by a table, (m, s, c)", "table", "values", "rows");
     define(m, "summed", summed, "sums at n nodes of values (m, k, 6) of elements", "values", "nodes", py::arg("n"));

@@ -36,4 +36,31 @@ struct Distinct {
     }
 };
 
+// Rows of cells, each with the cells around the corners of those in it: ascending, one row after another.
+struct Grown {
+    std::vector<int64_t> owner, entries;
+
+    // `cells` of each of n rows from `start`; corners (m, c), -1 for none; cells `around` each corner from `from`.
+    Grown(const int64_t* start, const int64_t* cells, int64_t n, const int64_t* corners, int64_t m, int64_t c,
+          const int64_t* from, const int64_t* around, int64_t nodes) {
+        std::vector<int64_t> node_met(nodes, -1), cell_met(m, -1);
+        for (int64_t row = 0; row < n; ++row) {
+            const size_t first = entries.size();
+            for (const int64_t* cell = cells + start[row]; cell < cells + start[row + 1]; ++cell)
+                for (int64_t k = 0; k < c; ++k) {
+                    const int64_t node = corners[*cell * c + k];
+                    if (node < 0 || node_met[node] == row) continue;
+                    node_met[node] = row;
+                    for (const int64_t* other = around + from[node]; other < around + from[node + 1]; ++other) {
+                        if (cell_met[*other] == row) continue;
+                        cell_met[*other] = row;
+                        entries.push_back(*other);
+                    }
+                }
+            std::sort(entries.begin() + first, entries.end());
+            owner.resize(entries.size(), row);
+        }
+    }
+};
+
 }  // namespace kl

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from kratos_lite.elements import (
     KinematicLinear3D6N,
     KinematicLinear3D8N,
 )
-from kratos_lite.records import record
+from kratos_lite.mesh.centers import surroundings
+from kratos_lite.mesh.hanging import HangingNodes
+from kratos_lite.records import record, replace
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array, Ints, Rows
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
     element.shape: element
@@ -35,8 +38,8 @@ class LinearLevel:
     Attributes
     ----------
     K : (3m, 3m) stiffness matrix of the linear elements on the corner nodes.
-    nodes : (m,) int, row among all n nodes of each corner node.
-    indptr, indices, weights : interpolation (n, m) from corner nodes to all nodes in rows (CSR).
+    nodes : (m,) int, row among all n nodes of each corner node that does not hang.
+    indptr, indices, weights : interpolation (n, m) from these nodes to all nodes in rows (CSR).
     """
 
     K: BlockMatrix
@@ -46,34 +49,55 @@ class LinearLevel:
     weights: Array
 
 
-def linear_level(points: Array, groups: Sequence[ElementGroup]) -> LinearLevel | None:
+LONG = 3.0
+"""Length of a cell to its second length from which its halves are the linear elements."""
+
+
+@record(eq=False)
+class _Part:
+    """Some elements of a group, and the linear ones in each of them."""
+
+    group: ElementGroup
+    element: type[KinematicLinear]
+    cells: Ints
+    """(s, c), rows among the nodes of an element that are the nodes of each linear one."""
+
+
+def linear_level(
+    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None = None
+) -> LinearLevel | None:
     """Return stiffness and interpolation of the linear elements on the corners of `groups`.
 
-    Elements that are linear already take part as they are.  Each other node takes the shape
-    functions of the corners, at its reference place, in the first element that has it; what they
-    interpolate is a linear field wherever cells are straight-sided.
+    Elements that are linear already take part as they are.  Long ones are halved, as the nodes in their
+    middle are far from their corners compared with the others, which no smoothing of single nodes makes up
+    for.  Each node that is left takes the shape functions of the corners, at its reference place, in the
+    first element that has it; what they interpolate is a linear field wherever cells are straight-sided.
 
     Parameters
     ----------
     points : (n, 3) float, m.
     groups : elements with these points.
+    hanging : the nodes among them that hang on larger neighbors, if any.
 
     Returns
     -------
     The level, or None if all elements are linear or some have no linear element on their corners.
     """
-    corners = [_corners(group.element.shape) for group in groups]
-    if any(c is None for c in corners) or all(_is_linear(group.element.shape) for group in groups):
+    corners = [c for group in groups if (c := _corners(group.element.shape)) is not None]
+    if len(corners) < len(groups) or all(_is_linear(group.element.shape) for group in groups):
         return None
+    halved = hanging is None  # else a middle node would be a corner of smaller neighbors
+    parts = [p for group, c in zip(groups, corners, strict=True) for p in _parts(points, group, c, halved)]
     number = np.full(len(points), -1, dtype=np.int32)
-    for group, c in zip(groups, corners, strict=True):
-        number[group.nodes[:, c]] = 0
+    for part in parts:
+        number[part.group.nodes[:, np.unique(part.cells)]] = 0
     nodes = np.flatnonzero(number == 0)
     number[nodes] = np.arange(len(nodes))
-    linear = [_linear(group, number[group.nodes[:, c]]) for group, c in zip(groups, corners, strict=True)]
+    linear = [_linear(part, cell, number) for part in parts for cell in part.cells]
     pattern = Pattern(len(nodes), [group.nodes for group in linear])
     K = assemble_stiffness(points[nodes], linear, pattern)
-    return LinearLevel(K, nodes, *_interpolation(groups, linear, number))
+    level = LinearLevel(K, nodes, *_interpolation(parts, number))
+    return level if hanging is None else _continuous(level, groups, number, hanging)
 
 
 def _corners(shape: type[Shape]) -> Ints | None:
@@ -89,22 +113,79 @@ def _is_linear(shape: type[Shape]) -> bool:
     return len(shape.nodes) == shape.corners
 
 
-def _linear(group: ElementGroup, nodes: Rows) -> ElementGroup:
-    """Return the linear elements of a group on their corner nodes."""
-    if _is_linear(group.element.shape):
-        return ElementGroup(group.element, group.rule, group.material, nodes, group.rows)
-    element = LINEAR[group.element.shape.linear()]
-    return ElementGroup(element, element.rule, group.material, nodes, group.rows)
+def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> list[_Part]:
+    """Return the elements of a group that are not long, and those long along each axis, with their halves."""
+    shape = group.element.shape
+    if _is_linear(shape):
+        return [_Part(group, group.element, corners[None])]
+    element = LINEAR[shape.linear()]
+    halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
+    if all(cells is None for cells in halves):
+        return [_Part(group, element, corners[None])]
+    center, extent = element.shape.nodes.mean(axis=0), np.ptp(element.shape.nodes, axis=0)
+    ends = np.swapaxes(points[group.nodes[:, corners]], 1, 2)
+    sides = extent * np.linalg.norm(ends @ element.shape.dN(center), axis=1)
+    order = np.sort(sides, axis=1)
+    along = np.where(order[:, 2] > LONG * order[:, 1], sides.argmax(axis=1), -1)
+    parts = []
+    for axis in np.unique(along):
+        cells = None if axis < 0 else halves[axis]
+        some = _some(group, along == axis)
+        parts.append(_Part(some, element, corners[None] if cells is None else cells))
+    return parts
 
 
-def _interpolation(
-    groups: Sequence[ElementGroup], linear: Sequence[ElementGroup], number: Rows
-) -> tuple[Rows, Rows, Array]:
+def _some(group: ElementGroup, chosen: Mask) -> ElementGroup:
+    return (
+        group
+        if chosen.all()
+        else replace(group, nodes=group.nodes[chosen], rows=group.rows[chosen], prestress=None)
+    )
+
+
+def _halves(shape: type[Shape], corners: Ints, axis: int) -> Ints | None:
+    """Return the corners of the two halves of a cell along an axis, if it has nodes there."""
+    ends = shape.nodes[corners]
+    middle = ends.copy()
+    middle[:, axis] = (ends[:, axis].min() + ends[:, axis].max()) / 2
+    same = np.abs(shape.nodes[None] - middle[:, None]).max(axis=2) < 1e-12
+    if not same.any(axis=1).all():
+        return None
+    between, low = same.argmax(axis=1), ends[:, axis] < middle[:, axis]
+    return np.array([np.where(low, corners, between), np.where(low, between, corners)])
+
+
+def _linear(part: _Part, cell: Ints, number: Rows) -> ElementGroup:
+    """Return one linear element of each element of a part, on numbered corners."""
+    same = part.element is part.group.element
+    rule = part.group.rule if same else part.element.rule
+    return ElementGroup(
+        part.element, rule, part.group.material, number[part.group.nodes[:, cell]], part.group.rows
+    )
+
+
+def _weights(part: _Part) -> Array:
+    """Return the interpolation (k, k) from the nodes of linear elements to all nodes of an element."""
+    shape = part.element.shape
+    nodes, low, high = part.group.element.shape.nodes, shape.nodes.min(axis=0), shape.nodes.max(axis=0)
+    weights = np.zeros((len(nodes), len(nodes)))
+    for cell in part.cells:
+        ends = nodes[cell]
+        start, end = ends.min(axis=0), ends.max(axis=0)
+        local = low + (high - low) * (nodes - start) / (end - start)
+        inside = (np.abs(2 * local - low - high) < high - low + 1e-9).all(axis=1)
+        weights[np.ix_(inside, cell)] = shape.N(local[inside])
+    weights[np.abs(weights) < 1e-14] = 0.0
+    return weights
+
+
+def _interpolation(parts: Sequence[_Part], number: Rows) -> tuple[Rows, Rows, Array]:
     """Return rows (indptr, indices, weights) from corners to all nodes; `number` is that of each corner."""
     corners = np.flatnonzero(number >= 0)
     entries = [(corners, number[corners], np.ones(len(corners)))]
     missing = number < 0
-    for group, inner in zip(groups, linear, strict=True):
+    for part in parts:
+        group = part.group
         k = group.nodes.shape[1]
         first = np.full(len(number), -1)
         flat = group.nodes.ravel()
@@ -112,11 +193,68 @@ def _interpolation(
         rows = np.flatnonzero((first >= 0) & missing)
         missing[rows] = False
         element, local = np.divmod(first[rows], k)
-        N = inner.element.shape.N(group.element.shape.nodes)
-        N = np.where(np.abs(N) < 1e-14, 0.0, N)[local]
+        N = _weights(part)[local]
         at, corner = np.nonzero(N)
-        entries.append((rows[at], inner.nodes[element[at], corner], N[at, corner]))
+        entries.append((rows[at], number[group.nodes[element[at], corner]], N[at, corner]))
     rows, columns, weights = (np.concatenate(part) for part in zip(*entries, strict=True))
     order = np.lexsort((columns, rows))
     indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(number)))])
     return indptr.astype(np.int32), columns[order].astype(np.int32), weights[order]
+
+
+def _continuous(
+    level: LinearLevel, groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
+) -> LinearLevel:
+    """Return the level of continuous fields: corners in the middle of larger edges and faces follow these.
+
+    Without it the linear elements of both sides come apart there, and iterations grow fivefold.
+    """
+    from scipy.sparse import csr_array, kron
+
+    n = len(number)
+    at = np.repeat(np.arange(n), np.diff(level.indptr))
+    rows, columns, weights = [at], [level.nodes[level.indices]], [level.weights]
+    follows = np.zeros(n, dtype=bool)
+    for nodes, leaders, shares in _followers(groups, number, hanging):
+        new = ~follows[nodes]
+        follows[nodes] = True
+        rows.append(np.repeat(nodes[new], leaders.shape[1]))
+        columns.append(leaders[new].ravel())
+        weights.append(shares[new].ravel())
+    kept = ~follows[at]
+    rows[0], columns[0], weights[0] = rows[0][kept], columns[0][kept], weights[0][kept]
+    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
+    S = csr_array(entries, shape=(n, n))
+    nodes = level.nodes[~follows[level.nodes]]
+    column = np.full(n, -1)
+    column[nodes] = np.arange(len(nodes))
+    while (column[S.indices[np.abs(S.data) > 1e-13]] < 0).any():  # who follows one that follows others
+        S = S @ S
+    S.data[np.abs(S.data) <= 1e-13] = 0.0
+    S.eliminate_zeros()
+    P = csr_array((S.data, column[S.indices], S.indptr), shape=(n, len(nodes)))
+    inner: Any = kron(P[level.nodes], np.eye(3)).tocsr()
+    A = (inner.T @ level.K.scipy().tocsr() @ inner).tobsr((3, 3))
+    A.sort_indices()
+    K = BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return LinearLevel(K, nodes, P.indptr.astype(np.int32), P.indices.astype(np.int32), P.data)
+
+
+def _followers(
+    groups: Sequence[ElementGroup], number: Rows, hanging: HangingNodes
+) -> Iterator[tuple[Ints, Ints, Array]]:
+    """Yield nodes (h,), each once, with the nodes (h, k) that they follow and the weights (h, k) of these."""
+    counts = np.diff(hanging.start)
+    for k in np.unique(counts):
+        mine = np.flatnonzero(counts == k)
+        take = hanging.start[mine][:, None] + np.arange(k)
+        yield hanging.nodes[mine], hanging.masters[take], hanging.weights[take]
+    for group in groups:
+        shape = group.element.shape
+        around = () if _is_linear(shape) else surroundings(shape)
+        for node, corners in enumerate(around, shape.corners):
+            nodes, first = np.unique(group.nodes[:, node].astype(np.int64), return_index=True)
+            inner = number[nodes] >= 0
+            leaders = group.nodes[first[inner]][:, list(corners)].astype(np.int64)
+            shares: Array = np.full(leaders.shape, 1 / len(corners))
+            yield nodes[inner], leaders, shares

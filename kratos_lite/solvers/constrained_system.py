@@ -15,6 +15,7 @@ from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
+from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import replace
 from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
@@ -38,6 +39,7 @@ class ConstrainedSystem:
     tolerance : relative residual at which the iterative solver stops.
     patterns : where sparsity patterns are kept from one system to the next.
     progress : called with the phase and the share done, 0 … 1.
+    hanging : the nodes of the mesh that hang on larger neighbors, which the constraints hold, too.
 
     Attributes
     ----------
@@ -72,12 +74,14 @@ class ConstrainedSystem:
         tolerance: float = 1e-10,
         patterns: PatternCache | None = None,
         progress: Progress | None = None,
+        hanging: HangingNodes | None = None,
     ) -> None:
         self.n_nodes = len(points)
         self.nodes, self.groups = renumber(self.n_nodes, groups)
         self.points = points[self.nodes]
         self.reduced = constraints(self.nodes)
         self.tolerance, self.progress = tolerance, progress
+        self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
@@ -113,11 +117,15 @@ class ConstrainedSystem:
             self.points,
             self.method,
             self.reason,
-            lambda: linear_level(self.points, self.groups),
+            lambda: linear_level(self.points, self.groups, self._hanging),
         )
 
     def solve(
-        self, forces: Array, prescribed: Array | None = None, tolerance: float | None = None
+        self,
+        forces: Array,
+        prescribed: Array | None = None,
+        tolerance: float | None = None,
+        start: Array | None = None,
     ) -> tuple[Array, solvers.Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
 
@@ -126,6 +134,7 @@ class ConstrainedSystem:
         forces : (n, 3) N.
         prescribed : (3a,) m, in place of c of the constraint map.
         tolerance : in place of that of the system.
+        start : (n, 3) m, near the solution; an iteration begins there.
 
         Raises
         ------
@@ -133,7 +142,8 @@ class ConstrainedSystem:
             If the matrix is singular or the accuracy asked for cannot be reached.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
-        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed)
+        near = None if start is None else self.gather(start)
+        solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
         return self.scatter(solution.x), solution
 
     def internal_load(self, u: Array) -> Array:

@@ -110,11 +110,17 @@ class LinearSolver:
     symmetric: bool = True
 
     def solve(
-        self, f: Array, tolerance: float, progress: Progress | None = None, prescribed: Array | None = None
+        self,
+        f: Array,
+        tolerance: float,
+        progress: Progress | None = None,
+        prescribed: Array | None = None,
+        start: Array | None = None,
     ) -> Solution:
         """Return the displacements (3n,) under nodal forces f (3n,) as a Solution.
 
-        `prescribed` displacements (3n,) take the place of c of the constraint map.
+        `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
+        `start` (3n,), of which the free components count, if that is nearer than 0.
 
         Raises
         ------
@@ -123,18 +129,41 @@ class LinearSolver:
         """
         c = self.reduced.c if prescribed is None else prescribed
         b = self.reduced.reduce(f - self.K @ c)
+        if start is not None and self.method == "amg":
+            near = self.reduced.expand((start - c)[self.reduced.free], c)
+            left = self.reduced.reduce(f - self.K @ near)
+            size = float(np.linalg.norm(b))
+            if np.linalg.norm(left) <= size:
+                return self._continue(f, near, left, size, tolerance, progress)
         solution = self._solve(b, tolerance, progress) if len(b) else Solution(b, self.method, "", 0, 0.0)
         if not solution.reason:
             solution = replace(solution, reason=self.reason)
         return replace(solution, x=self.reduced.expand(solution.x, c))
 
-    def _solve(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
+    def _continue(
+        self, f: Array, near: Array, left: Array, size: float, tolerance: float, progress: Progress | None
+    ) -> Solution:
+        """Solve for what the displacements `near` leave of the load, whose norm is `size`."""
+        rest, rounding = float(np.linalg.norm(left)), 2 * float(np.finfo(float).eps)
+        aim = max(tolerance * size, rounding * (self.norm * float(np.linalg.norm(near)) + size))
+        q, reason, iterations = np.zeros(len(left)), "", 0
+        if rest > aim:
+            found = self._solve(left, aim / rest, progress, continued=True)
+            q, reason, iterations = found.x, found.reason, found.iterations
+        u = self.reduced.expand(q, near)
+        off, scale = self.reduced.reduce(f - self.K @ u), self.norm * np.abs(u).max() + np.abs(f).max()
+        error = float(np.abs(off).max() / scale) if scale > 0 else 0.0
+        return Solution(u, "direct" if reason else self.method, reason or self.reason, iterations, error)
+
+    def _solve(
+        self, b: Array, tolerance: float, progress: Progress | None, continued: bool = False
+    ) -> Solution:
         if self.method == "dense":
             q = self.factors.solve(b)
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
-            solution = self._iterate(b, tolerance, progress)
+            solution = self._iterate(b, tolerance, progress, continued)
             if not solution.reason:
                 return solution
             why = solution.reason
@@ -194,12 +223,13 @@ class LinearSolver:
     def _norm(self) -> float:
         return self.norm if self._blocks is self.K else self._blocks.norm()
 
-    def _iterate(self, b: Array, tolerance: float, progress: Progress | None) -> Solution:
+    def _iterate(self, b: Array, tolerance: float, progress: Progress | None, continued: bool) -> Solution:
         """Solve by multigrid; a solution with a reason is one that did not converge, and why."""
         free, rhs = self.reduced.free, np.zeros(len(self._free))
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorization.
-        aim = min(tolerance, ROUND_OFF) if len(b) <= DIRECT_LIMIT else tolerance
+        exact = len(b) <= DIRECT_LIMIT and not continued
+        aim = min(tolerance, ROUND_OFF) if exact else tolerance
         forecast = ConvergenceForecast(tolerance) if quick_to_factorize(len(b)) else None
         x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, forecast)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()

@@ -2,7 +2,8 @@
 
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid).
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
-On stretched meshes the kernels smooth lines or planes of close nodes exactly and aggregate them whole.
+On stretched meshes the kernels smooth lines or small planes of close nodes exactly and aggregate them
+whole; in large planes, and where nodes have few close ones, they aggregate close nodes alone.
 Source: Vaněk, Mandel & Brezina, Computing 56 (1996) 179-196; Adams, Brezina, Hu & Tuminaro, J. Comput.
 Phys. 188 (2003) 593-610 (Chebyshev smoothing).
 """

@@ -23,6 +23,7 @@ def numpy_alone(monkeypatch):
     """Compute with the reference of the kernels."""
     monkeypatch.setattr(polynomial_fit, "kernels", lambda name: None)
     monkeypatch.setattr(recovery, "kernels", lambda name: None)
+    monkeypatch.setattr("kratos_lite.assembly.patches.kernels", lambda name: None)
 
 
 def region_of(mesh, material=STEEL):
@@ -271,6 +272,26 @@ def test_kernels_agree_with_numpy(kind, n, request):
     request.getfixturevalue("numpy_alone")
     for one, other in zip(compiled, compared(scene), strict=True):
         assert np.abs(one - other).max() < 1e-10 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("kind", ["4N", "8N", "20N"])
+def test_patches_of_kernels_are_those_of_numpy(kind, request):
+    compiled = region_of(warped(kind, 4)).patches
+    request.getfixturevalue("numpy_alone")
+    reference = region_of(warped(kind, 4)).patches
+    assert compiled.wide.tolist() == reference.wide.tolist()
+    for one, other in ((compiled.elements, reference.elements), (compiled.of, reference.of)):
+        assert one.start.tolist() == other.start.tolist()
+        assert one.entries.tolist() == other.entries.tolist()
+    assert np.abs(compiled.weights - reference.weights).max() < 1e-14
+
+
+@pytest.mark.parametrize("kind", ["8N", "10N"])
+def test_error_of_a_product_is_the_square_where_both_are_one(kind):
+    result = scenes.manufactured(kind, 2).model.solve()
+    found, m = Recovery(result.mesh, result.groups), result.mesh.n_elements
+    squares, _ = found.squared_errors(result.u, m)
+    assert np.abs(found.products(result.u, 2 * result.u, m) - 2 * squares).max() < 1e-12 * squares.max()
 
 
 def test_fits_of_rank_deficient_samples_agree_with_numpy(request):

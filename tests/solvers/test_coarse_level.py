@@ -51,6 +51,38 @@ def test_stiffness_is_that_of_the_linear_mesh(suffix, linear):
     np.testing.assert_allclose(level.K.scipy().toarray(), want, rtol=0, atol=1e-14 * np.abs(want).max())
 
 
+@pytest.mark.parametrize("suffix", ["3D15N", "3D20N", "3D27N"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_long_cells_are_halved(suffix, axis):
+    if suffix == "3D15N" and axis < 2:
+        pytest.skip("wedges are halved between their triangles")
+    size, cells = np.ones(3), np.array([2, 2, 2])
+    size[axis] = 20.0
+    mesh = kl.box(size, cells, f"KinematicLinear{suffix}")
+    level = linear_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    P = interpolation(level, mesh.n_nodes)
+    np.testing.assert_allclose(P @ mesh.points[level.nodes], mesh.points, rtol=0, atol=1e-13)
+    cells[axis] *= 2
+    halves = kl.box(size, cells, f"KinematicLinear{LINEAR_OF[suffix]}")
+    groups = kl.Model(halves, STEEL).element_groups()
+    K = assemble_stiffness(halves.points, groups, Pattern(halves.n_nodes, [b.nodes for b in groups]))
+    same = np.array([np.abs(halves.points - x).max(axis=1).argmin() for x in mesh.points[level.nodes]])
+    assert len(np.unique(same)) == halves.n_nodes
+    dofs = (3 * same[:, None] + np.arange(3)).ravel()
+    want = K.scipy().toarray()[np.ix_(dofs, dofs)]
+    np.testing.assert_allclose(level.K.scipy().toarray(), want, rtol=0, atol=1e-13 * np.abs(want).max())
+
+
+def test_long_cells_are_halved_beside_others():
+    mesh = kl.box((2.0, 1.0, 1.0), (2, 1, 1), "KinematicLinear3D20N")
+    points = mesh.points.copy()
+    points[:, 0] = np.where(points[:, 0] > 1.0, 1.0 + 9.0 * (points[:, 0] - 1.0), points[:, 0])
+    level = linear_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
+    assert len(level.nodes) == 12 + 4
+    P = interpolation(level, len(points))
+    np.testing.assert_allclose(P @ points[level.nodes], points, rtol=0, atol=1e-13)
+
+
 def test_linear_meshes_have_no_level():
     for suffix in LINEAR_OF.values():
         assert linear_level(*scene(suffix)) is None
