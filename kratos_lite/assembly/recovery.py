@@ -64,7 +64,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer. Meth.
     Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points.  In linear
     hexahedra and wedges they lie at the center.  One degree above that of the element is fitted elsewhere,
-    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes.
+    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes, and
+    nothing of it in linear ones and linear pyramids.
     """
     shape, T, points = element.shape, None, rule.points
     corner = shape.linear() or shape
@@ -77,7 +78,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     N = np.array([shape.N(xi) for xi in points])
     degree = shape.degree + (0 if means or shape.cell == "tetrahedron" else 1)
     at_nodes, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (shape.nodes, points))
-    to_nodes = at_nodes @ np.linalg.pinv(at_samples) * (0.5 if shape.cell == "tetrahedron" else 1.0)
+    to_nodes = at_nodes @ np.linalg.pinv(at_samples)
+    to_nodes *= 0.0 if shape.degree == 1 else 0.5 if shape.cell == "tetrahedron" else 1.0
     return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)
 
 
@@ -109,6 +111,8 @@ class Region:
         fitted = self._fitted(ways, places, sampled)
         rest = np.zeros((len(self.nodes), 6))
         for way, cells, *both in zip(ways, self.cells, places, sampled, strict=True):
+            if not way.to_nodes.any():
+                continue
             X, value = (_means(v) if way.means else v for v in both)
             rest += _sum(fitted.residuals(X, value, way.to_nodes, cells, self.patches.of), cells, len(rest))
         return fitted.at(points[self.nodes], self.patches.of) + rest / self.held[:, None]
