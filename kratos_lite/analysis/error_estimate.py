@@ -126,8 +126,10 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
 
 def in_few_elements(shares: Array) -> bool:
     """Return whether the hundredth of elements with the largest shares holds much of their sum."""
-    worst = np.sort(shares)[-max(WORST, len(shares) // 100) :]
-    return len(shares) >= 20 * WORST and float(worst.sum()) > FOCUS * float(shares.sum())
+    if len(shares) < 20 * WORST:
+        return False
+    count = max(WORST, len(shares) // 100)
+    return float(np.partition(shares, -count)[-count:].sum()) > FOCUS * float(shares.sum())
 
 
 def _locks(group: ElementGroup) -> bool:

@@ -124,10 +124,12 @@ def _decayed(points: Array, owner: Ints, element: Ints, corners: Ints) -> Array:
     used[element] = True
     X = points[corners[used, :8]]
     center = X.mean(axis=1)
-    radius = np.sqrt(((X - center[:, None]) ** 2).sum(axis=(1, 2)) / 8)
-    at = (np.cumsum(used) - 1)[element]
-    distance = np.linalg.norm(center[at] - points[owner], axis=1)
-    return np.asarray(np.minimum(1.0, radius[at] / distance) ** DECAY)
+    radius = ((X - center[:, None]) ** 2).sum(axis=(1, 2)) / 8  # squared, as are the distances
+    at, distance = (np.cumsum(used) - 1)[element], np.zeros(len(owner))
+    for x, place in zip(center.T.copy(), points.T.copy(), strict=True):
+        distance += (x[at] - place[owner]) ** 2
+    share = np.minimum(1.0, radius[at] / distance)
+    return np.asarray(share ** (DECAY // 2))
 
 
 def outer_corners(cells: Cells, kind: Ints) -> tuple[Ints, Ints]:

@@ -19,6 +19,7 @@ from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import replace
 from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.dilatation import SplitMatrix, split
 from kratos_lite.solvers.linear_solver import DENSE_MAX
 from kratos_lite.typing import Array, Ints, Progress
 
@@ -96,13 +97,16 @@ class ConstrainedSystem:
 
     @cached_property
     def K(self) -> Any:
-        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``."""
+        """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
+
+        For the method ``amg`` it is a SplitMatrix where elements are nearly incompressible.
+        """
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
         skipped: set[str] = set()
         K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
-        return K
+        return split(K, self.points, self.groups, self.pattern) if self.method == "amg" else K
 
     @cached_property
     def norm(self) -> float:
@@ -111,13 +115,14 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> solvers.LinearSolver:
+        groups = self.K.groups if isinstance(self.K, SplitMatrix) else self.groups
         return solvers.LinearSolver(
             self.K,
             self.reduced,
             self.points,
             self.method,
             self.reason,
-            lambda: linear_level(self.points, self.groups, self._hanging),
+            lambda: linear_level(self.points, groups, self._hanging),
         )
 
     def solve(

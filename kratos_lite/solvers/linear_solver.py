@@ -16,6 +16,8 @@ from kratos_lite.records import record, replace
 from kratos_lite.solvers import direct, multigrid
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.dilatation import NEAR_HALF, SplitMatrix
+from kratos_lite.solvers.displacement_pressure import DisplacementPressure
 from kratos_lite.solvers.iteration import PATIENCE, ConvergenceForecast
 from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import choice
@@ -35,6 +37,8 @@ SUPERLU_LIMIT = 30_000
 """Up to this many unknowns SuperLU factorizes in less time than a slow iteration takes."""
 ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
+SPLIT = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
+"""Reason for the method ``displacement-pressure``."""
 
 
 @record(frozen=True)
@@ -44,7 +48,7 @@ class Solution:
     Attributes
     ----------
     x : (n,) float.
-    method, reason : ``dense``, ``direct`` or ``amg``, and why.
+    method, reason : ``dense``, ``direct``, ``amg`` or ``displacement-pressure``, and why.
     iterations : 0 for a factorization.
     backward_error : |b - A x| / (|A| |x| + |b|) in the maximum norm.
     """
@@ -91,7 +95,7 @@ class LinearSolver:
 
     Attributes
     ----------
-    K : full array for the method ``dense``, else blocks; (3n, 3n) in N/m.
+    K : full array for the method ``dense``, else blocks, or split for ``amg``; (3n, 3n) in N/m.
     reduced : the supports.
     points : (n, 3) m, from which multigrid knows the rigid modes.
     method, reason : as `choose` gives them.
@@ -146,14 +150,13 @@ class LinearSolver:
         """Solve for what the displacements `near` leave of the load, whose norm is `size`."""
         rest, rounding = float(np.linalg.norm(left)), 2 * float(np.finfo(float).eps)
         aim = max(tolerance * size, rounding * (self.norm * float(np.linalg.norm(near)) + size))
-        q, reason, iterations = np.zeros(len(left)), "", 0
+        found = Solution(np.zeros(len(left)), *self._iteration, 0, 0.0)
         if rest > aim:
             found = self._solve(left, aim / rest, progress, continued=True)
-            q, reason, iterations = found.x, found.reason, found.iterations
-        u = self.reduced.expand(q, near)
+        u = self.reduced.expand(found.x, near)
         off, scale = self.reduced.reduce(f - self.K @ u), self.norm * np.abs(u).max() + np.abs(f).max()
         error = float(np.abs(off).max() / scale) if scale > 0 else 0.0
-        return Solution(u, "direct" if reason else self.method, reason or self.reason, iterations, error)
+        return replace(found, x=u, backward_error=error)
 
     def _solve(
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool = False
@@ -163,14 +166,14 @@ class LinearSolver:
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
-            solution = self._iterate(b, tolerance, progress, continued)
-            if not solution.reason:
+            solution, why = self._iterate(b, tolerance, progress, continued)
+            if not why:
                 return solution
-            why = solution.reason
             if len(b) > FALLBACK_LIMIT:
                 raise SolveError(
-                    f"{why}; {len(b)} unknowns are too many to factorize instead; look for thin elements or "
-                    "ν near 0.5, use quadratic elements, or ask for solver='direct'"
+                    f"{why}; {len(b)} unknowns are too many to factorize instead; look for thin elements, "
+                    "for plain ones with ν near 0.5 (formulation='non_locking' takes others), or ask for "
+                    "solver='direct'"
                 )
         q = self.factors.solve(b)
         return Solution(q, "direct", why, 0, backward_error(self._sparse, q, b))
@@ -198,10 +201,14 @@ class LinearSolver:
         )
 
     @cached_property
-    def _blocks(self) -> BlockMatrix:
+    def _blocks(self) -> BlockMatrix | SplitMatrix:
         """The matrix on all components, constraints worked in, of which only the free ones count."""
-        T = self.reduced.T
-        return self.K if T is None else constrained(self.K, T, self.reduced.free)
+        T, free = self.reduced.T, self.reduced.free
+        if T is None:
+            return self.K
+        if isinstance(self.K, SplitMatrix):
+            return replace(self.K, A=constrained(self.K.A, T, free), D=self.K.D @ on_all(T, free))
+        return constrained(self.K, T, free)
 
     @cached_property
     def _free(self) -> Mask:
@@ -211,8 +218,16 @@ class LinearSolver:
 
     @cached_property
     def _multigrid(self) -> multigrid.Solver:
-        linear = self.linear_level() if self.linear_level else None
-        return multigrid.multigrid(self._blocks, self._free, self.points, linear)
+        linear, matrix = self.linear_level() if self.linear_level else None, self._blocks
+        if isinstance(matrix, SplitMatrix):
+            return DisplacementPressure(matrix, self._free, self.points, linear)
+        return multigrid.multigrid(matrix, self._free, self.points, linear)
+
+    @property
+    def _iteration(self) -> tuple[str, str]:
+        """The method that iterates, and the reason for it."""
+        split = isinstance(self.K, SplitMatrix)
+        return ("displacement-pressure", SPLIT) if split else ("amg", self.reason)
 
     @cached_property
     def norm(self) -> float:
@@ -223,8 +238,10 @@ class LinearSolver:
     def _norm(self) -> float:
         return self.norm if self._blocks is self.K else self._blocks.norm()
 
-    def _iterate(self, b: Array, tolerance: float, progress: Progress | None, continued: bool) -> Solution:
-        """Solve by multigrid; a solution with a reason is one that did not converge, and why."""
+    def _iterate(
+        self, b: Array, tolerance: float, progress: Progress | None, continued: bool
+    ) -> tuple[Solution, str]:
+        """Solve by multigrid; return also why it did not converge, or "" where it did."""
         free, rhs = self.reduced.free, np.zeros(len(self._free))
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorization.
@@ -237,7 +254,7 @@ class LinearSolver:
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"
         if forecast and forecast.stopped:
             stopped += f", at a rate that takes more than {PATIENCE}: a factorization is faster"
-        return Solution(q, "amg", "" if converged else stopped, iterations, error)
+        return Solution(q, *self._iteration, iterations, error), "" if converged else stopped
 
 
 def quick_to_factorize(unknowns: int) -> bool:
@@ -251,19 +268,23 @@ def quick_to_factorize(unknowns: int) -> bool:
 
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
-    from scipy.sparse import csr_array
-
-    n = K.shape[0]
-    pick = csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), n))
-    full = T @ pick
+    full = on_all(T, free)
     A = (full.T @ K.scipy().tocsr() @ full).tobsr((3, 3))
     A.sort_indices()
     return BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
 
 
+def on_all(T: Any, free: Ints) -> Any:
+    """Return T (N, q) with its columns in the places of the free components, (N, N)."""
+    from scipy.sparse import csr_array
+
+    q = len(free)
+    return T @ csr_array((np.ones(q), (np.arange(q), free)), shape=(q, T.shape[0]))
+
+
 def matrix_norm(A: Any) -> float:
     """Return the largest row sum of |A|."""
-    if isinstance(A, BlockMatrix):
+    if isinstance(A, (BlockMatrix, SplitMatrix)):
         return A.norm()
     return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
 

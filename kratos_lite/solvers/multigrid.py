@@ -47,7 +47,9 @@ class Solver(Protocol):
         """
 
 
-def multigrid(A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> Solver:
+def multigrid(
+    A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None
+) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,).
 
     Parameters

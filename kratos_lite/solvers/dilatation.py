@@ -1,0 +1,223 @@
+"""K of nearly incompressible elements, split into their dilatations and a stiffness without them.
+
+K = A + Dᵀ κ D, where D u are the dilatations that elements have, by orthonormal polynomials, κ is the bulk
+modulus that is taken off the material, and A is the stiffness with what is left of it: λ = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.gauss_point_fields import volumes
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import add_in_parts
+from kratos_lite.elements.formulations import bulk_over_shear
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.records import record, replace
+from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+NEAR_HALF = 40.0
+"""Bulk over shear modulus (ν = 0.488) from which the split pays: fewer iterations, but dearer ones."""
+KEPT = 2 / 3
+"""Bulk over shear modulus that A keeps: λ = 0."""
+
+
+@record(eq=False)
+class SplitMatrix:
+    """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied.
+
+    Attributes
+    ----------
+    A : the stiffness without most of the bulk modulus.
+    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
+    bulk : (p,) Pa, κ.
+    modulus : (p,) Pa, λ + 2μ in A.
+    means : (n, p) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
+        stiffest element there.
+    groups : the elements, with materials as in A.
+    """
+
+    A: BlockMatrix
+    D: csr_array
+    bulk: Array
+    modulus: Array
+    means: csr_array
+    groups: list[ElementGroup]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of rows and columns."""
+        return self.A.shape
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return K x of a vector (3n,)."""
+        return self.A @ x + self.D.T @ (self.bulk * (self.D @ x))
+
+    def norm(self) -> float:
+        """Return the largest row sum of |A| and |D|ᵀ κ |D|: no less than that of |K|."""
+        size = abs(self.D)
+        return self.A.norm() + float((size.T @ (self.bulk * size.sum(axis=1))).max(initial=0.0))
+
+    def scipy(self) -> csr_array:
+        """Return K as a scipy.sparse.csr_array."""
+        from scipy.sparse import diags_array
+
+        return (self.A.scipy().tocsr() + self.D.T @ diags_array(self.bulk) @ self.D).tocsr()
+
+
+def split(
+    K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern: Pattern
+) -> BlockMatrix | SplitMatrix:
+    """Return K as a SplitMatrix, which takes its memory, or K itself where no group is to be split.
+
+    Parameters
+    ----------
+    K : the stiffness matrix of the groups; where it is split, A takes its place.
+    points : (n, 3) m.
+    groups : the elements, in the order of the pattern.
+    pattern : of K.
+    """
+    if not any(map(is_split, groups)):
+        return K
+    left, parts = list(groups), []
+    for number, group in enumerate(groups):
+        if is_split(group):
+            taken = _moduli(group.material.C)[0] - KEPT * _moduli(group.material.C)[1]
+            left[number] = _softened(group, taken)
+            parts.append(_Part(group, taken, _longitudinal(left[number]), _dilatations(points, group)))
+            parts[-1].take_off(K, pattern, number)
+    bulk = np.concatenate([np.full(part.count, part.bulk) for part in parts])
+    modulus = np.concatenate([np.full(part.count, part.modulus) for part in parts])
+    means = _means(points, parts, _stiffest(len(points), left))
+    return SplitMatrix(K, _assembled(len(points), parts), bulk, modulus, means, left)
+
+
+def is_split(group: ElementGroup) -> bool:
+    """Return whether the dilatations of a group are known and its material is nearly incompressible.
+
+    Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
+    the modes take up the others.
+    """
+    known = group.element.has_kernels(*GEOMETRY, *MECHANICS) and group.strain_tables() is not None
+    return known and bulk_over_shear(group.material.C) > NEAR_HALF
+
+
+@record(eq=False)
+class _Part:
+    """A group, the bulk modulus taken off it, λ + 2μ that it keeps, and its dilatations (m, r, 3k)."""
+
+    group: ElementGroup
+    bulk: float
+    modulus: float
+    D: Array
+
+    @property
+    def count(self) -> int:
+        return self.D.shape[0] * self.D.shape[1]
+
+    def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
+        """Subtract Dᵀ κ D from the matrix."""
+        m, r, size = self.D.shape
+        by_axis = self.D.reshape(m, r, size // 3, 3).swapaxes(-1, -2).reshape(m, r, size)
+
+        def products(chunk: slice) -> Array:
+            D = by_axis[chunk]
+            return (-self.bulk * D.swapaxes(-1, -2) @ D).reshape(len(D), 3, size // 3, 3, size // 3)
+
+        for _ in add_in_parts(K.data, self.group, pattern, number, products):
+            pass
+
+
+def _dilatations(points: Array, group: ElementGroup) -> Array:
+    """Return the dilatations of elements, (m, r, 3k): their integrals with r orthonormal polynomials."""
+    tables = group.strain_tables()
+    assert tables is not None
+    linear = tables.C is None and tables.functions.shape[1] > 0
+    found = []
+    for chunk in group.chunks():
+        elements = group.at(points, chunk)
+        dV, gradients = elements._gauss
+        rows, weighted = np.swapaxes(gradients, -1, -2).reshape(*dV.shape, -1), dV[..., None]
+        volume = weighted.sum(axis=-2)[..., None]
+        if linear:
+            P = np.concatenate(
+                [np.ones_like(weighted), tables.functions @ elements.X / np.cbrt(volume)], axis=-1
+            )
+            moments = np.swapaxes(P * weighted, -1, -2)
+            found.append(np.linalg.solve(np.linalg.cholesky(moments @ P), moments @ rows))
+        else:
+            found.append(np.swapaxes(weighted, -1, -2) @ rows / np.sqrt(volume))
+    return np.concatenate(found)
+
+
+def _moduli(C: Array) -> tuple[float, float]:
+    """Return bulk and mean shear modulus of a C (6, 6)."""
+    shear = float(C.diagonal()[3:].mean())
+    return bulk_over_shear(C) * shear, shear
+
+
+def _longitudinal(group: ElementGroup) -> float:
+    """Return λ + 2μ of a group."""
+    bulk, shear = _moduli(group.material.C)
+    return bulk + 4 / 3 * shear
+
+
+def _stiffest(n_nodes: int, groups: Sequence[ElementGroup]) -> Array:
+    """Return the largest λ + 2μ of the elements at each node, (n,)."""
+    found = np.ones(n_nodes)
+    for group in sorted(groups, key=_longitudinal):
+        found[group.nodes] = _longitudinal(group)
+    return found
+
+
+def _softened(group: ElementGroup, taken: float) -> ElementGroup:
+    """Return a group whose material has a smaller bulk modulus."""
+    C = group.material.C.copy()
+    C[:3, :3] -= taken
+    return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
+
+
+def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
+    """Return D (p, 3n) of the dilatations of each group."""
+    from scipy.sparse import csr_array, vstack
+
+    rows = []
+    for part in parts:
+        (m, r, size), D = part.D.shape, part.D
+        dofs = (3 * part.group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
+        columns = np.repeat(dofs, r, axis=1).ravel()
+        starts = np.arange(0, D.size + 1, size, dtype=np.int32)
+        rows.append(csr_array((D.ravel(), columns, starts), shape=(m * r, 3 * n_nodes)))
+    return rows[0] if len(rows) == 1 else vstack(rows, format="csr")
+
+
+def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:
+    """Return the means (n, p) at corner nodes; see `SplitMatrix`.
+
+    The first polynomial of an element is 1 / √volume, and a corner has its share of the volume.
+    """
+    from scipy.sparse import csr_array, hstack
+
+    columns, mass = [], np.zeros(len(points))
+    for part in parts:
+        corners = part.group.nodes[:, : part.group.element.shape.corners]
+        (m, r, _), k = part.D.shape, corners.shape[1]
+        volume = np.repeat(volumes(points, part.group).sum(axis=1), k)
+        mass += np.bincount(corners.ravel(), volume / k, len(points))
+        places = corners.ravel(), np.repeat(r * np.arange(m), k)
+        columns.append(csr_array((np.sqrt(volume) / k, places), shape=(len(points), m * r)))
+    means = hstack(columns, format="csr")
+    scale = np.sqrt(np.where(mass > 0, mass, 1.0) * stiffest)
+    means.data /= np.repeat(scale, np.diff(means.indptr))
+    return means

@@ -1,0 +1,231 @@
+"""Displacements and a pressure in each nearly incompressible element, found together.
+
+With p = κ D u the equations (A + Dᵀ κ D) u = b are
+
+    [A  Dᵀ  ] [u]   [b]
+    [D  -1/κ] [p] = [0],
+
+which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
+p = -S⁻¹ r_p and one multigrid cycle for A u = r_u - Dᵀ p.  S ≈ D A⁻¹ Dᵀ + 1/κ is
+
+    S = D diag(A)⁻¹ Dᵀ + (means at corner nodes)² / (λ + 2μ) + 1/κ:
+
+the second term holds for smooth pressures, the first one for those that change sign from element to element.
+Some of these hardly act on the nodes (checkerboards): no element needs to be stable.
+
+Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (2014), chapter 4.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kratos_lite.solvers import multigrid
+from kratos_lite.solvers.blas import one_thread
+from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers.dilatation import SplitMatrix
+from kratos_lite.solvers.iteration import Share
+from kratos_lite.typing import Array, Mask, Progress
+
+DIRECTIONS = 60
+"""Iterations after which they start anew from what is left: their directions are kept until then."""
+REDUCED = 1e-10
+"""Share of the residual at which they start anew, as rounding leaves no more."""
+MAX_ITERATIONS = 400
+"""Iterations after which it does not converge."""
+INNER, INNER_MAX = 0.02, 120
+"""Share of the energy at which a solution with S ends, and its most iterations."""
+
+
+class DisplacementPressure:
+    """What solves K u = b for one right side after another, where K is split.
+
+    Attributes
+    ----------
+    levels : unknowns of each level of the multigrid for A.
+    """
+
+    def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
+        self._K, self._fixed = K, ~free
+        self._cycle = multigrid.multigrid(K.A, free, points, linear)
+        self.levels: list[int] = self._cycle.levels
+        inverse = _diagonal_inverse(K, free)
+        size = np.concatenate([np.sqrt(np.einsum("nii->ni", inverse)).ravel(), np.sqrt(K.modulus)])
+        self._weight = size  # residuals are measured by the energy that they stand for
+        self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
+        self._schur = _Schur(K, inverse, np.asarray(free.reshape(-1, 3).any(axis=1)))
+
+    def solve(
+        self,
+        b: Array,
+        tolerance: float,
+        norm: float,
+        progress: Progress | None,
+        go_on: multigrid.GoOn | None = None,
+    ) -> tuple[Array, int, bool]:
+        """Return u, iterations and success."""
+        with one_thread():
+            return self._solve(b, tolerance, norm, Share(tolerance, progress) if progress else None, go_on)
+
+    def _solve(
+        self, b: Array, tolerance: float, norm: float, share: Share | None, go_on: multigrid.GoOn | None
+    ) -> tuple[Array, int, bool]:
+        n, norm_b = len(b), float(np.linalg.norm(b))
+        x = np.zeros(len(self._weight))
+        if norm_b == 0:
+            return x[:n], 0, True
+        r = self._residual(b, x)
+        first = float(np.linalg.norm(r))
+        aim, before, space = tolerance * first, float("inf"), _Directions(r)
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            z = self._precondition(space.last * self._inverse_weight).astype(np.float32)
+            estimate = space.extend(z, self._weight * self._product(z.astype(float)))
+            stop = bool(go_on and not go_on(estimate / first))
+            if share:
+                share(estimate / first)
+            exhausted = space.full or estimate <= REDUCED * space.start or iteration == MAX_ITERATIONS
+            if not (stop or exhausted or estimate <= aim):
+                continue
+            found = space.added_to(x)
+            r = self._residual(b, found)
+            left = self._left(r)
+            rounding = 2 * np.finfo(float).eps * (norm * float(np.linalg.norm(found[:n])) + norm_b)
+            limit = max(float(rounding), tolerance * norm_b)
+            if left <= limit or stop or (exhausted and left > before / 2):
+                break
+            aim = estimate * min(limit / left, 0.5)
+            if exhausted:
+                x, before, space = found, left, _Directions(r)
+        if share and left <= limit:
+            share.finish()
+        return found[:n], iteration, left <= limit
+
+    def _product(self, x: Array) -> Array:
+        """Return the product of the matrix of displacements and pressures with both."""
+        K, n = self._K, self._K.shape[0]
+        u, p = x[:n], x[n:]
+        forces = K.A @ u + K.D.T @ p
+        forces[self._fixed] = 0.0
+        return np.concatenate([forces, K.D @ u - p / K.bulk])
+
+    def _residual(self, b: Array, x: Array) -> Array:
+        """Return the weighted residual."""
+        r = -self._product(x)
+        r[: len(b)] += b
+        return self._weight * r
+
+    def _left(self, r: Array) -> float:
+        """Return |b - K u|: the pressures that the displacements have are not quite those found."""
+        r = r * self._inverse_weight
+        n = self._K.shape[0]
+        forces = r[:n] + self._K.D.T @ (self._K.bulk * r[n:])
+        forces[self._fixed] = 0.0
+        return float(np.linalg.norm(forces))
+
+    def _precondition(self, r: Array) -> Array:
+        n = self._K.shape[0]
+        p = -self._schur.solve(r[n:])
+        forces = r[:n] - self._K.D.T @ p
+        forces[self._fixed] = 0.0
+        return np.concatenate([self._cycle.precondition(forces), p])
+
+
+class _Directions:
+    """Directions Z and their products with the matrix, of which the residual is made as small as can be.
+
+    The preconditioner may differ from step to step, as it does.  Source: Saad, SIAM J. Sci. Comput. 14 (1993)
+    461-469.
+    """
+
+    def __init__(self, r: Array) -> None:
+        self.start = float(np.linalg.norm(r))
+        self._V = np.empty((DIRECTIONS + 1, len(r)))
+        self._Z = np.empty((DIRECTIONS, len(r)), dtype=np.float32)  # as the multigrid cycle gives them
+        self._H = np.zeros((DIRECTIONS + 1, DIRECTIONS))
+        self._V[0] = r / (self.start or 1.0)
+        self._count = 0
+        self._y = np.zeros(0)
+
+    @property
+    def last(self) -> Array:
+        """The last of the orthonormal vectors."""
+        return self._V[self._count]
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for more directions."""
+        return self._count == DIRECTIONS
+
+    def extend(self, z: NDArray[np.float32], w: Array) -> float:
+        """Take a direction and its product; return the smallest norm that the residual can have."""
+        from scipy.linalg.blas import daxpy
+
+        k = self._count
+        self._Z[k] = z
+        for j in range(k + 1):
+            self._H[j, k] = self._V[j] @ w
+            w = daxpy(self._V[j], w, a=-self._H[j, k])
+        self._H[k + 1, k] = np.linalg.norm(w)
+        self._V[k + 1] = w / (self._H[k + 1, k] or 1.0)
+        self._count = k + 1
+        H, goal = self._H[: k + 2, : k + 1], self.start * np.eye(k + 2)[0]
+        self._y = np.linalg.lstsq(H, goal, rcond=None)[0]
+        return float(np.linalg.norm(goal - H @ self._y))
+
+    def added_to(self, x: Array) -> Array:
+        """Return x changed along the directions so that the residual is smallest."""
+        found = x.copy()
+        for factor, z in zip(self._y, self._Z, strict=False):
+            found += factor * z
+        return found
+
+
+class _Schur:
+    """S in single precision, scaled to a diagonal of 1."""
+
+    def __init__(self, K: SplitMatrix, inverse: Array, loose: Mask) -> None:
+        from scipy.sparse import bsr_array, diags_array
+
+        n = len(inverse)
+        blocks = bsr_array((inverse, np.arange(n), np.arange(n + 1)), shape=K.shape)
+        means = diags_array(loose * 1.0) @ K.means  # around held nodes checkerboards have means, too
+        S = (K.D @ blocks.tocsr()) @ K.D.T + means.T @ means + diags_array(1 / K.bulk)
+        self._scale = 1 / np.sqrt(S.diagonal())
+        scale = diags_array(self._scale)
+        self._S: Any = (scale @ S @ scale).astype(np.float32).tocsr()
+
+    def solve(self, r: Array) -> Array:
+        """Return S⁻¹ r, roughly, by conjugate gradients."""
+        r = self._scale * r
+        size = float(np.abs(r).max(initial=0.0))
+        if size == 0:
+            return r
+        x, r = np.zeros(len(r), dtype=np.float32), (r / size).astype(np.float32)
+        p, rr = r.copy(), float(r @ r)
+        end = INNER * rr
+        for _ in range(INNER_MAX):
+            Sp = self._S @ p
+            alpha = np.float32(rr / float(p @ Sp))
+            x += alpha * p
+            r -= alpha * Sp
+            old, rr = rr, float(r @ r)
+            if rr <= end:
+                break
+            p *= np.float32(rr / old)
+            p += r
+        return self._scale * (size * x.astype(float))
+
+
+def _diagonal_inverse(K: SplitMatrix, free: Mask) -> Array:
+    """Return the inverses (n, 3, 3) of the diagonal blocks of A, zero where components are not free."""
+    mask = free.reshape(-1, 3)
+    diagonal = K.A.diagonal_blocks()
+    rows = K.A.indices[diagonal]
+    both = mask[rows][:, :, None] & mask[rows][:, None, :]
+    blocks = np.where(both, K.A.data[diagonal], np.eye(3))
+    out = np.zeros((len(mask), 3, 3))
+    out[rows] = np.linalg.inv(blocks) * both
+    return out

@@ -1,0 +1,275 @@
+"""Displacements and pressures of nearly incompressible elements: few iterations, and the exact solution."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.assembly.stiffness import assemble_dense
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.native import kernels
+from kratos_lite.solvers import dilatation, multigrid
+from kratos_lite.solvers import linear_solver as equations
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.dilatation import SplitMatrix
+from kratos_lite.solvers.displacement_pressure import MAX_ITERATIONS
+
+CELLS = {
+    "EnhancedStrain3D8N": 6,
+    "BBar3D8N": 6,
+    "BBar3D10N": 3,
+    "BBar3D13N": 3,
+    "BBar3D15N": 3,
+    "BBar3D20N": 4,
+    "BBar3D27N": 3,
+}
+LIMIT = {"BBar3D13N": 60, "BBar3D15N": 65, "BBar3D20N": 65}
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
+
+
+def rubber(nu=0.4999, E=3e6):
+    return kl.Isotropic3D(E=E, nu=nu, density=1100.0)
+
+
+def body(element, material=None, cells=None, size=(1.0, 0.9, 1.1), face="z-"):
+    """Return a box under its own weight, which acts in no special direction, clamped at a side."""
+    n = cells or CELLS[element]
+    cells = n if isinstance(n, tuple) else (n, n, n)
+    model = kl.Model(kl.box(size, cells, element), material or rubber())
+    model.fix(face)
+    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    return model
+
+
+def system_of(model):
+    return ConstrainedSystem(
+        model.mesh.points, model.element_groups(), model.supports.constraint_map, solver="amg"
+    )
+
+
+def centers(model):
+    return np.vstack([model.mesh.points[block.nodes].mean(axis=1) for block in model.mesh.blocks])
+
+
+def moved(mesh, by=0.05):
+    """Return a mesh whose inner nodes are moved along smooth fields: no side stays parallel to another."""
+    X = mesh.points
+    low, high = X.min(axis=0), X.max(axis=0)
+    x = (X - low) / (high - low)
+    change = by * np.prod(np.sin(np.pi * x), axis=1, keepdims=True) * np.sin(3 * x[:, [1, 2, 0]] + 1)
+    return kl.Mesh(X + change, mesh.blocks)
+
+
+def check(model, limit, rtol=1e-7):
+    """Solve by pressures in few iterations, and compare with a factorization of the same matrix."""
+    found, exact = model.solve("amg"), model.solve("direct")
+    assert found.report.solver == "displacement-pressure", found.report.reason
+    assert found.report.iterations <= limit
+    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=rtol * np.abs(exact.u).max())
+    return found
+
+
+@pytest.fixture(autouse=True)
+def to_the_tolerance(monkeypatch):
+    """Few unknowns are iterated to round-off otherwise, like a factorization."""
+    monkeypatch.setattr(equations, "ROUND_OFF", 1e-8)
+
+
+# ---- iterations ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("nu", [0.49, 0.499, 0.4999, 0.499999])
+@pytest.mark.parametrize("element", CELLS)
+def test_iterations_do_not_grow_towards_incompressibility(element, nu):
+    model = body(element, rubber(nu))
+    found = model.solve("amg", tolerance=1e-8)
+    assert found.report.solver == "displacement-pressure", found.report.reason
+    assert found.report.iterations <= LIMIT.get(element, 45)
+    exact = model.solve("direct").u
+    # both are off by rounding times the condition of K, which ν makes large
+    np.testing.assert_allclose(found.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (5, 13)), ("BBar3D27N", (3, 7))])
+def test_iterations_hardly_grow_with_the_mesh(element, sizes):
+    few, many = (body(element, cells=n).solve("amg", tolerance=1e-8).report.iterations for n in sizes)
+    assert many <= few + 12
+
+
+@pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
+def test_a_beam(element):
+    n = CELLS[element] // 2 + 1
+    check(body(element, cells=(4 * n, n, n), size=(8.0, 1.0, 1.0), face="x-"), 60, rtol=1e-6)
+
+
+@pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
+def test_a_confined_body(element):
+    model = body(element)
+    for face in ("x-", "x+", "y-", "y+"):
+        model.fix(face)
+    check(model, 60)
+
+
+@pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D20N"])
+def test_distorted_cells(element):
+    model = kl.Model(moved(body(element).mesh), rubber())
+    model.fix("z-")
+    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    check(model, LIMIT.get(element, 45))
+
+
+# ---- materials -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
+@pytest.mark.parametrize("inside", ["rubber", "steel"])
+def test_rubber_and_steel(element, inside):
+    materials = (STEEL, rubber()) if inside == "rubber" else (rubber(), STEEL)
+    model = body(element, materials[0])
+    model.assign(materials[1], np.flatnonzero(np.abs(centers(model) - 0.5).max(axis=1) < 0.3))
+    check(model, 75)
+
+
+def test_two_rubbers():
+    model = body("EnhancedStrain3D8N")
+    model.assign(rubber(E=3e8), np.flatnonzero(centers(model)[:, 0] > 0.5))
+    check(model, 50)
+
+
+def test_a_rubber_with_fibers_is_nearly_incompressible():
+    fibers = kl.Orthotropic3D(
+        E_x=9e6, E_y=3e6, E_z=3e6, nu_xy=0.4999, nu_yz=0.833, nu_xz=0.4999, G_xy=1e6, G_yz=1e6, G_xz=1e6,
+        density=1100.0,
+    )  # fmt: skip
+    check(body("BBar3D27N", fibers), 60)
+
+
+def test_compressible_bodies_have_no_pressures():
+    assert body("BBar3D27N", rubber(0.45)).solve("amg").report.solver == "amg"
+
+
+# ---- the matrix ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_the_split_matrix_is_the_stiffness(element):
+    cells = (2, 2, 1)
+    model = kl.Model(moved(kl.box((1.0, 1.0, 1.0), cells, element)), rubber())
+    model.fix("z-")
+    system, groups = system_of(model), model.element_groups()
+    exact = assemble_dense(model.mesh.points, groups)
+    assert isinstance(system.K, SplitMatrix)
+    x = np.random.default_rng(0).standard_normal(len(exact))
+    size = np.abs(exact).sum(axis=1).max()
+    np.testing.assert_allclose(system.K @ x, exact @ x, rtol=0, atol=1e-13 * size)
+    np.testing.assert_allclose(system.K.scipy().toarray(), exact, rtol=0, atol=1e-13 * size)
+    assert size * (1 - 1e-12) <= system.K.norm() <= 2 * size
+
+
+@pytest.mark.parametrize("element", CELLS)
+def test_what_is_left_is_that_of_an_ordinary_material(element):
+    model = kl.Model(moved(kl.box((1.0, 1.0, 1.0), (2, 2, 1), element)), rubber(0.49999))
+    A = system_of(model).K.A.scipy().toarray()
+    shear = 3e6 / (2 * 1.49999)
+    ordinary = assemble_dense(
+        model.mesh.points, kl.Model(model.mesh, kl.Isotropic3D(E=2 * shear, nu=0.0)).element_groups()
+    )
+    if element.startswith("BBar") and element != "BBar3D10N":  # the others depend on the material
+        np.testing.assert_allclose(A, ordinary, rtol=0, atol=1e-9 * np.abs(ordinary).max())
+    values = np.linalg.eigvalsh(A)
+    assert values[0] > -1e-9 * values[-1]
+    assert values[-1] < 3 * np.linalg.eigvalsh(ordinary)[-1]
+
+
+def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():
+    with ELEMENTS.temporary():
+
+        class Own8N(kl.elements.EnhancedStrain3D8N):
+            def B_at_gauss_points(self, C=None):
+                return 1.01 * super().B_at_gauss_points(C)
+
+        assert not dilatation.is_split(body("Own8N", cells=3).element_groups()[0])
+
+
+# ---- constraints, right sides, ways ----------------------------------------------------------------------
+
+
+def test_multi_point_constraints():
+    model = body("EnhancedStrain3D8N", cells=4)
+    top = model.mesh.nodes("z+")
+    for node in top[1:]:
+        model.constrain((int(node), "z"), {(int(top[0]), "z"): 1.0})
+    check(model, 50)
+
+
+def test_prescribed_displacements():
+    model = body("BBar3D20N", cells=3)
+    model.fix("z+", value=(0.01, 0.0, -0.05))
+    found = check(model, 65)
+    assert found.report.backward_error < 1e-11
+
+
+def test_a_system_is_prepared_once_for_many_right_sides(monkeypatch):
+    made = []
+    original = multigrid.multigrid
+    monkeypatch.setattr(multigrid, "multigrid", lambda *given: made.append(1) or original(*given))
+    analysis = body("EnhancedStrain3D8N").static("amg")
+    direct = body("EnhancedStrain3D8N").static("direct")
+    for g in ((0.0, 0.0, -9.81), (5.0, 0.0, 0.0)):
+        found, exact = (one.solve(kl.Gravity(g)).u for one in (analysis, direct))
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+    assert made == [1]
+
+
+def test_without_kernels(monkeypatch):
+    monkeypatch.setattr(multigrid, "kernels", lambda name: None)
+    check(body("EnhancedStrain3D8N", cells=5), 50)
+
+
+@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+def test_results_do_not_depend_on_the_number_of_threads():
+    results = []
+    for threads in (1, 2, 3):
+        for name in ("multigrid", "sparse", "stiffness"):
+            kernels(name).set_threads(threads)
+        results.append(body("EnhancedStrain3D8N").solve("amg").u)
+    for name in ("multigrid", "sparse", "stiffness"):
+        kernels(name).set_threads(2)
+    for other in results[1:]:
+        np.testing.assert_array_equal(other, results[0])
+
+
+def test_progress_grows_to_its_end():
+    told = []
+    body("BBar3D27N").solve("amg", progress=lambda phase, share: told.append((phase, share)))
+    shares = [share for phase, share in told if phase == "solve"]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+
+
+def test_no_load_has_no_displacement():
+    system = system_of(body("EnhancedStrain3D8N", cells=4))
+    u, solution = system.solve(np.zeros((125, 3)))
+    assert not u.any()
+    assert solution.iterations == 0
+
+
+# ---- where it does not converge --------------------------------------------------------------------------
+
+
+def test_a_factorization_takes_over(monkeypatch):
+    monkeypatch.setattr("kratos_lite.solvers.displacement_pressure.MAX_ITERATIONS", 5)
+    model = body("EnhancedStrain3D8N", cells=5)
+    found = model.solve("amg")
+    assert found.report.solver == "direct"
+    assert found.report.reason == "multigrid stopped after 5 iterations short of 1e-10"
+    np.testing.assert_allclose(found.u, model.solve("direct").u, rtol=0, atol=1e-9 * np.abs(found.u).max())
+    assert MAX_ITERATIONS > 5
+
+
+def test_too_many_unknowns_to_factorize_are_refused(monkeypatch):
+    monkeypatch.setattr("kratos_lite.solvers.displacement_pressure.MAX_ITERATIONS", 5)
+    monkeypatch.setattr(equations, "FALLBACK_LIMIT", 100)
+    with pytest.raises(
+        kl.SolveError, match=r"too many to factorize instead; look for thin elements, for plain"
+    ):
+        body("EnhancedStrain3D8N", cells=5).solve("amg")
