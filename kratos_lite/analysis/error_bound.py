@@ -37,7 +37,10 @@ def error_bound(origin: Origin, groups: Sequence[ElementGroup], u: Array, energy
     model = origin.model
     mesh, supports = model.mesh, model.supports
     if supports.constraints:
-        raise ModelError("the bound of the error takes no multi-point constraints; ask for method='recovery'")
+        raise ModelError(
+            "the bound of the error takes neither multi-point constraints nor hanging nodes; ask for "
+            "method='recovery'"
+        )
     for group in groups:
         if not group.element.inherits(*GEOMETRY, *STRESS):
             raise ModelError(

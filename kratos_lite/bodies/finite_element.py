@@ -57,7 +57,7 @@ class FiniteElementBody(Deformable):
     Raises
     ------
     MeshError, ModelError, InputError
-        If the mesh is inverted, nodes belong to no element, or there is no mass.
+        If the mesh is inverted, nodes hang or belong to no element, or there is no mass.
 
     Examples
     --------
@@ -85,6 +85,11 @@ class FiniteElementBody(Deformable):
     ) -> None:
         kind = FORMULATIONS[formulation]
         self.groups = elements_of(mesh, material, kind.unnamed)
+        if mesh.hanging is not None:
+            raise ModelError(
+                f"the mesh of a body has {len(mesh.hanging)} hanging nodes, whose constraints a body does "
+                "not take; give it a mesh that is as fine everywhere, or take a model"
+            )
         lost = mesh.node_ids[~mesh.used_nodes()]
         if len(lost):
             raise ModelError(

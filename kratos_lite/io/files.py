@@ -13,6 +13,7 @@ from kratos_lite.validation import path_of
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
+    from kratos_lite.io.formats.document import Document
     from kratos_lite.io.settings import Settings
     from kratos_lite.mesh import Mesh
 
@@ -151,15 +152,16 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         document = document_from(thing)
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
-        return write_document(path, Document(_with_named_sides(thing)) if isinstance(thing, Mesh) else thing)
+        return write_document(path, _document_of(thing) if isinstance(thing, Mesh) else thing)
     raise InputError(f"a Result, State, Model or Mesh can be written; got {type(thing).__name__}")
 
 
-def _with_named_sides(mesh: Mesh) -> Mesh:
-    """Return a mesh whose parts for the sides, such as ``z+`` of a box, have names for files."""
-    from kratos_lite.io.kratos.to_document import kratos_name
+def _document_of(mesh: Mesh) -> Document:
+    """Return a mesh with names for files of its sides, such as ``z+`` of a box, and hanging nodes tied."""
+    from kratos_lite.io.formats.document import Document
+    from kratos_lite.io.kratos.to_document import constraints_of, kratos_name
     from kratos_lite.mesh import SIDES
+    from kratos_lite.model.supports import hanging_constraints
 
-    return mesh.replace(
-        parts={kratos_name(name) if name in SIDES else name: p for name, p in mesh.parts.items()}
-    )
+    parts = {kratos_name(name) if name in SIDES else name: p for name, p in mesh.parts.items()}
+    return Document(mesh.replace(parts=parts), constraints=constraints_of(mesh, hanging_constraints(mesh)))

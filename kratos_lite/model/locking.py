@@ -38,7 +38,7 @@ QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexa
 
 def check_locking(mesh: Mesh, groups: Sequence[ElementGroup], supports: Supports, faces: Faces) -> list[str]:
     """Return a warning for each kind of elements that will lock, with the better choice."""
-    warnings = [*_near_half(groups), *_tetrahedra(groups)]
+    warnings = [*_near_half(groups), *_with_apex(groups)]
     bending = [group for group in groups if _has_two_sides(group.element)]
     if bending:
         walls = _walls(OppositeFaces(mesh, faces), bending, supports.fixed)
@@ -63,9 +63,19 @@ def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     return [f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); take {better}"]
 
 
-def _tetrahedra(groups: Sequence[ElementGroup]) -> list[str]:
-    names = {g.element.__name__ for g in groups if is_own(g.element) and len(g.element.nodes) == 4}
-    return [f"{name} locks in bending (comes out far too stiff); take KinematicLinear3D10N" for name in names]
+def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
+    """Warn of linear tetrahedra, and of linear pyramids unless they are few, between other elements."""
+    counts: dict[type[KinematicLinear], int] = {}
+    for group in groups:
+        if is_own(group.element) and len(group.element.nodes) in (4, 5):
+            counts[group.element] = counts.get(group.element, 0) + len(group)
+    half = sum(map(len, groups)) / 2
+    return [
+        f"{kind.__name__} locks in bending (comes out far too stiff); take KinematicLinear"
+        f"{QUADRATIC[kind.shape.cell]}"
+        for kind, count in counts.items()
+        if kind.shape.cell == "tetrahedron" or count > half
+    ]
 
 
 def better_element(kind: type[KinematicLinear], family: str = "KinematicLinear") -> str:

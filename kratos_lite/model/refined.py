@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TypeVar
 
 import numpy as np
@@ -53,7 +54,8 @@ def refined(structure: S, finer: Finer) -> S:
         raise ModelError(
             "a model whose material moves through the mesh cannot be carried over to a finer one"
         )
-    new = type(structure)(finer.mesh)
+    new = copy(structure)  # a class of a user may have a constructor of its own
+    Structure.__init__(new, finer.mesh)
     try:
         new.formulation = structure.formulation
     except InputError:

@@ -123,6 +123,11 @@ class Supports:
         """
         rows, value = fixing.rows, fixing.value
         stays = ~self._hangs[rows]
+        if len(rows) and not stays.any():
+            raise ModelError(
+                f"cannot fix {fixing.axes}: the nodes, such as {self.mesh.node_ids[rows[0]]}, hang on an "
+                "edge or face of a larger element and follow its nodes; fix these"
+            )
         if callable(value):
             self.prescribe_motion(rows[stays], fixing.axes, value, fixing.override)
         else:

@@ -86,6 +86,12 @@ def test_wedges_and_tetrahedra_are_pointed_to_quadratic_ones():
     assert tetrahedron.endswith("take KinematicLinear3D10N")
 
 
+def test_pyramids_are_warned_of_unless_they_are_few():
+    (text,) = [t for t in warnings((1, 1, 0.01), (4, 4, 1), "KinematicLinear3D5N") if "3D5N" in t]
+    assert "locks in bending" in text
+    assert "take KinematicLinear3D13N" in text
+
+
 def test_mean_dilatation_with_one_brick_through_the_thickness_bends_wrongly():
     (text,) = warnings((10, 1, 1), (10, 1, 1), "BBar3D8N")
     assert "alone through a thickness" in text

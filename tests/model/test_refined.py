@@ -153,3 +153,42 @@ def test_rules_follow_if_the_shape_stays():
     one.use_rule(kl.KinematicLinear3D8N.rule, [1])
     with pytest.raises(kl.ModelError, match="does not fit those of another shape"):
         refined(one, raised(one.mesh))
+
+
+def test_a_model_of_a_class_with_a_constructor_of_its_own_is_refined():
+    class Bar(kl.Model):
+        def __init__(self, length):
+            super().__init__(kl.box((length, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.3))
+            self.length = length
+
+    finer = refined(Bar(3.0), refine(Bar(3.0).mesh))
+    assert type(finer) is Bar
+    assert finer.length == 3.0
+    assert finer.mesh.n_elements == 16
+
+
+def test_a_support_of_hanging_nodes_alone_is_refused():
+    model = kl.Model(refine(kl.box(cells=(2, 1, 1)), [0]).mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+    with pytest.raises(kl.ModelError, match="hang on an edge or face of a larger element"):
+        model.fix(model.mesh.hanging.nodes[:1], "y")
+
+
+def test_a_body_of_a_mesh_with_hanging_nodes_is_refused():
+    mesh = refine(kl.box(cells=(2, 1, 1)), [0]).mesh
+    with pytest.raises(kl.ModelError, match="5 hanging nodes, whose constraints a body does not take"):
+        kl.FiniteElementBody(mesh, kl.Isotropic3D(E=1e6, nu=0.3, density=1.0))
+
+
+@pytest.mark.parametrize("kind", ["8N", "10N", "20N"])
+def test_hanging_nodes_are_written_as_constraints_or_said_to_be_left_out(kind, tmp_path):
+    mesh = refine(kl.box((2, 1, 1), (2, 1, 1), f"KinematicLinear3D{kind}"), [0]).mesh
+    model = kl.Model(mesh, kl.Isotropic3D(E=1e6, nu=0.3))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0.0, 0.0, 1.0)))
+    kl.write(tmp_path / "model.mdpa", model)
+    u = model.solve().u
+    assert np.abs(kl.read(tmp_path / "model.mdpa").solve().u - u).max() < 1e-9 * np.abs(u).max()
+    kl.write(tmp_path / "mesh.mdpa", mesh)
+    assert len(kl.read(tmp_path / "mesh.mdpa").supports.constraints) == 3 * len(mesh.hanging)
+    (note,) = kl.write(tmp_path / "mesh.vtu", mesh)
+    assert "constraints" in note

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +17,7 @@ from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import Gravity, TimeDependentLoad
 from kratos_lite.records import names_of, replace
 from kratos_lite.shapes import Point1
+from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Ints
 
 KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}
@@ -43,7 +45,9 @@ def document_from(model: Model) -> Document:
     conditions, data = _point_loads(mesh, forces, next(iter(properties), 0))
     written = mesh.replace(blocks=blocks, conditions=conditions, parts=_parts(mesh))
     data = [*_fixed(model), *start, *data]
-    document = Document(written, properties, nodal_data=data, constraints=_constraints(model))
+    document = Document(
+        written, properties, nodal_data=data, constraints=constraints_of(mesh, model.supports.constraints)
+    )
     if mesh.conditions:
         document.notes.append(Note(0, "conditions are replaced by the nodal forces of their loads"))
     return document
@@ -161,11 +165,13 @@ def kratos_name(part: str) -> str:
     return part.replace("+", "_plus").replace("-", "_minus")
 
 
-def _constraints(model: Model) -> list[Constraint]:
+def constraints_of(mesh: Mesh, constraints: Iterable[MultiPointConstraint]) -> list[Constraint]:
+    """Return constraints of a mesh as those of a file."""
+
     def dof(number: int) -> tuple[int, str]:
-        return int(model.mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
+        return int(mesh.node_ids[number // 3]), f"DISPLACEMENT_{'XYZ'[number % 3]}"
 
     return [
         Constraint(i, dof(each.slave), tuple(map(dof, each.masters)), each.weights, each.constant)
-        for i, each in enumerate(model.supports.constraints, start=1)
+        for i, each in enumerate(constraints, start=1)
     ]
