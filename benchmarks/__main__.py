@@ -1,6 +1,6 @@
 """Measure: ``python -m benchmarks quick``, or ``full``, or one set by its name.
 
-Sets: ``kratos error growth assembly parse skips cube1 motion ale``.
+Sets: ``kratos error growth stall assembly parse skips cube1 motion ale``.
 
 ``report`` makes docs/benchmarks.md and its picture from the results kept; ``references`` makes the energies
 of the scenes without an exact field.  See benchmarks/README.md.
@@ -59,6 +59,12 @@ def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
     return sets.growth_runs(options.programs, options.cells or sets.GROWTH, options.elements or ("8N",))
 
 
+def stall(options: argparse.Namespace, folder: Path) -> list[Run]:
+    """Return the scenes on which multigrid may stall."""
+    sizes = {kind: options.cells[0] for kind in sets.STALLING} if options.cells else None
+    return sets.stall_runs(options.programs, sizes)
+
+
 def assembly(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return the assembly alone."""
     sizes = {kind: options.cells[0] for kind in scenes.KINDS} if options.cells else None
@@ -78,6 +84,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "kratos": kratos,
     "error": error,
     "growth": growth,
+    "stall": stall,
     "assembly": assembly,
     "parse": lambda options, folder: sets.parse_runs(options.programs, options.cells or (20, 50)),
     "skips": lambda options, folder: sets.skip_runs(options.programs, (options.cells or (32,))[0]),
@@ -85,7 +92,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "motion": lambda options, folder: sets.motion_runs(options.programs),
     "ale": lambda options, folder: sets.ale_runs(options.programs),
 }
-REPEATS = {"growth": 1, "full": 3, "cube1": 11, "quick": 1, "error": 1}
+REPEATS = {"growth": 1, "stall": 3, "full": 3, "cube1": 11, "quick": 1, "error": 1}
 
 
 def main(words: Sequence[str] | None = None) -> int:

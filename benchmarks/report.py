@@ -181,6 +181,20 @@ def growth(rows: Sequence[Row]) -> str:
     return text
 
 
+def stalls(rows: Sequence[Row]) -> str:
+    """Return iterations, and time and memory beside the block of the same elements."""
+    body = []
+    for row in rows:
+        base = next((r for r in rows if r["scene"] == "block" and r["kind"] == row["kind"]), None)
+        if base is None or row.get("unknowns") is None:
+            continue
+        work, peak = (ratio(row[name], base[name]) for name in ("work", "peak"))
+        name, solver = label((row["scene"], row["kind"], row["n"])), f"{row['solver']}, {row['iterations']}"
+        body.append([name, str(row["unknowns"]), solver, seconds(row["work"]), work, peak])
+    head = ["scene", "unknowns", "solver, iterations", "s", "of block", "memory of block"]
+    return table(head, body)
+
+
 def compared(rows: Sequence[Row], names: Sequence[str], process: bool = False) -> str:
     """Return phases of all programs on each scene, with the ratio of kratos_lite to each of them."""
     body = []
@@ -301,6 +315,7 @@ SECTIONS = {
     "case": ("Real scenes, whole processes", goals),
     "error": ("Run time against error", errors),
     "growth": ("Growth: the clamped block up to the memory", growth),
+    "stall": ("Scenes on which multigrid may stall", stalls),
     "assembly": ("Assembly alone", lambda rows: compared(rows, ("pattern", "matrix", "matrix, again"))),
     "parse": ("Reading an `.mdpa` file", lambda rows: compared(rows, ("read",), process=True)),
     "cube1": ("One element, whole process", lambda rows: compared(rows, (), process=True)),
@@ -319,6 +334,9 @@ NOTES = {
     "with interpreter, imports and whatever is compiled at the first call. The last column is the better of "
     "our two over the best Python library; goal: ≤ 0.33.",
     "growth": "Goal: at most 2000 B per unknown for 8N.",
+    "stall": "Ratios are to the block with ν = 0.3 of the same elements: reading, assembly and solution; "
+    "peak of the process. `block_nu_4999` has ν = 0.4999. Goals: at most 40 iterations, 3 times the time "
+    "and 1.5 times the memory.",
     "assembly": "Seconds, in brackets kratos_lite / program. Programs without a pattern of their own make it "
     "within the matrix; `again` is the shortest of further times.",
     "parse": "Seconds, in brackets kratos_lite / program.",

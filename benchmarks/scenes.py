@@ -67,14 +67,31 @@ def hole_incompressible(kind: str, n: int) -> Scene:
     return replace(concentrations.hole(kind, n, nu=0.4999), name="hole_incompressible")
 
 
-def block(kind: str, n: int) -> Scene:
+def block(kind: str, n: int, nu: float = 0.3) -> Scene:
     """Return the unit block of n³ cells, clamped at its bottom, under gravity in three directions."""
     model = kl.Model(
-        kl.box(cells=(n, n, n), element=element(kind)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+        kl.box(cells=(n, n, n), element=element(kind)), kl.Isotropic3D(E=210e6, nu=nu, density=7620.0)
     )
     model.fix("z-")
     model.add(kl.Gravity((3.0, 2.0, -9.81)))
-    return Scene("block", kind, n, model, energy=ENERGIES["block"])
+    return Scene("block", kind, n, model, energy=ENERGIES["block"] if nu == 0.3 else None)
+
+
+# ---- scenes on which multigrid may stall, beside the block -------------------------------------------
+
+
+def _nearly_incompressible(nu: float) -> Callable[[str, int], Scene]:
+    """Return what makes the clamped block of a ratio of Poisson."""
+    return lambda kind, n: replace(block(kind, n, nu), name=_named(nu))
+
+
+def _named(nu: float) -> str:
+    """Return the name of the block of a ratio of Poisson.
+
+    >>> _named(0.4999)
+    'block_nu_4999'
+    """
+    return f"block_nu_{str(nu)[2:]}"
 
 
 # ---- scenes for what can be skipped ------------------------------------------------------------------
@@ -136,13 +153,15 @@ def held(kind: str, n: int) -> Scene:
 
 ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "block": 6.8668}
 """J, of the exact solutions, good to 1e-4: from ``python -m benchmarks references`` (27N, extrapolated)."""
+STALL = {_named(nu): _nearly_incompressible(nu) for nu in (0.45, 0.49, 0.4999, 0.499999)}
+"""Scenes that are compared with the block, as their solution may take many more iterations."""
 SCENES: dict[str, Callable[[str, int], Scene]] = {
     made.__name__: made
     for made in (
         manufactured, sphere, bending, cook, l_domain, cavity, hole_incompressible, cantilever, block, cube,
         two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
-}  # fmt: skip
+} | STALL  # fmt: skip
 """Every scene by name."""
 
 

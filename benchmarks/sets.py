@@ -10,7 +10,7 @@ from benchmarks import ale
 from benchmarks.driver import Run
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
-from benchmarks.scenes import KINDS
+from benchmarks.scenes import KINDS, STALL
 from benchmarks.tables import ADAPTIVE, OURS
 
 CURVED = ("sphere", "cavity", "hole_incompressible")
@@ -52,6 +52,8 @@ GOALS = (
     *(("cube", "8N", n) for n in (20, 32, 50)),
 )
 GROWTH = (10, 14, 20, 28, 40, 50, 64, 80, 100, 124)
+STALLING = {"8N enhanced": 32, "20N B-bar": 14, "27N B-bar": 14}
+"""Elements and cells along an edge of the scenes on which multigrid may stall."""
 ASSEMBLY = {"4N": 20, "8N": 20, "10N": 12, "20N": 12, "27N": 10}
 SKIPS: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...] = (
     ("two_bodies", "two bodies, both loaded", ()),
@@ -177,6 +179,17 @@ def growth_runs(
         for n in sizes
         for program in FROM_FILES[:1] + FROM_FILES[2:]
         if program in programs
+    ]
+
+
+def stall_runs(programs: Sequence[str], sizes: dict[str, int] | None = None) -> list[Run]:
+    """Return the scenes on which multigrid may stall, and the block that they are compared with."""
+    if OURS not in programs:
+        return []
+    return [
+        Run("stall", OURS, scene, kind, n)
+        for kind, n in (sizes or STALLING).items()
+        for scene in ("block", *STALL)
     ]
 
 

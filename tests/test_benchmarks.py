@@ -252,6 +252,18 @@ def test_wheels_have_rows_beside_getfem():
     assert text.count("\n") == 5
 
 
+def test_scenes_that_may_stall_have_ratios_to_the_block():
+    common = {"kind": "8N enhanced", "n": 8, "unknowns": 1000, "solver": "amg"}
+    rows = [
+        common | {"scene": "block", "work": 1.0, "peak": 100, "iterations": 13},
+        common | {"scene": "block_nu_4999", "work": 2.0, "peak": 150, "iterations": 40},
+        common | {"scene": "block_nu_49", "kind": "27N B-bar", "work": 2.0, "peak": 150, "iterations": 40},
+    ]
+    text = report.stalls(rows)
+    assert "| block_nu_4999 8N enhanced n = 8 | 1000 | amg, 40 | 2 | 2 | 1.5 |" in text
+    assert "27N" not in text
+
+
 # ---- sets, results and report --------------------------------------------------------------------------
 
 
