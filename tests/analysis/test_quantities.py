@@ -64,6 +64,7 @@ def test_values_are_those_of_the_result():
     point = (1.3, 0.4, 0.2)
     assert kl.DisplacementAt(point, "y").value(result) == pytest.approx(result.displacement(at=point)[1])
     assert kl.StressAt(point, "xy").value(result) == result.stress(at=point)[3]
+    assert kl.StressAt(point, "xz").value(result) == result.stress(at=point)[5]
     reaction = kl.ReactionOf("x-", "x").value(result)
     assert reaction == pytest.approx(result.reaction("x-")[:, 0].sum())
     assert kl.MeanDisplacement("x+", "x").value(result) == pytest.approx(0.01)
@@ -341,7 +342,7 @@ def test_a_quantity_of_your_own():
         (lambda: kl.DisplacementAt((0, 0, 0), "w"), InputError, "axis must be one of x, y, z"),
         (lambda: kl.MeanDisplacement("x+", 1), InputError, "axis must be one of x, y, z"),
         (lambda: kl.ReactionOf("x-", "xy"), InputError, "axis must be one of x, y, z"),
-        (lambda: kl.StressAt((0, 0, 0), "xz"), InputError, "component must be one of xx, yy, zz, xy, yz, zx"),
+        (lambda: kl.StressAt((0, 0, 0), "xw"), InputError, "component must be one of xx, yy, zz, xy, yz, zx"),
     ],
 )
 def test_wrong_quantities(make, kind, words):
