@@ -39,11 +39,12 @@ Stresses of elements jump from one to the next; the estimate is their difference
 
 **Recovered stress.** `result.stress("node")` fits polynomials to the stresses of the elements around a
 node, at the points where these are most accurate (Zienkiewicz & Zhu 1992). Each material is fitted by
-itself: nodes between materials have the mean of both. `result.stress("averaged")` is extrapolated in
-each element and averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of
-each element. With two elements along a side, averaged stresses can be closer than recovered ones.
+itself: nodes between materials have the mean of both. What a polynomial leaves of the elements at its
+node is extrapolated to it and added. `result.stress("averaged")` is extrapolated in each element and
+averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of each element.
+With two elements along a side, and in thin layers of tetrahedra, averaged stresses can be closer.
 
-**Reported error.** The difference to recovered stresses is raised by 1.6, that to averaged ones by 1.8,
+**Reported error.** The difference to recovered stresses is raised by 1.7, that to averaged ones by 1.8,
 and the smaller counts. The table shows reported over true error, which is to lie between 1 and 2. A
 star marks a warning: plain elements near ν = ½ lock, and their estimate is too small; coarse meshes,
 few elements and singular corners are named, too. A proven bound, larger and more expensive, is

@@ -27,8 +27,8 @@ from kratos_lite.typing import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-NEAR_HALF = 40.0
-"""Bulk over shear modulus (ν = 0.488) from which the split pays: fewer iterations, but dearer ones."""
+NEAR_HALF = 99.0
+"""Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
 KEPT = 2 / 3
 """Bulk over shear modulus that A keeps: λ = 0."""
 

@@ -36,7 +36,7 @@ REDUCED = 1e-10
 """Share of the residual at which they start anew, as rounding leaves no more."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
-INNER, INNER_MAX = 0.02, 120
+INNER, INNER_MAX = 0.05, 100
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
 
