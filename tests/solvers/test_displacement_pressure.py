@@ -143,6 +143,17 @@ def test_a_rubber_with_fibers_is_nearly_incompressible():
     check(body("BBar3D27N", fibers), 60)
 
 
+def test_elements_with_one_and_with_four_pressures():
+    parts = [body("EnhancedStrain3D8N", cells=4).mesh, body("BBar3D27N", cells=2).mesh]
+    points = np.vstack([parts[0].points, parts[1].points + [2.0, 0.0, 0.0]])
+    (block,) = parts[1].blocks
+    beside = kl.Block(block.name, block.nodes + len(parts[0].points))
+    model = kl.Model(kl.Mesh(points, [*parts[0].blocks, beside]), rubber())
+    model.fix(points[:, 2] == 0)
+    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    check(model, 55)
+
+
 def test_compressible_bodies_have_no_pressures():
     assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
