@@ -44,9 +44,10 @@ LONGEST = 0.4
 TEXT = """
 A requested error, from one coarse mesh of 8N: asked for, true and reported error in percent of the energy
 norm, unknowns of the last mesh, number of meshes, and processor time of all; beside them the fastest mesh
-made by hand with the same true error, of the elements
-{kinds}, uniform or, at the corner of the L, graded, and the ratio of the two times; "-" where none of half a second has that error. The meshes made by
-hand have no estimate, and nobody knows their error beforehand.
+made by hand with the same true error, and the ratio of the two times. These are of the elements
+{kinds}, uniform or, at the corner of the L, graded;
+"-" where none of half a second has that error. They have no estimate, and nobody knows their error
+beforehand.
 
 """
 
