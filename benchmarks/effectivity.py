@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import scenes
+from benchmarks import requested, scenes
 from benchmarks.driver import ROOT
 from kratos_lite import voigt
 from kratos_lite.errors import KratosLiteError
@@ -39,11 +39,12 @@ Stresses of elements jump from one to the next; the estimate is their difference
 
 **Recovered stress.** `result.stress("node")` fits polynomials to the stresses of the elements around a
 node, at the points where these are most accurate (Zienkiewicz & Zhu 1992). Each material is fitted by
-itself: nodes between materials have the mean of both. `result.stress("averaged")` is extrapolated in
-each element and averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of
-each element. With two elements along a side, averaged stresses can be closer than recovered ones.
+itself: nodes between materials have the mean of both. What a polynomial leaves of the elements at its
+node is extrapolated to it and added. `result.stress("averaged")` is extrapolated in each element and
+averaged over the elements at a node, as in Kratos; `result.stress("raw")` is that of each element.
+With two elements along a side, and in thin layers of tetrahedra, averaged stresses can be closer.
 
-**Reported error.** The difference to recovered stresses is raised by 1.6, that to averaged ones by 1.8,
+**Reported error.** The difference to recovered stresses is raised by 1.7, that to averaged ones by 1.8,
 and the smaller counts. The table shows reported over true error, which is to lie between 1 and 2. A
 star marks a warning: plain elements near ν = ½ lock, and their estimate is too small; coarse meshes,
 few elements and singular corners are named, too. A proven bound, larger and more expensive, is
@@ -56,7 +57,8 @@ and the summary show the meshes; the result is on the last one. Edges along a di
 cells nor stresses change, as in plane strain, are not cut. Supports and loads should be given by part,
 by predicate, or as functions of places (`model.fix(…, field=…)`), which new nodes take exactly; rows
 and masks of nodes grow by their faces, forces on single nodes stay there. Curved surfaces of straight
-cells need `geometry={part: function}`. Estimates of successive meshes correct each other, so that the
+cells need `geometry={part: function}`; a warning says so where they seem to be. `kl.draw_history(path,
+result)` draws the error of each mesh. Estimates of successive meshes correct each other, so that the
 reported error is safe at singular points, too. With `quantity=kl.StressAt((2, 0.5, 0.9), "xx")` the
 error is that of the quantity, relative to its value, and the elements that matter for it are cut; give
 parts by name.
@@ -125,7 +127,9 @@ def page(rows: Sequence[dict[str, Any]]) -> str:
         "\nStresses at nodes, relative error in percent on the finer mesh, root mean square over all nodes: "
         "recovered / averaged.\n\n"
     )
-    return TEXT + table(rows, entry, NAMES) + stresses + table(rows, stress_entry, smooth)
+    return (
+        TEXT + table(rows, entry, NAMES) + stresses + table(rows, stress_entry, smooth) + requested.section()
+    )
 
 
 def run(names: Sequence[str] | None, kinds: Sequence[str] | None) -> list[dict[str, Any]]:

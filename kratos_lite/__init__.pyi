@@ -80,6 +80,7 @@ from kratos_lite.io.run import run as run
 from kratos_lite.io.runners.outcome import Outcome as Outcome
 from kratos_lite.io.writers.pictures import draw as draw
 from kratos_lite.io.writers.pictures import draw_element as draw_element
+from kratos_lite.io.writers.pictures import draw_history as draw_history
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.io.writers.trajectory import draw_trajectory as draw_trajectory

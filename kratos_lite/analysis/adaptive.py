@@ -27,6 +27,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_own
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Finer, Mesh, with_rows
+from kratos_lite.mesh.facets import facets
 from kratos_lite.mesh.order import quadratic, raised
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined
@@ -37,16 +38,18 @@ from kratos_lite.validation import number, short, whole_number
 S = TypeVar("S", bound=Structure)
 Geometry: TypeAlias = Mapping[str, Callable[[Array], Array]]
 """By part, a function that takes places (k, 3) near its true surface onto it."""
-GROWTH = 1.5
+GROWTH = 1.2
 """How many times more elements the next mesh has, unless singular ones hold most of the error."""
 FLAT = 0.05
 """Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
 DEPTH = 2
-"""Times that elements around a singular point are cut at once."""
+"""Times that elements are cut at once, around singular points and where less cannot be enough."""
 ROUGH, ROUGH_SHARE = 1e-5, 1e-3
 """Relative residual of the meshes on the way at most, and as a share of the error asked for."""
 FAIR = 1e-3
 """Share of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
+BOLD = 8.0
+"""Error of a mesh to that asked for from which elements away from singular points are cut twice at once."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
 UNKNOWNS = 400_000
@@ -102,6 +105,7 @@ def solve_to(
     history: list[RefinementStep] = []
     missed, keep = "", None
     rough = max(tolerance, min(ROUGH, ROUGH_SHARE * aim))
+    warnings = [] if geometry else _curved(model.mesh)
     while True:
         start = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
@@ -129,13 +133,27 @@ def solve_to(
     if result.report.iterations and rough > tolerance:
         result = analysis.solve(start=result.u)
     analysis.release()
+    result.report.warnings += warnings
     if missed:
         result.report.warnings.append(
             f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
         )
     result.report.history, result.report.error = history, level.reported
+    result.report.error_asked = aim
     result.report.error_of = "the energy norm" if quantity is None else str(quantity)
     return result
+
+
+def _curved(mesh: Mesh) -> list[str]:
+    """Return the warning about a surface that seems curved and is not followed, if any."""
+    count, angle = facets(mesh)
+    if not count:
+        return []
+    return [
+        f"{count} boundary faces of straight cells turn by about {angle:.0f}° from one to the next, as if "
+        "they stood for a curved surface: what that costs is not in the error; give geometry={part: function "
+        "of places}, or cells with curved edges"
+    ]
 
 
 def _solved(analysis: StaticAnalysis, start: Array | None, rough: float) -> Result:
@@ -208,18 +226,21 @@ def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) ->
         return [refine(mesh, keep=keep).onto(geometry)]
     aim = level.aim(error)
     kept = level.kept()
-    times = _times(level.squares, kept, aim, 8 if keep is None else 4)
+    need = _need(level.squares, kept, aim, 8 if keep is None else 4)
+    times, sure = np.ceil(need - 0.5), np.floor(need) * (kept <= SINGULAR)
+    if level.reported < BOLD * error:
+        sure[:] = 0.0
     steps = [refine(mesh, times > 0, keep).onto(geometry)]
     points = _singular_points(mesh, kept > SINGULAR)
-    wanted = times[steps[0].elements]
+    wanted, sure = times[steps[0].elements], sure[steps[0].elements]
     known = level.before is not None and level.before.order == level.order
-    for done in range(1, DEPTH if known else 1):
+    for done in range(1, DEPTH):
         finer = steps[-1].mesh
-        again = (wanted > done) & _touching(finer, points)
+        again = (sure > done) | (known & (wanted > done) & _touching(finer, points))
         if not again.any():
             break
         steps.append(refine(finer, again, keep).onto(geometry))
-        wanted = wanted[steps[-1].elements]
+        wanted, sure = wanted[steps[-1].elements], sure[steps[-1].elements]
     return steps
 
 
@@ -247,14 +268,14 @@ def _can_be_raised(model: Structure) -> bool:
     kinds = [ELEMENTS[block.name] for block in mesh.blocks if len(block)]
     return (
         mesh.hanging is None
-        and bool((model._rule_of < 0).all())
+        and not model.has_own_rules
         and all(map(is_own, kinds))
         and any(kind.shape.degree == 1 for kind in kinds)
     )
 
 
-def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
-    """Return how often elements (m,) are cut on the way to a mesh with the error `aim`.
+def _need(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
+    """Return how often elements (m,), as real numbers, are cut on the way to a mesh with the error `aim`.
 
     On it all elements have the same error τ.  An element cut k times has pieces^k children, or pieces · k
     around a singular point, that hold kept^k of its squared error.
@@ -263,17 +284,17 @@ def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
     rate = np.where(singular, -np.log(kept), np.log(pieces / kept))
     logs = np.log(np.maximum(squares, np.finfo(float).tiny))
 
-    def times(tau: float) -> Array:
-        return np.maximum(np.ceil((logs - tau) / rate - 0.5), 0.0)
+    def need(tau: float) -> Array:
+        return np.maximum((logs - tau) / rate, 0.0)
 
     low, high = float(logs.max()) - 60.0, float(logs.max())
     for _ in range(40):
         middle = (low + high) / 2
-        if (squares * kept ** times(middle)).sum() > aim**2:
+        if (squares * kept ** np.ceil(need(middle) - 0.5)).sum() > aim**2:
             high = middle
         else:
             low = middle
-    found = times(low)
+    found = need(low)
     least = 1
     if squares[singular].sum() < squares.sum() / 2:
         least = int(np.ceil((GROWTH - 1) * len(squares) / (pieces - 1)))

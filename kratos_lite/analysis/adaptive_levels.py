@@ -22,7 +22,7 @@ CORRECTED = 1.25
 """Safety of an estimate that a coarser mesh corrects."""
 SETTLED = 0.9
 """Share to which estimates must fall, so that they can be corrected."""
-AIM = 0.8
+AIM = 0.9
 """Share of the error asked for at which the next mesh aims."""
 SINGULAR = 0.25
 """Share of its squared error that an element keeps when it is cut or becomes quadratic, from which the
@@ -84,6 +84,8 @@ class Level:
         if self.before is None or not self.before.is_nested or self.before.is_blind:
             return self.estimate
         ratio = self.estimate / self.before.estimate
+        if self.before.order == self.order:  # faster than cells shrink, the one before was too large
+            ratio = max(ratio, 2.0 ** -(self.order * float(self.cuts().max())))
         if not ratio < SETTLED:
             return max(self.estimate, self.change)
         found = self.change * ratio / float(np.sqrt(1 - ratio**2))

@@ -62,7 +62,7 @@ class ErrorEstimate:
         return f"{self.relative:.2%} in the energy norm ({self.absolute:.4e} √J, by {self.method})"
 
 
-SAFETY = {"recovery": 1.6, "averaging": 1.8}
+SAFETY = {"recovery": 1.7, "averaging": 1.8}
 """Factors by which the differences of the elements' stresses to smooth ones are raised to errors."""
 
 NEGLIGIBLE, COARSE, FEW, FOCUS = 1e-9, 1.7, 8, 0.4
@@ -116,7 +116,7 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
         )
     if len(recovered) < FEW:
         warnings.append(f"{len(recovered)} elements are too few to estimate their error by one another")
-    elif len(recovered) >= 20 * WORST and _in_the_worst(recovered) > FOCUS * total:
+    elif in_few_elements(recovered):
         warnings.append(
             f"a large share of the error lies in few elements, most in row {int(recovered.argmax())}: near a "
             "re-entrant corner, the edge of a support or a concentrated load stresses have no limit"
@@ -124,10 +124,12 @@ def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup])
     return warnings
 
 
-def _in_the_worst(squares: Array) -> float:
-    """Return the sum over the hundredth of elements with the largest values."""
-    count = max(WORST, len(squares) // 100)
-    return float(np.partition(squares, -count)[-count:].sum())
+def in_few_elements(shares: Array) -> bool:
+    """Return whether the hundredth of elements with the largest shares holds much of their sum."""
+    if len(shares) < 20 * WORST:
+        return False
+    count = max(WORST, len(shares) // 100)
+    return float(np.partition(shares, -count)[-count:].sum()) > FOCUS * float(shares.sum())
 
 
 def _locks(group: ElementGroup) -> bool:
@@ -148,7 +150,8 @@ class QuantityError:
     value : Q(u_h), in its unit.
     signed : the best guess of Q(u) - Q(u_h); value + signed is a better value.
     absolute : on the safe side: the sum of the sizes of what the elements contribute, as if nothing canceled,
-        with the factors of the energy norm for both errors of the product.
+        with the factors of the energy norm for both errors of the product; no less than `signed` by averaged
+        stresses with theirs.
     per_element : (m,) what each element contributes to `signed`.
     unit : of all these.
     warnings : why it cannot be trusted; empty where nothing speaks against it.

@@ -265,10 +265,13 @@ class ReactionOf(Quantity):
 class StressAt(Quantity):
     """A component of the stress at a point, as ``result.stress(at=point)``.
 
+    It is that of the element which holds the point; recovered stresses at nodes are closer, as a rule, and the
+    estimate of the error goes by them.
+
     Parameters
     ----------
     point : (3,) m, anywhere in the undeformed mesh.
-    component : one of ``xx yy zz xy yz zx``.
+    component : one of ``xx yy zz xy yz zx``, in either order.
 
     Raises
     ------
@@ -289,7 +292,8 @@ class StressAt(Quantity):
 
     def __init__(self, point: ArrayLike, component: str) -> None:
         self.point = finite(point, "a point", (3,))
-        self.component = choice(component, "component", COMPONENTS)
+        turned = component[::-1] if isinstance(component, str) else component
+        self.component = choice(turned if turned in COMPONENTS else component, "component", COMPONENTS)
 
     def value(self, result: Solved) -> float:
         """Return the stress in Pa."""

@@ -68,6 +68,7 @@ class Report:
     formulation : which one of the elements was chosen and why; "" where their names say it.
     error : relative error, as estimated on the safe side, of a solution to a requested accuracy.
     error_of : what has that error.
+    error_asked : the error that was asked for.
     history : the meshes that it took, the last one of the result.
     motion : of a model whose material moves through its mesh: rate, critical rate, resultant of the supports.
     """
@@ -91,6 +92,7 @@ class Report:
     motion: dict[str, Any] = field(default_factory=dict)
     error: float | None = None
     error_of: str = "the energy norm"
+    error_asked: float | None = None
     history: list[RefinementStep] = field(default_factory=list)
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:

@@ -1,5 +1,8 @@
 """Recovered nodal values: stresses or strains of patches of elements, fitted by polynomials.
 
+Coarse and curved meshes, and nodes on the surface, are where a polynomial cannot follow the samples of the
+elements at its node: the mean of what it leaves of them, extrapolated to the node, is added.
+
 Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superconvergent patch recovery.
 """
 
@@ -61,7 +64,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     Hexahedra of degree 2 have their most accurate stresses at 2 x 2 x 2 points (Barlow, Int. J. Numer. Meth.
     Eng. 10 (1976) 243-251): trilinear functions are fitted to those at more Gauss points.  In linear
     hexahedra and wedges they lie at the center.  One degree above that of the element is fitted elsewhere,
-    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes.
+    but not in tetrahedra, which have no such points; in these half of what is left belongs to the nodes, and
+    nothing of it in linear ones and linear pyramids.
     """
     shape, T, points = element.shape, None, rule.points
     corner = shape.linear() or shape
@@ -74,7 +78,8 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     N = np.array([shape.N(xi) for xi in points])
     degree = shape.degree + (0 if means or shape.cell == "tetrahedron" else 1)
     at_nodes, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (shape.nodes, points))
-    to_nodes = at_nodes @ np.linalg.pinv(at_samples) * (0.5 if shape.cell == "tetrahedron" else 1.0)
+    to_nodes = at_nodes @ np.linalg.pinv(at_samples)
+    to_nodes *= 0.0 if shape.degree == 1 else 0.5 if shape.cell == "tetrahedron" else 1.0
     return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)
 
 
@@ -106,6 +111,8 @@ class Region:
         fitted = self._fitted(ways, places, sampled)
         rest = np.zeros((len(self.nodes), 6))
         for way, cells, *both in zip(ways, self.cells, places, sampled, strict=True):
+            if not way.to_nodes.any():
+                continue
             X, value = (_means(v) if way.means else v for v in both)
             rest += _sum(fitted.residuals(X, value, way.to_nodes, cells, self.patches.of), cells, len(rest))
         return fitted.at(points[self.nodes], self.patches.of) + rest / self.held[:, None]
@@ -225,22 +232,25 @@ class Recovery:
         if free:
             self._last = u, found
 
-    def products(self, u: Array, z: Array, n_elements: int) -> Array:
+    def products(self, u: Array, z: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ)' dV of each element, (m,) in J, of two displacements (n, 3).
 
-        Prestress is given and no part of the error.  σ* is kept for the first of them alone.
+        With recovered and with averaged σ*.  Prestress is given and no part of the error.  σ* is kept for the
+        first of them alone.
         """
-        found = np.zeros(n_elements)
+        found = np.zeros((2, n_elements))
         both = zip(self.regions, self._recovered(u), self._recovered(z, keep=False), strict=True)
         for region, (values, nodal), (others, other_nodal) in both:
+            stars = (nodal, other_nodal), (region.averaged(values), region.averaged(others))
             for group, nodes, value, other in zip(region.groups, region.cells, values, others, strict=True):
                 fine, N, dV, S = self._tables(group)
-                pairs = [
-                    (star, raw if fine is group else at_gauss(self.points, fine, field))
-                    for star, raw, field in ((nodal, value, u), (other_nodal, other, z))
-                ]
-                found[group.rows] = _products(pairs[0], pairs[1], nodes, N, dV, S)
-        return found
+                raw, other_raw = (
+                    known if fine is group else at_gauss(self.points, fine, field)
+                    for known, field in ((value, u), (other, z))
+                )
+                for row, (star, other_star) in zip(found, stars, strict=True):
+                    row[group.rows] = _products((star, raw), (other_star, other_raw), nodes, N, dV, S)
+        return found[0], found[1]
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""

@@ -110,6 +110,11 @@ class Solid:
         self._material_of[rows] = len(self._materials) - 1
         self._changes += 1
 
+    @property
+    def has_own_rules(self) -> bool:
+        """Whether any element has another quadrature rule than that of its class."""
+        return bool((self._rule_of >= 0).any())
+
     def use_rule(self, rule: Rule | int, where: WhereElements = None) -> None:
         """Replace the quadrature rule of elements.
 

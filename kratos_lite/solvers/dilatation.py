@@ -27,8 +27,8 @@ from kratos_lite.typing import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-NEAR_HALF = 40.0
-"""Bulk over shear modulus (ν = 0.488) from which the split pays: fewer iterations, but dearer ones."""
+NEAR_HALF = 99.0
+"""Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
 KEPT = 2 / 3
 """Bulk over shear modulus that A keeps: λ = 0."""
 
@@ -43,7 +43,7 @@ class SplitMatrix:
     D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
     bulk : (p,) Pa, κ.
     modulus : (p,) Pa, λ + 2μ in A.
-    means : (n, p) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
+    means : (p, n) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
         stiffest element there.
     groups : the elements, with materials as in A.
     """
@@ -203,21 +203,21 @@ def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
 
 
 def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:
-    """Return the means (n, p) at corner nodes; see `SplitMatrix`.
+    """Return the means (p, n) at corner nodes; see `SplitMatrix`.
 
     The first polynomial of an element is 1 / √volume, and a corner has its share of the volume.
     """
-    from scipy.sparse import csr_array, hstack
+    from scipy.sparse import csr_array
 
-    columns, mass = [], np.zeros(len(points))
+    nodes, values, counts, mass = [], [], [], np.zeros(len(points))
     for part in parts:
         corners = part.group.nodes[:, : part.group.element.shape.corners]
-        (m, r, _), k = part.D.shape, corners.shape[1]
-        volume = np.repeat(volumes(points, part.group).sum(axis=1), k)
-        mass += np.bincount(corners.ravel(), volume / k, len(points))
-        places = corners.ravel(), np.repeat(r * np.arange(m), k)
-        columns.append(csr_array((np.sqrt(volume) / k, places), shape=(len(points), m * r)))
-    means = hstack(columns, format="csr")
-    scale = np.sqrt(np.where(mass > 0, mass, 1.0) * stiffest)
-    means.data /= np.repeat(scale, np.diff(means.indptr))
-    return means
+        k, volume = corners.shape[1], volumes(points, part.group).sum(axis=1)
+        mass += np.bincount(corners.ravel(), np.repeat(volume / k, k), len(points))
+        nodes.append(corners.ravel())
+        values.append(np.repeat(np.sqrt(volume) / k, k))
+        counts.append(np.tile(k * (np.arange(part.D.shape[1]) == 0), len(corners)))
+    at = np.concatenate(nodes)
+    starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    data = np.concatenate(values) / np.sqrt(mass * stiffest)[at]
+    return csr_array((data, at, starts), shape=(len(starts) - 1, len(points)))

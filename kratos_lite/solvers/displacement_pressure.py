@@ -36,7 +36,7 @@ REDUCED = 1e-10
 """Share of the residual at which they start anew, as rounding leaves no more."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
-INNER, INNER_MAX = 0.02, 120
+INNER, INNER_MAX = 0.03, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
 
@@ -191,8 +191,8 @@ class _Schur:
 
         n = len(inverse)
         blocks = bsr_array((inverse, np.arange(n), np.arange(n + 1)), shape=K.shape)
-        means = diags_array(loose * 1.0) @ K.means  # around held nodes checkerboards have means, too
-        S = (K.D @ blocks.tocsr()) @ K.D.T + means.T @ means + diags_array(1 / K.bulk)
+        means = K.means @ diags_array(loose * 1.0)  # around held nodes checkerboards have means, too
+        S = (K.D @ blocks.tocsr()) @ K.D.T + means @ means.T + diags_array(1 / K.bulk)
         self._scale = 1 / np.sqrt(S.diagonal())
         scale = diags_array(self._scale)
         self._S: Any = (scale @ S @ scale).astype(np.float32).tocsr()

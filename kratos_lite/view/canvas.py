@@ -50,6 +50,20 @@ def new_figure_with_curves(size: tuple[float, float]) -> tuple[Any, Any, Any]:
     return figure, _without_frame(upper), lower
 
 
+def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone, both logarithmic."""
+    figure = _empty(size)
+    from matplotlib.ticker import LogLocator
+
+    axes = figure.add_subplot(xscale="log", yscale="log")
+    axes.spines[["top", "right"]].set_visible(False)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(lambda value, _: "")
+    return figure, axes
+
+
 def file_types() -> list[str]:
     """Return the endings of files that a figure can be saved as, without the dot."""
     return sorted(_canvas().get_supported_filetypes())

@@ -77,7 +77,7 @@ def to_the_tolerance(monkeypatch):
 # ---- iterations ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("nu", [0.49, 0.499, 0.4999, 0.499999])
+@pytest.mark.parametrize("nu", [0.495, 0.499, 0.4999, 0.499999])
 @pytest.mark.parametrize("element", CELLS)
 def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
@@ -89,7 +89,7 @@ def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     np.testing.assert_allclose(found.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (5, 13)), ("BBar3D27N", (3, 7))])
+@pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (8, 14)), ("BBar3D27N", (3, 7))])
 def test_iterations_hardly_grow_with_the_mesh(element, sizes):
     few, many = (body(element, cells=n).solve("amg", tolerance=1e-8).report.iterations for n in sizes)
     assert many <= few + 12
@@ -143,8 +143,19 @@ def test_a_rubber_with_fibers_is_nearly_incompressible():
     check(body("BBar3D27N", fibers), 60)
 
 
+def test_elements_with_one_and_with_four_pressures():
+    parts = [body("EnhancedStrain3D8N", cells=4).mesh, body("BBar3D27N", cells=2).mesh]
+    points = np.vstack([parts[0].points, parts[1].points + [2.0, 0.0, 0.0]])
+    (block,) = parts[1].blocks
+    beside = kl.Block(block.name, block.nodes + len(parts[0].points))
+    model = kl.Model(kl.Mesh(points, [*parts[0].blocks, beside]), rubber())
+    model.fix(points[:, 2] == 0)
+    model.add(kl.Gravity((3.0, 4.0, -9.0)))
+    check(model, 55)
+
+
 def test_compressible_bodies_have_no_pressures():
-    assert body("BBar3D27N", rubber(0.45)).solve("amg").report.solver == "amg"
+    assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
 
 # ---- the matrix ------------------------------------------------------------------------------------------

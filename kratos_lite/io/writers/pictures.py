@@ -141,6 +141,41 @@ def draw_element(
     save_figure(path, view.element_figure(shape, points))
 
 
+def draw_history(
+    path: str | Path, result: Result, *, title: str = "", size: tuple[float, float] = (6, 4)
+) -> None:
+    """Draw the reported error of each mesh of an adaptive solution against its unknowns.
+
+    Parameters
+    ----------
+    path : picture to write; .png, .pdf or .svg.
+    result : of ``model.solve(error=…)``.
+    title : above the picture.
+    size : width and height in inches, at 150 dots per inch.
+
+    Raises
+    ------
+    InputError
+        It is no such result, or the file cannot be written.
+    KratosLiteError
+        matplotlib is missing.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> model = kl.Model(kl.box(cells=(2, 1, 1)), kl.Isotropic3D(E=1e9, nu=0.3))
+    >>> model.fix("x-")
+    >>> model.add(kl.Traction("x+", (0.0, 0.0, 1e3)))
+    >>> draw_history(getfixture("tmp_path") / "history.png", model.solve(error=0.2))
+    """
+    if not isinstance(result, Result) or not result.report.history:
+        raise InputError(f"{path}: a result of model.solve(error=...) has a history; got {short(result)}")
+    report, steps = result.report, result.report.history
+    unknowns, errors = (np.array([getattr(s, name) for s in steps]) for name in ("unknowns", "error"))
+    goal, of = report.error_asked, report.error_of
+    save_figure(path, view.history_figure(unknowns, errors, goal=goal, of=of, title=title, size=size))
+
+
 def check_picture(path: str | Path) -> str:
     """Return the type of a picture, before any work is done.
 
