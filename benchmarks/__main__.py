@@ -61,7 +61,7 @@ def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
 
 def stall(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return the scenes on which multigrid may stall."""
-    sizes = {kind: options.cells[0] for kind in sets.STALLING} if options.cells else None
+    sizes = {kind: options.cells[0] for kind in scenes.KINDS} if options.cells else None
     return sets.stall_runs(options.programs, sizes)
 
 
