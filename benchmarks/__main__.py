@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cases, curves, effectivity, report, scenes, sets
+from benchmarks import cases, curves, effectivity, report, requested, scenes, sets
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
 from benchmarks.tables import Row
@@ -61,7 +61,7 @@ def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
 
 def stall(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return the scenes on which multigrid may stall."""
-    sizes = {kind: options.cells[0] for kind in sets.STALLING} if options.cells else None
+    sizes = {kind: options.cells[0] for kind in scenes.KINDS} if options.cells else None
     return sets.stall_runs(options.programs, sizes)
 
 
@@ -103,6 +103,10 @@ def main(words: Sequence[str] | None = None) -> int:
     if options.command == "effectivity":
         effectivity.write(effectivity.run(options.scenes, options.elements))
         return 0
+    if options.command == "adaptive":
+        requested.write(requested.run(options.scenes, options.elements))
+        effectivity.PAGE.write_text(effectivity.page(kept(effectivity.RESULTS)["rows"]), encoding="utf-8")
+        return 0
     if options.command == "references":
         return references(options.cells or (4, 8, 16))
     with scratch() as name:
@@ -140,13 +144,13 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("command", choices=[*COMMANDS, "report", "references", "effectivity"])
+    add("command", choices=[*COMMANDS, "report", "references", "effectivity", "adaptive"])
     add("--programs", nargs="+", choices=[*PROGRAMS, *HELPERS], default=[*PROGRAMS, *HELPERS], metavar="NAME",
         help="some of: " + ", ".join([*PROGRAMS, *HELPERS]))  # fmt: skip
     add(
         "--scenes",
         nargs="+",
-        choices=list(scenes.SCENES),
+        choices=sorted({*scenes.SCENES, *requested.MAKERS}),
         metavar="NAME",
         help="for error: some of its scenes",
     )

@@ -335,7 +335,8 @@ NOTES = {
     "our two over the best Python library; goal: ≤ 0.33.",
     "growth": "Goal: at most 2000 B per unknown for 8N.",
     "stall": "Ratios are to the block with ν = 0.3 of the same elements: reading, assembly and solution; "
-    "peak of the process. `block_nu_4999` has ν = 0.4999. Goals: at most 40 iterations, 3 times the time "
+    "peak of the process. `block_nu_4999` has ν = 0.4999; flat_100 is the block made 100 times as thin, of "
+    "which plates have one layer of cells or three. Goals: at most 40 iterations, 3 times the time "
     "and 1.5 times the memory.",
     "assembly": "Seconds, in brackets kratos_lite / program. Programs without a pattern of their own make it "
     "within the matrix; `again` is the shortest of further times.",

@@ -94,6 +94,45 @@ def _named(nu: float) -> str:
     return f"block_nu_{str(nu)[2:]}"
 
 
+def _stretched(
+    size: tuple[float, float, float], layers: int = 0, sides: tuple[str, ...] = ("z-",)
+) -> Callable[[str, int], Scene]:
+    """Return what makes a box under gravity with about n³ cells, `layers` of them across z if given."""
+
+    def make(kind: str, n: int) -> Scene:
+        m = round((n**3 / (2 * layers)) ** 0.5) if layers else n
+        model = kl.Model(
+            kl.box(size, (m, m, layers or n), element(kind)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
+        )
+        for side in sides:
+            model.fix(side)
+        model.add(kl.Gravity((3.0, 2.0, -9.81)))
+        return Scene("", kind, n, model)
+
+    return make
+
+
+def _called(name: str) -> Callable[[str, int], Scene]:
+    """Return what makes the stretched box of a name."""
+    return lambda kind, n: replace(STRETCHED[name](kind, n), name=name)
+
+
+RIM = ("x-", "x+", "y-", "y+")
+STRETCHED = {
+    "flat_10": _stretched((1.0, 1.0, 0.1)),
+    "flat_100": _stretched((1.0, 1.0, 0.01)),
+    "flat_1000": _stretched((1.0, 1.0, 0.001)),
+    "needles_10": _stretched((1.0, 1.0, 10.0)),
+    "needles_one_layer": _stretched((1.0, 1.0, 0.5), 1),
+    "plate_100": _stretched((1.0, 1.0, 0.01), 1, RIM),
+    "plate_1000": _stretched((1.0, 1.0, 0.001), 1, RIM),
+    "cantilever_plate_100": _stretched((1.0, 1.0, 0.01), 1, ("x-",)),
+    "cantilever_plate_100_layers": _stretched((1.0, 1.0, 0.01), 3, ("x-",)),
+    "cantilever_plate_1000": _stretched((1.0, 1.0, 0.001), 1, ("x-",)),
+}
+"""Boxes of thin and of long cells by name."""
+
+
 # ---- scenes for what can be skipped ------------------------------------------------------------------
 
 
@@ -161,7 +200,7 @@ SCENES: dict[str, Callable[[str, int], Scene]] = {
         manufactured, sphere, bending, cook, l_domain, cavity, hole_incompressible, cantilever, block, cube,
         two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
-} | STALL  # fmt: skip
+} | STALL | {name: _called(name) for name in STRETCHED}  # fmt: skip
 """Every scene by name."""
 
 

@@ -10,7 +10,7 @@ from benchmarks import ale
 from benchmarks.driver import Run
 from benchmarks.motion import MOTIONS
 from benchmarks.programs import PROGRAMS
-from benchmarks.scenes import KINDS, STALL
+from benchmarks.scenes import KINDS, STALL, STRETCHED
 from benchmarks.tables import ADAPTIVE, OURS
 
 CURVED = ("sphere", "cavity", "hole_incompressible")
@@ -53,7 +53,9 @@ GOALS = (
 )
 GROWTH = (10, 14, 20, 28, 40, 50, 64, 80, 100, 124)
 STALLING = {"8N enhanced": 32, "20N B-bar": 14, "27N B-bar": 14}
-"""Elements and cells along an edge of the scenes on which multigrid may stall."""
+"""Elements and cells along an edge of the scenes on which multigrid may stall as ν is near 0.5."""
+STRETCHING = {"4N": 24, "8N": 32, "8N enhanced": 32, "10N": 14, "20N": 14, "27N": 14}
+"""The same of those on which it may as cells are thin or long."""
 ASSEMBLY = {"4N": 20, "8N": 20, "10N": 12, "20N": 12, "27N": 10}
 SKIPS: tuple[tuple[str, str, tuple[tuple[str, Any], ...]], ...] = (
     ("two_bodies", "two bodies, both loaded", ()),
@@ -186,11 +188,14 @@ def stall_runs(programs: Sequence[str], sizes: dict[str, int] | None = None) -> 
     """Return the scenes on which multigrid may stall, and the block that they are compared with."""
     if OURS not in programs:
         return []
-    return [
-        Run("stall", OURS, scene, kind, n)
-        for kind, n in (sizes or STALLING).items()
-        for scene in ("block", *STALL)
+    sets = ((STALLING, STALL), (STRETCHING, STRETCHED))
+    runs = [
+        Run("stall", OURS, scene, kind, (sizes or {}).get(kind, n))
+        for kinds, scenes in sets
+        for kind, n in kinds.items()
+        for scene in ("block", *scenes)
     ]
+    return list(dict.fromkeys(runs))
 
 
 def assembly_runs(programs: Sequence[str], sizes: dict[str, int] | None = None, repeat: int = 4) -> list[Run]:

@@ -9,7 +9,13 @@ import numpy as np
 
 from benchmarks.programs.common import Array, Job, run
 
-ROUND = {"sphere": ((1.0, 3), (2.0, 3)), "cavity": ((1.0, 3),), "hole_incompressible": ((1.0, 2),)}
+ROUND = {
+    "sphere": ((1.0, 3), (2.0, 3)),
+    "cavity": ((1.0, 3),),
+    "hole": ((1.0, 2),),
+    "hole_incompressible": ((1.0, 2),),
+    "cylinder": ((1.0, 2), (3.0, 2)),
+}
 """Radius and number of axes of the spheres and cylinders that bound a scene."""
 
 

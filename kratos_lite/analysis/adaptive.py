@@ -43,13 +43,11 @@ GROWTH = 1.2
 FLAT = 0.05
 """Share of the error asked for that the stress may vary along a direction in which nothing is cut."""
 DEPTH = 2
-"""Times that elements are cut at once, around singular points and where less cannot be enough."""
+"""Times that elements around a singular point are cut at once."""
 ROUGH, ROUGH_SHARE = 1e-5, 1e-3
 """Relative residual of the meshes on the way at most, and as a share of the error asked for."""
 FAIR = 1e-3
 """Share of the forces that such a mesh may miss to equilibrium; beyond it is solved in full."""
-BOLD = 8.0
-"""Error of a mesh to that asked for from which elements away from singular points are cut twice at once."""
 STEPS = 25
 """Meshes after which the accuracy counts as out of reach."""
 UNKNOWNS = 400_000
@@ -226,21 +224,18 @@ def _next(level: Level, error: float, keep: Array | None, geometry: Geometry) ->
         return [refine(mesh, keep=keep).onto(geometry)]
     aim = level.aim(error)
     kept = level.kept()
-    need = _need(level.squares, kept, aim, 8 if keep is None else 4)
-    times, sure = np.ceil(need - 0.5), np.floor(need) * (kept <= SINGULAR)
-    if level.reported < BOLD * error:
-        sure[:] = 0.0
+    times = _times(level.squares, kept, aim, 8 if keep is None else 4)
     steps = [refine(mesh, times > 0, keep).onto(geometry)]
     points = _singular_points(mesh, kept > SINGULAR)
-    wanted, sure = times[steps[0].elements], sure[steps[0].elements]
+    wanted = times[steps[0].elements]
     known = level.before is not None and level.before.order == level.order
-    for done in range(1, DEPTH):
+    for done in range(1, DEPTH if known else 1):
         finer = steps[-1].mesh
-        again = (sure > done) | (known & (wanted > done) & _touching(finer, points))
+        again = (wanted > done) & _touching(finer, points)
         if not again.any():
             break
         steps.append(refine(finer, again, keep).onto(geometry))
-        wanted, sure = wanted[steps[-1].elements], sure[steps[-1].elements]
+        wanted = wanted[steps[-1].elements]
     return steps
 
 
@@ -274,8 +269,8 @@ def _can_be_raised(model: Structure) -> bool:
     )
 
 
-def _need(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
-    """Return how often elements (m,), as real numbers, are cut on the way to a mesh with the error `aim`.
+def _times(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
+    """Return how often elements (m,) are cut on the way to a mesh with the error `aim`.
 
     On it all elements have the same error τ.  An element cut k times has pieces^k children, or pieces · k
     around a singular point, that hold kept^k of its squared error.
@@ -284,17 +279,17 @@ def _need(squares: Array, kept: Array, aim: float, pieces: int) -> Array:
     rate = np.where(singular, -np.log(kept), np.log(pieces / kept))
     logs = np.log(np.maximum(squares, np.finfo(float).tiny))
 
-    def need(tau: float) -> Array:
-        return np.maximum((logs - tau) / rate, 0.0)
+    def times(tau: float) -> Array:
+        return np.maximum(np.ceil((logs - tau) / rate - 0.5), 0.0)
 
     low, high = float(logs.max()) - 60.0, float(logs.max())
     for _ in range(40):
         middle = (low + high) / 2
-        if (squares * kept ** np.ceil(need(middle) - 0.5)).sum() > aim**2:
+        if (squares * kept ** times(middle)).sum() > aim**2:
             high = middle
         else:
             low = middle
-    found = need(low)
+    found = times(low)
     least = 1
     if squares[singular].sum() < squares.sum() / 2:
         least = int(np.ceil((GROWTH - 1) * len(squares) / (pieces - 1)))

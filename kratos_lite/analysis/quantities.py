@@ -265,8 +265,8 @@ class ReactionOf(Quantity):
 class StressAt(Quantity):
     """A component of the stress at a point, as ``result.stress(at=point)``.
 
-    It is that of the element which holds the point; recovered stresses at nodes are closer, as a rule, and the
-    estimate of the error goes by them.
+    It is that of the element which holds the point.  Recovered stresses at nodes are closer, as a rule, and
+    the estimate of the error goes by them.
 
     Parameters
     ----------

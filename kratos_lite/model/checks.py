@@ -189,8 +189,9 @@ def check_coincident(
             break
         near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1)]
         pairs += [(int(rows[i]), int(rows[i + step])) for i in near]
-    tied = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
-    pairs = [pair for pair in pairs if frozenset(pair) not in tied]
+    if pairs:
+        tied = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
+        pairs = [pair for pair in pairs if frozenset(pair) not in tied]
     if not pairs:
         return []
     ids = mesh.node_ids

@@ -268,10 +268,10 @@ class Supports:
 
     def check_used(self, used: Mask) -> None:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
-        for slave, (terms, _) in self.slaves().items():
-            for dof in (slave, *terms):
-                if not used[dof // 3]:
-                    raise ModelError(UNUSED.format(self.name(dof)))
+        dofs = np.array([dof for slave, (terms, _) in self.slaves().items() for dof in (slave, *terms)], int)
+        unused = dofs[~used[dofs // 3]]
+        if len(unused):
+            raise ModelError(UNUSED.format(self.name(int(unused[0]))))
 
     # ---- for the equations ------------------------------------------------------------------------------
 

@@ -91,10 +91,10 @@ inline int32_t aggregate(const Graph& g, const Bytes& excluded, const Bytes& str
     return count;
 }
 
-// The vectors q (6, m) made orthonormal by Gram-Schmidt, twice; r (6, 6) takes the triangular factor.
-// A vector that cannot be told from those before it becomes zero.
-inline void orthonormalize(double* Q, int64_t m, double* r) {
-    for (int c = 0; c < MODES; ++c) {
+// The vectors q (modes, m) made orthonormal by Gram-Schmidt, twice; r (modes, modes) takes the triangular
+// factor.  A vector that cannot be told from those before it becomes zero.
+inline void orthonormalize(double* Q, int64_t m, double* r, int modes) {
+    for (int c = 0; c < modes; ++c) {
         double* q = Q + c * m;
         double before = 0, after = 0;
         for (int64_t k = 0; k < m; ++k) before += q[k] * q[k];
@@ -103,39 +103,42 @@ inline void orthonormalize(double* Q, int64_t m, double* r) {
                 double dot = 0;
                 for (int64_t k = 0; k < m; ++k) dot += Q[p * m + k] * q[k];
                 for (int64_t k = 0; k < m; ++k) q[k] -= dot * Q[p * m + k];
-                r[p * MODES + c] += dot;
+                r[p * modes + c] += dot;
             }
         for (int64_t k = 0; k < m; ++k) after += q[k] * q[k];
         const bool lost = !(after > 1e-16 * before);
         const double norm = lost ? 0 : std::sqrt(after);
-        r[c * MODES + c] = norm;
+        r[c * modes + c] = norm;
         for (int64_t k = 0; k < m; ++k) q[k] = lost ? 0 : q[k] / norm;
     }
 }
 
-// The tentative prolongator: rows of B orthonormalized over each aggregate.  B (n, b, 6) becomes T in
-// place; returns R (count, 6, 6), which is B of the coarse nodes.  A mode that an aggregate cannot tell from
-// the modes before it (few nodes, fixed components) becomes zero.
+// The tentative prolongator: rows of B (n, b, 6 sets) orthonormalized over each aggregate.  B becomes T
+// (n, sets, b, 6); returns R (count, sets, 6, 6 sets), which is B of the coarse nodes: `sets` of them for
+// each aggregate.  A mode that an aggregate cannot tell from the modes before it (few nodes, fixed
+// components) becomes zero.
 template <int b>
-Doubles tentative_prolongator(const Ints& of, int32_t count, Doubles& B) {
-    Doubles R(static_cast<size_t>(count) * MODES * MODES, 0.0);
+Doubles tentative_prolongator(const Ints& of, int32_t count, Doubles& B, int sets) {
+    const int modes = MODES * sets;
+    Doubles R(static_cast<size_t>(count) * modes * modes, 0.0), T(sets > 1 ? B.size() : 0, 0.0);
+    Doubles& to = sets > 1 ? T : B;
     Ints members, starts;
     members_of(of, count, starts, members);
     parallel_ranges(count, 64, [&](int64_t first, int64_t last) {
         Doubles Q;
         for (int64_t a = first; a < last; ++a) {
             const int64_t m = static_cast<int64_t>(starts[a + 1] - starts[a]) * b;
-            const auto row = [&](int64_t k) {
-                return &B[(static_cast<int64_t>(members[starts[a] + k / b]) * b + k % b) * MODES];
-            };
-            Q.resize(m * MODES);
+            const auto node = [&](int64_t k) { return static_cast<int64_t>(members[starts[a] + k / b]); };
+            Q.resize(m * modes);
             for (int64_t k = 0; k < m; ++k)
-                for (int c = 0; c < MODES; ++c) Q[c * m + k] = row(k)[c];
-            orthonormalize(Q.data(), m, &R[a * MODES * MODES]);
+                for (int c = 0; c < modes; ++c) Q[c * m + k] = B[(node(k) * b + k % b) * modes + c];
+            orthonormalize(Q.data(), m, &R[a * modes * modes], modes);
             for (int64_t k = 0; k < m; ++k)
-                for (int c = 0; c < MODES; ++c) row(k)[c] = Q[c * m + k];
+                for (int c = 0; c < modes; ++c)
+                    to[((node(k) * sets + c / MODES) * b + k % b) * MODES + c % MODES] = Q[c * m + k];
         }
     });
+    if (sets > 1) B.swap(T);
     return R;
 }
 
@@ -159,13 +162,15 @@ struct Smoothing {
     const Bytes& fixed;
     const Ints& of;
     const Doubles& T;
+    int sets;  // coarse nodes of each aggregate
     double omega;
 
-    // P = T - omega smoothed of one block in row i; `own` where it belongs to the node's own aggregate.
+    // P = T - omega smoothed of one block in row i and a column, a coarse node.
     template <int b>
-    KL_INLINE void store(int64_t i, bool own, const double* smoothed, float* P) const {
+    KL_INLINE void store(int64_t i, int32_t column, const double* smoothed, float* P) const {
+        const bool own = column / sets == of[i];
         for (int e = 0; e < b * MODES; ++e) {
-            const double tentative = own ? T[i * b * MODES + e] : 0.0;
+            const double tentative = own ? T[(i * sets + column % sets) * b * MODES + e] : 0.0;
             P[e] = fixed[i * b + e / MODES] ? 0.0f : static_cast<float>(tentative - omega * smoothed[e]);
         }
     }
@@ -184,14 +189,15 @@ KL_INLINE void smooth_rows(const Smoothing& s, const double* Dinv, Prolongator& 
         for (int32_t k = s.g.indptr[i]; k < s.g.indptr[i + 1]; ++k) {
             const int32_t j = s.g.indices[k], aggregate = s.of[j];
             if (aggregate < 0) continue;
-            const int32_t at = static_cast<int32_t>(std::lower_bound(columns, columns + count, aggregate) - columns);
-            add_product<b, b>(&row[at * size], s.A + static_cast<int64_t>(k) * b * b,
-                              &s.T[static_cast<int64_t>(j) * size]);
+            const int64_t at = std::lower_bound(columns, columns + count, aggregate * s.sets) - columns;
+            for (int e = 0; e < s.sets; ++e)
+                add_product<b, b>(&row[(at + e) * size], s.A + static_cast<int64_t>(k) * b * b,
+                                  &s.T[(static_cast<int64_t>(j) * s.sets + e) * size]);
         }
         for (int32_t c = 0; c < count; ++c) {
             double smoothed[size] = {};
             add_product<b, b>(smoothed, Dinv + i * b * b, &row[c * size]);
-            s.store<b>(i, columns[c] == s.of[i], smoothed, &P.data[static_cast<int64_t>(start + c) * size]);
+            s.store<b>(i, columns[c], smoothed, &P.data[static_cast<int64_t>(start + c) * size]);
         }
     }
 }
@@ -204,9 +210,11 @@ Prolongator smoothed_prolongator(const Smoothing& s, const double* Dinv) {
     const auto columns_of = [&](int64_t i, Ints& found) {
         found.clear();
         if (s.of[i] < 0) return;
-        found.push_back(s.of[i]);
-        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-            if (s.of[g.indices[k]] >= 0) found.push_back(s.of[g.indices[k]]);
+        const auto add = [&](int32_t aggregate) {
+            for (int e = 0; e < s.sets && aggregate >= 0; ++e) found.push_back(aggregate * s.sets + e);
+        };
+        add(s.of[i]);
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) add(s.of[g.indices[k]]);
         std::sort(found.begin(), found.end());
         found.erase(std::unique(found.begin(), found.end()), found.end());
     };

@@ -55,23 +55,27 @@ KL_INLINE void cluster_product(const Smoothing& s, const int32_t* members, int64
         for (int32_t k = s.g.indptr[i]; s.of[i] >= 0 && k < s.g.indptr[i + 1]; ++k) {
             const int32_t j = s.g.indices[k];
             if (s.of[j] < 0) continue;
-            const int64_t at = std::lower_bound(columns, columns + count, s.of[j]) - columns;
-            add_product<b, b>(X + (at * nodes + p) * size, s.A + int64_t{k} * b * b, &s.T[int64_t{j} * size]);
+            const int64_t at = std::lower_bound(columns, columns + count, s.of[j] * s.sets) - columns;
+            for (int e = 0; e < s.sets; ++e)
+                add_product<b, b>(X + ((at + e) * nodes + p) * size, s.A + int64_t{k} * b * b,
+                                  &s.T[(int64_t{j} * s.sets + e) * size]);
         }
     }
 }
 
-// Aggregates that the nodes of each cluster are linked to: the columns of their rows of P.
-inline void cluster_columns(const Graph& g, const Clusters& clusters, const Ints& of, Ints& starts, Ints& columns) {
-    Ints aggregates(g.indptr[g.rows]);
-    for (size_t k = 0; k < aggregates.size(); ++k) aggregates[k] = of[g.indices[k]];
+// Coarse nodes of the aggregates that the nodes of each cluster are linked to: the columns of their rows of P.
+inline void cluster_columns(const Smoothing& s, const Clusters& clusters, Ints& starts, Ints& columns) {
+    const Graph& g = s.g;
     union_pattern(
-        clusters.count(), g.rows,
+        clusters.count(), g.rows * s.sets,
         [&](int64_t c, const auto& add) {
             for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) {
                 const int32_t i = clusters.members[p];
-                for (int32_t k = g.indptr[i]; of[i] >= 0 && k < g.indptr[i + 1]; ++k)
-                    if (aggregates[k] >= 0) add(&aggregates[k], &aggregates[k] + 1);
+                for (int32_t k = g.indptr[i]; s.of[i] >= 0 && k < g.indptr[i + 1]; ++k)
+                    for (int32_t e = 0, a = s.of[g.indices[k]]; a >= 0 && e < s.sets; ++e) {
+                        const int32_t column = a * s.sets + e;
+                        add(&column, &column + 1);
+                    }
             }
         },
         starts, columns);
@@ -82,7 +86,7 @@ template <int b>
 Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
     constexpr int size = b * MODES;
     Ints starts, columns;
-    cluster_columns(s.g, clusters, s.of, starts, columns);
+    cluster_columns(s, clusters, starts, columns);
     Prolongator P;
     P.indptr.assign(s.g.rows + 1, 0);
     for (int64_t i = 0; i < s.g.rows; ++i) {
@@ -107,7 +111,7 @@ Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
                 if (s.of[i] < 0) continue;
                 std::copy_n(own, count, P.indices.begin() + P.indptr[i]);
                 for (int64_t e = 0; e < count; ++e)
-                    s.store<b>(i, own[e] == s.of[i], &X[(e * nodes + p) * size], &P.data[(P.indptr[i] + e) * size]);
+                    s.store<b>(i, own[e], &X[(e * nodes + p) * size], &P.data[(P.indptr[i] + e) * size]);
             }
         }
     });

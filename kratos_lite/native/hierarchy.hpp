@@ -44,8 +44,9 @@ public:
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
-    // B (n, 3, 6) are its rigid modes, zero at fixed components.
+    // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.
     void coarsen(const double* data, Bytes fixed, Doubles B) {
+        sets = static_cast<int>(B.size() / (fixed.size() * MODES));
         CoarseMatrix matrix;
         Graph graph = levels.back().graph;
         while (true) {
@@ -66,7 +67,10 @@ public:
             graph = {count, coarse.own_indptr.data(), coarse.own_indices.data()};
             fixed.assign(count * MODES, 0);
             inverse = coarse.set_matrix(graph, data, fixed, MODES);
-            coarse.cluster(data, fixed, X.data(), settings.theta);
+            if (sets > 1)
+                coarse.cluster_equally(data, fixed, sets);
+            else
+                coarse.cluster(data, fixed, X.data(), settings.theta);
             coarse.largest = largest_eigenvalue(coarse);
         }
         factorize(data, fixed);
@@ -148,7 +152,7 @@ private:
         coarsest = Cholesky(std::move(full), N);
     }
 
-    // The mean coordinates of each aggregate.
+    // The mean coordinates of each aggregate, where there is one coarse node for each.
     static Doubles centroids(const Doubles& X, const Ints& of, int32_t count) {
         Doubles sum(3 * static_cast<size_t>(count), 0.0), nodes(count, 0.0);
         for (size_t i = 0; i < of.size(); ++i) {
@@ -177,22 +181,24 @@ private:
         clusters.near = {};
         const int32_t count = clusters.empty() ? aggregate(g, excluded, strong, of)
                                                : aggregate_clusters<b>(g, data, clusters, excluded, strong, of);
-        if (count == 0 || count * MODES > 0.9 * b * g.rows) return 0;
-        R = tentative_prolongator<b>(of, count, B);
-        const Smoothing smoothing{g, data, fixed, of, B, 4.0 / 3.0 / levels.back().largest};
+        const int32_t nodes = count * sets;
+        if (count == 0 || nodes * MODES > 0.9 * b * g.rows) return 0;
+        R = tentative_prolongator<b>(of, count, B, sets);
+        const Smoothing smoothing{g, data, fixed, of, B, sets, 4.0 / 3.0 / levels.back().largest};
         transfers.emplace_back();
         Transfer& t = transfers.back();
         t.P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
                                : smoothed_prolongator<b>(smoothing, clusters);
         clusters.exact = {};
-        X = centroids(X, of, count);
-        t.columns = Transposed(count, t.P.indptr, t.P.indices);
-        next = galerkin<b>(g, data, t.P, t.columns, count);
-        return count;
+        if (sets == 1) X = centroids(X, of, count);
+        t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
+        next = galerkin<b>(g, data, t.P, t.columns, nodes);
+        return nodes;
     }
 
     static constexpr int64_t FULL_LIMIT = 1500;
     Settings settings;
+    int sets = 1;      // coarse nodes of each aggregate
     Cholesky coarsest;
     Doubles inverse;  // D^-1 of the last level, while setting up
     Doubles X;        // nodes of the last level

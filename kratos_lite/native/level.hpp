@@ -59,6 +59,15 @@ public:
         if (!clusters.empty()) clusters.factorize(graph, data, b, fixed);
     }
 
+    // Solve exactly within each `size` nodes that follow one another.
+    void cluster_equally(const double* data, const Bytes& fixed, int32_t size) {
+        Ints label(n);
+        for (int64_t i = 0; i < n; ++i) label[i] = static_cast<int32_t>(i / size * size);
+        clusters = {};
+        clusters.collect(graph, label);
+        clusters.factorize(graph, data, b, fixed);
+    }
+
     // Make a float copy of the blocks with rows and columns of fixed components uncoupled, and the
     // inverse of the diagonal blocks, which is also returned in double.
     Doubles set_matrix(const Graph& g, const double* data, const Bytes& fixed, int block) {

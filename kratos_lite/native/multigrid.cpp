@@ -31,12 +31,14 @@ Doubles coordinates(Numbers points, size_t unknowns) {
     return {points.data(), points.data() + points.size()};
 }
 
-// Modes (3n, 6) with zeros at fixed components.
+// Modes (3n, 6) or (3n, 12) with zeros at fixed components.
 Doubles free_modes(Numbers modes, const Bytes& fixed) {
-    require(modes.size() == 6 * static_cast<int64_t>(fixed.size()), "modes must be (3n, 6)");
+    const int64_t six = MODES * static_cast<int64_t>(fixed.size());
+    require(modes.size() == six || modes.size() == 2 * six, "modes must be (3n, 6) or (3n, 12)");
     Doubles B(modes.data(), modes.data() + modes.size());
+    const size_t columns = modes.size() == six ? MODES : 2 * MODES;
     for (size_t i = 0; i < B.size(); ++i)
-        if (fixed[i / 6]) B[i] = 0;
+        if (fixed[i / columns]) B[i] = 0;
     return B;
 }
 
@@ -150,6 +152,7 @@ PYBIND11_MODULE(_multigrid, m) {
         .def("solve", &Multigrid::solve)
         .def("sizes", &Multigrid::sizes)
         .def("clusters", &Multigrid::clusters)
+        .def("has_planes", [](const Multigrid& m) { return !m.hierarchy.levels.front().clusters.near.empty(); })
         .def("bytes", [](const Multigrid& m) { return m.hierarchy.bytes(); })
         .def("complexity", [](const Multigrid& m) { return m.hierarchy.complexity(); });
 }

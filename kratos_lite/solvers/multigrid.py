@@ -1,5 +1,6 @@
 """Conjugate gradients with algebraic multigrid: smoothed aggregation from the six rigid modes.
 
+In thin flat bodies the modes of constant curvature join them, without which plates bend slowly.
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid).
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
 On stretched meshes the kernels smooth lines or small planes of close nodes exactly and aggregate them
@@ -31,6 +32,11 @@ RATIO = 12.0
 """Largest to smallest eigenvalue that a smoother has to damp."""
 STRENGTH = 0.005
 """|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
+
+FLAT = 0.1
+"""Thickness of a body to its width, up to which it bends like a plate."""
+CLOSER = 0.5
+"""Factor on distances across a plate: there, nodes are close from smaller aspects on."""
 
 
 class Solver(Protocol):
@@ -76,10 +82,20 @@ class Compiled:
 
     def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
         fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
+        axes, places = plate_axes(points, free), points
+        if axes is not None:
+            normal = axes[:, 0]
+            places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
-        self._kernel = module.Multigrid(matrix, fixed, points, DEGREE, RATIO, STRENGTH)
+        self._kernel = module.Multigrid(matrix, fixed, places, DEGREE, RATIO, STRENGTH)
+        if linear is not None:
+            points, places = points[linear.nodes], places[linear.nodes]
+        if axes is None or self._kernel.has_planes():
+            modes = rigid_modes(points)
+        else:
+            modes = bending_modes(points, axes)
         if linear is None:
-            self._kernel.aggregate(rigid_modes(points))
+            self._kernel.aggregate(modes)
         else:
             K = linear.K
             self._kernel.aggregate_linear(
@@ -88,8 +104,8 @@ class Compiled:
                 linear.indptr,
                 linear.indices,
                 linear.weights,
-                points[linear.nodes],
-                rigid_modes(points[linear.nodes]),
+                places,
+                modes,
             )
         self.levels: list[int] = self._kernel.sizes()
         self.clusters: list[int] = self._kernel.clusters()
@@ -115,6 +131,32 @@ class Compiled:
         if share and converged:
             share.finish()
         return x, iterations, converged
+
+
+def plate_axes(points: Array, free: Mask) -> Array | None:
+    """Return the axes (3, 3) of a thin flat body in columns, its normal first; None for other bodies.
+
+    Parameters
+    ----------
+    points : (n, 3) m.
+    free : (3n,) the components that are unknown; a body whose normal displacements are held does not bend.
+    """
+    X = points - points.mean(axis=0)
+    moments, axes = np.linalg.eigh(X.T @ X)
+    held = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
+    return None if moments[0] > FLAT**2 * moments[1] or held > 0.5 else axes
+
+
+def bending_modes(points: Array, axes: Array) -> Array:
+    """Return the rigid modes of a thin flat body, those of constant curvature, and zeros: (3n, 12)."""
+    z, x, y = ((points - points.mean(axis=0)) @ axes).T / np.ptp(points, axis=0).max()
+    modes = np.zeros((len(points), 3, 12))
+    modes[:, :, :6] = rigid_modes(points).reshape(-1, 3, 6)
+    for mode, (w, slope_x, slope_y) in enumerate(
+        ((x * x, 2 * x, 0 * x), (y * y, 0 * y, 2 * y), (x * y, y, x)), 6
+    ):
+        modes[:, :, mode] = np.column_stack([w, -z * slope_x, -z * slope_y]) @ axes.T
+    return modes.reshape(-1, 12)
 
 
 class Pyamg:

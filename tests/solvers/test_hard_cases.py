@@ -9,16 +9,18 @@ from kratos_lite.native import kernels
 from kratos_lite.solvers import coarse_level
 from kratos_lite.solvers import linear_solver as equations
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.solvers.multigrid import Compiled
+from kratos_lite.solvers.multigrid import Compiled, bending_modes, plate_axes
 
 pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="multigrid is not compiled")
 LIMIT = 60
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
 CELLS = {"4N": (11, 11, 11), "8N": (11, 11, 11), "10N": (5, 5, 5), "20N": (6, 6, 6), "27N": (5, 5, 5)}
 
 
 def body(element, size, side, cells=None, contrast=None):
     """Return a box under its own weight, which acts in no special direction, clamped at a side."""
-    mesh = kl.box(size, cells or CELLS[element], f"KinematicLinear3D{element}")
+    name = "EnhancedStrain3D8N" if element == "E8N" else f"KinematicLinear3D{element}"
+    mesh = kl.box(size, cells or CELLS[element], name)
     model = kl.Model(mesh, kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     if contrast:
         centers = np.vstack([mesh.points[b.nodes].mean(axis=1) for b in mesh.blocks]) / size
@@ -88,6 +90,61 @@ def test_long_elements_in_planes_too_large_to_be_solved(element, n, length):
 @pytest.mark.parametrize("element", ["4N", "8N"])
 def test_a_plate_of_linear_elements(element):
     check(body(element, (1.0, 1.0, 0.01), "x-", (26, 26, 2)))
+
+
+PLATES = {"4N": (24, 30), "8N": (40, 20), "E8N": (40, 26), "10N": (20, 150), "20N": (24, 60), "27N": (20, 70)}
+"""Cells along an edge of a plate 1:100, and iterations that it may take."""
+
+
+@pytest.mark.parametrize("side", ["x-", "y+"])
+@pytest.mark.parametrize("element", PLATES)
+def test_plates_have_modes_of_bending(element, side):
+    n, limit = PLATES[element]
+    model = body(element, (1.0, 1.0, 0.01), side, (n, n, 1))
+    solver, b = hierarchy(model)
+    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= limit
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_iterations_of_a_plate_do_not_grow_with_its_mesh(turn):
+    for n in (20, 50):
+        model = body("8N", (1.0, 1.0, 0.02), "x-", (n, n, 1))
+        c, s = np.cos(turn), np.sin(turn)
+        points = model.mesh.points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        turned = kl.Model(kl.Mesh(points, model.mesh.blocks), STEEL)
+        turned.fix(model.mesh.nodes("x-"))
+        solver, b = hierarchy(turned)
+        assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 26
+
+
+def gravity(b):
+    """Return a load in no special direction on the free components."""
+    return np.where(b != 0, np.tile([3.0, 4.0, -9.0], len(b) // 3), 0.0)
+
+
+def test_modes_of_bending_have_the_energy_of_constant_curvature():
+    mesh = kl.box((1.0, 0.7, 0.05), (3, 2, 1), "KinematicLinear3D27N")
+    turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    points = mesh.points @ turn
+    model = kl.Model(kl.Mesh(points, mesh.blocks), STEEL)
+    system = ConstrainedSystem(points, model.element_groups(), model.supports.constraint_map)
+    modes = bending_modes(points, plate_axes(points, np.ones(points.size, dtype=bool)))
+    energy = modes.T @ system.K.scipy() @ modes
+    mu = STEEL.E / 2 / (1 + STEEL.nu)
+    lame = 2 * mu * STEEL.nu / (1 - 2 * STEEL.nu)
+    inertia = 4 * 0.7 * 0.05**3 / 12 / np.ptp(points, axis=0).max() ** 4
+    want = np.zeros((12, 12))
+    want[6:9, 6:9] = inertia * np.array([[lame + 2 * mu, lame, 0], [lame, lame + 2 * mu, 0], [0, 0, mu]])
+    np.testing.assert_allclose(np.abs(energy), want, rtol=0, atol=1e-6 * want.max())
+
+
+@pytest.mark.parametrize("side", ["z", "thick"])
+def test_other_bodies_are_no_plates(side):
+    points = kl.box((1.0, 0.7, 0.05 if side == "z" else 0.2), (6, 6, 1)).points
+    free = np.ones(points.shape, dtype=bool)
+    free[:, 2] = side == "thick"  # plane strain is no bending
+    assert plate_axes(points, free.ravel()) is None
 
 
 @pytest.mark.parametrize("element", CELLS)
@@ -163,7 +220,8 @@ ISOTROPIC = {
 @pytest.mark.parametrize("case", ISOTROPIC)
 def test_other_meshes_have_no_clusters(case):
     model = ISOTROPIC[case]()
-    assert not any(hierarchy(model)[0].clusters)
+    clusters = hierarchy(model)[0].clusters
+    assert not (clusters[0] if "flat" in case else any(clusters))
 
 
 @pytest.mark.parametrize(("size", "clusters"), [((1.0, 1.0, 0.1), 12**2), ((1.0, 1.0, 10.0), 12)])
