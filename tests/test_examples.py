@@ -48,6 +48,7 @@ def test_python_of_the_readme_runs(number, tmp_path):
     [
         "users.md",
         "elements.md",
+        "accuracy.md",
         "add-an-element.md",
         "formats.md",
         "exercises.md",

@@ -80,7 +80,11 @@ def _write(outcome: Outcome, options: Namespace) -> int:
     written, expected = outcome.write(), outcome.compare()
     _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
     _print(expected)
-    return EXIT_VALUE_MISSED if any(" failed " in line for line in expected) else 0
+    missed = any(" failed " in line for line in expected)
+    report = None if outcome.result is None else outcome.result.report
+    if report is not None and report.error is not None and report.error_asked is not None:
+        missed |= report.error > report.error_asked
+    return EXIT_VALUE_MISSED if missed else 0
 
 
 def _print(lines: list[str]) -> None:

@@ -13,7 +13,7 @@ EXIT_CODES = """exit codes:
   0    done
   1    a defect of kratos-lite, or a row of verify that fails
   2    bad input, or an output that cannot be written
-  3    solved, but an expected value of the run file is missed
+  3    solved, but an expected value of the run file, or the error asked for, is missed
   130  interrupted with Ctrl-C; 143 by SIGTERM"""
 MODEL = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
 BODY = "a .json file with a body, or a .py script with body, dt and steps"

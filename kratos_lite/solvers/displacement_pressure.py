@@ -30,13 +30,13 @@ from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.iteration import Share
 from kratos_lite.typing import Array, Mask, Progress
 
-DIRECTIONS = 60
+DIRECTIONS = 80
 """Iterations after which they start anew from what is left: their directions are kept until then."""
 REDUCED = 1e-10
 """Share of the residual at which they start anew, as rounding leaves no more."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
-INNER, INNER_MAX = 0.03, 120
+INNER, INNER_MAX = 0.06, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
 

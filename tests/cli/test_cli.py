@@ -945,6 +945,17 @@ def test_an_error_asked_for_is_reached_on_a_finer_mesh(run, tmp_path, monkeypatc
     assert Path("fine.vtu").exists()
 
 
+def test_an_error_asked_for_that_is_missed_ends_with_exit_code_3(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("kratos_lite.analysis.adaptive.UNKNOWNS", 600)
+    kl.write("bar.vtu", kl.box((4, 1, 1), (4, 1, 1)))
+    words = ["--material", "E=1e9,nu=0.3", "--fix", "x-:xyz", "--traction", "x+:0,0,1e3"]
+    done = run("solve", "bar.vtu", *words, "--error", "0.1%", "-o", "fine.vtu")
+    assert done.code == 3
+    assert "was not reached" in done.out
+    assert Path("fine.vtu").exists()
+
+
 @pytest.mark.parametrize("share", ["0", "100%", "-1%", "much", "1.5", "nan", "1_0%"])
 def test_an_error_that_is_no_share_is_refused(run, tmp_path, monkeypatch, share):
     monkeypatch.chdir(tmp_path)
