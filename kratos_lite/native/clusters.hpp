@@ -14,8 +14,8 @@
 
 namespace kl {
 
-constexpr double NEAR = 9, FAR = 10;     // squares of distances, to that of the nearest node
-constexpr double REACH = 12.5;           // that of linked nodes in cubes of 27 nodes is 12
+constexpr double NEAR = 9, FAR = 16;     // squares of distances, to that of the nearest node
+constexpr double COARSE_FAR = 12.5;      // the same where close nodes alone have aggregated
 constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
 constexpr double FILL = 1;               // nodes in the envelopes of clusters, to their blocks in A
 constexpr double CONTRAST = 1e3;           // largest stiffness of one node to that of another
@@ -40,12 +40,12 @@ inline std::pair<double, double> extent(const Graph& g, const double* X, int64_t
 }
 
 // Of some nodes of the whole mesh, have a few both near and far ones?
-inline bool is_stretched(const Graph& g, const double* X) {
+inline bool is_stretched(const Graph& g, const double* X, double far) {
     const int64_t step = std::max<int64_t>(1, g.rows / SAMPLE);
     int64_t seen = 0, stretched = 0;
     for (int64_t i = 0; i < g.rows; i += step, ++seen) {
         const auto [low, high] = extent(g, X, i);
-        stretched += high > REACH * low;
+        stretched += high > far * low;
     }
     return 20 * stretched > seen;
 }
@@ -225,7 +225,7 @@ struct Lengths {
     Ints label, size, far, between;
 };
 
-inline Lengths lengths(const Graph& g, const double* X) {
+inline Lengths lengths(const Graph& g, const double* X, double far) {
     Lengths out;
     Doubles least(g.rows);
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
@@ -246,7 +246,7 @@ inline Lengths lengths(const Graph& g, const double* X) {
         const int32_t c = out.label[i];
         ++out.size[c];
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
-            if (out.label[g.indices[k]] != c) ++(ratio(i, k) > FAR ? out.far : out.between)[c];
+            if (out.label[g.indices[k]] != c) ++(ratio(i, k) > far ? out.far : out.between)[c];
     }
     return out;
 }
@@ -254,9 +254,9 @@ inline Lengths lengths(const Graph& g, const double* X) {
 // The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
 // clusters that a gap sets apart from the links between them, and near links alone unless these are
 // cheap to factorize.
-inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta) {
-    if (!is_stretched(g, X)) return {};
-    const Lengths links = lengths(g, X);
+inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta, double far) {
+    if (!is_stretched(g, X, far)) return {};
+    const Lengths links = lengths(g, X, far);
     Ints label(g.rows);
     int64_t clustered = 0;
     for (int32_t i = 0; i < g.rows; ++i) {

@@ -25,7 +25,7 @@ public:
         levels.emplace_back();
         X = std::move(points);
         inverse = levels.back().set_matrix(g, data, fixed, 3);
-        levels.back().cluster(data, fixed, X.data(), settings.theta);
+        levels.back().cluster(data, fixed, X.data(), settings.theta, FAR);
         levels.back().largest = largest_eigenvalue(levels.back());
     }
 
@@ -54,8 +54,25 @@ public:
             if (fine.size() <= settings.full || levels.size() > 20) break;
             Doubles R;
             CoarseMatrix next;
-            const int64_t count = fine.b == 3 ? add_transfer<3>(graph, data, fixed, B, R, next)
-                                              : add_transfer<6>(graph, data, fixed, B, R, next);
+            bool planes = !fine.clusters.near.empty();
+            const Doubles kept = planes || sets > 1 ? B : Doubles();
+            const auto is_large = [&](double share) { return next.data.size() > share * fine.A.size(); };
+            int64_t count = add_transfer(graph, data, fixed, B, R, next);
+            if (count && planes && is_large(LARGEST_PLANES)) {
+                transfers.pop_back();
+                fine.clusters.near = {};
+                planes = false;
+                B = kept;
+                count = add_transfer(graph, data, fixed, B, R, next);
+            }
+            if (count && sets > 1 && is_large(LARGEST_SETS)) {
+                transfers.pop_back();
+                B = first_columns(kept, MODES * sets);
+                sets = 1;
+                count = add_transfer(graph, data, fixed, B, R, next);
+            }
+            fine.clusters.exact = {};
+            fine.clusters.near = {};
             if (count == 0) break;
             matrix = std::move(next);
             data = matrix.data.data();
@@ -70,7 +87,7 @@ public:
             if (sets > 1)
                 coarse.cluster_equally(data, fixed, sets);
             else
-                coarse.cluster(data, fixed, X.data(), settings.theta);
+                coarse.cluster(data, fixed, X.data(), settings.theta, planes ? COARSE_FAR : FAR);
             coarse.largest = largest_eigenvalue(coarse);
         }
         factorize(data, fixed);
@@ -164,6 +181,19 @@ private:
         return sum;
     }
 
+    // The first six of the columns of B.
+    static Doubles first_columns(const Doubles& B, int columns) {
+        Doubles out(B.size() / columns * MODES);
+        for (size_t i = 0; i < out.size(); ++i) out[i] = B[i / MODES * columns + i % MODES];
+        return out;
+    }
+
+    int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed, Doubles& B, Doubles& R,
+                         CoarseMatrix& next) {
+        return levels.back().b == 3 ? add_transfer<3>(g, data, fixed, B, R, next)
+                                    : add_transfer<6>(g, data, fixed, B, R, next);
+    }
+
     // Aggregate, smooth and multiply; returns the number of coarse nodes, or 0 if nothing is gained.
     template <int b>
     int64_t add_transfer(const Graph& g, const double* data, const Bytes& fixed,
@@ -176,9 +206,8 @@ private:
         Bytes strong = strong_links(g, data, b * b, settings.theta);
         Ints of;
         Clusters& clusters = levels.back().clusters;
-        if (strong.empty()) strong.swap(clusters.near);
+        if (strong.empty()) strong = clusters.near;
         for (size_t k = 0; k < clusters.near.size(); ++k) strong[k] &= clusters.near[k];
-        clusters.near = {};
         const int32_t count = clusters.empty() ? aggregate(g, excluded, strong, of)
                                                : aggregate_clusters<b>(g, data, clusters, excluded, strong, of);
         const int32_t nodes = count * sets;
@@ -189,7 +218,6 @@ private:
         Transfer& t = transfers.back();
         t.P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
                                : smoothed_prolongator<b>(smoothing, clusters);
-        clusters.exact = {};
         if (sets == 1) X = centroids(X, of, count);
         t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
         next = galerkin<b>(g, data, t.P, t.columns, nodes);
@@ -197,6 +225,7 @@ private:
     }
 
     static constexpr int64_t FULL_LIMIT = 1500;
+    static constexpr double LARGEST_PLANES = 2.5, LARGEST_SETS = 1.25;  // memory of a level to that above it
     Settings settings;
     int sets = 1;      // coarse nodes of each aggregate
     Cholesky coarsest;

@@ -54,8 +54,8 @@ public:
     int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes(); }
 
     // Solve exactly within clusters of the nodes at X, if it has any.
-    void cluster(const double* data, const Bytes& fixed, const double* X, double theta) {
-        clusters = find_clusters(graph, data, b, X, theta);
+    void cluster(const double* data, const Bytes& fixed, const double* X, double theta, double far) {
+        clusters = find_clusters(graph, data, b, X, theta, far);
         if (!clusters.empty()) clusters.factorize(graph, data, b, fixed);
     }
 

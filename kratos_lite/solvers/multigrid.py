@@ -35,8 +35,8 @@ STRENGTH = 0.005
 
 FLAT = 0.1
 """Thickness of a body to its width, up to which it bends like a plate."""
-CLOSER = 0.5
-"""Factor on distances across a plate: there, nodes are close from smaller aspects on."""
+CLOSER = 0.2
+"""Factor on distances across a plate: there, nodes above each other are close in cubes of cells, too."""
 
 
 class Solver(Protocol):

@@ -117,6 +117,26 @@ def test_iterations_of_a_plate_do_not_grow_with_its_mesh(turn):
         assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 26
 
 
+def cylinder(n):
+    """Return part of a thin cylinder of cells with three unlike sides."""
+    mesh = kl.box((1.5, 1.0, 0.01), (n, n, 1))
+    angle, radius = mesh.points[:, 0], 1 + mesh.points[:, 2]
+    points = np.column_stack([radius * np.sin(angle), mesh.points[:, 1], radius * np.cos(angle)])
+    model = kl.Model(kl.Mesh(points, mesh.blocks), STEEL)
+    model.fix(mesh.nodes("x-"))
+    return model
+
+
+def test_sides_of_three_lengths_without_a_gap_between_them_make_no_clusters():
+    assert not any(hierarchy(cylinder(40))[0].clusters)
+
+
+def test_an_unstructured_plate_takes_no_more_memory_than_its_matrix():
+    model = unstructured(100)
+    solver, _ = hierarchy(model)
+    assert solver.complexity < 3.5
+
+
 def gravity(b):
     """Return a load in no special direction on the free components."""
     return np.where(b != 0, np.tile([3.0, 4.0, -9.0], len(b) // 3), 0.0)
