@@ -40,6 +40,7 @@ class LinearLevel:
     K : (3m, 3m) stiffness matrix of the linear elements on the corner nodes.
     nodes : (m,) int, row among all n nodes of each corner node that does not hang.
     indptr, indices, weights : interpolation (n, m) from these nodes to all nodes in rows (CSR).
+    halved : whether long cells are two linear ones each.
     """
 
     K: BlockMatrix
@@ -47,6 +48,7 @@ class LinearLevel:
     indptr: Rows
     indices: Rows
     weights: Array
+    halved: bool = False
 
 
 LONG = 3.0
@@ -96,7 +98,7 @@ def linear_level(
     linear = [_linear(part, cell, number) for part in parts for cell in part.cells]
     pattern = Pattern(len(nodes), [group.nodes for group in linear])
     K = assemble_stiffness(points[nodes], linear, pattern)
-    level = LinearLevel(K, nodes, *_interpolation(parts, number))
+    level = LinearLevel(K, nodes, *_interpolation(parts, number), any(len(part.cells) > 1 for part in parts))
     return level if hanging is None else _continuous(level, groups, number, hanging)
 
 

@@ -88,6 +88,8 @@ class Compiled:
             places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
         self._kernel = module.Multigrid(matrix, fixed, places, DEGREE, RATIO, STRENGTH)
+        if linear is not None and self._kernel.has_planes() and not linear.halved:
+            linear = None  # tetrahedra: their middle nodes are too far from their corners
         if linear is not None:
             points, places = points[linear.nodes], places[linear.nodes]
         if axes is None or self._kernel.has_planes():

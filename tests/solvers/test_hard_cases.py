@@ -78,13 +78,13 @@ def test_extremely_long_elements_on_rollers(element):
     check(body(element, (1.0, 1.0, 1000.0), "rollers"))
 
 
-@pytest.mark.parametrize(("element", "n"), [("8N", 20), ("20N", 22), ("27N", 18), ("15N", 18)])
+@pytest.mark.parametrize(("element", "n"), [("8N", 20), ("20N", 22), ("27N", 18), ("15N", 18), ("10N", 14)])
 @pytest.mark.parametrize("length", [0.3, 1.0, 4.0])
 def test_long_elements_in_planes_too_large_to_be_solved(element, n, length):
     model = body(element, (1.0, 1.0, length), "x-", (n, n, 1))
     solver, b = hierarchy(model)
     assert not solver.clusters[0]
-    assert solver.solve(b, 1e-8, 0.0, None)[1] <= 30
+    assert solver.solve(b, 1e-8, 0.0, None)[1] <= (45 if element == "10N" else 30)
 
 
 @pytest.mark.parametrize("element", ["4N", "8N"])
