@@ -105,7 +105,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     if options.command == "adaptive":
         requested.write(requested.run(options.scenes, options.elements))
-        effectivity.PAGE.write_text(effectivity.page(kept(effectivity.RESULTS)["rows"]), encoding="utf-8")
+        effectivity.write_page(kept(effectivity.RESULTS)["rows"])
         return 0
     if options.command == "references":
         return references(options.cells or (4, 8, 16))

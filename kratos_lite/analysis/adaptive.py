@@ -138,6 +138,8 @@ def solve_to(
         )
     result.report.history, result.report.error = history, level.reported
     result.report.error_asked = aim
+    if history[0].kinds != history[-1].kinds:
+        result.report.formulation = f"{history[-1].kinds}, raised from {history[0].kinds}"
     result.report.error_of = "the energy norm" if quantity is None else str(quantity)
     return result
 

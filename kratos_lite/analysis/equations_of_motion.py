@@ -183,7 +183,7 @@ class EquationsOfMotion:
         reduced = self.system.reduced
         equations = solvers.LinearSolver(self.K, reduced, self.system.points, "direct", "")
         at_zero = np.zeros_like(reduced.c)
-        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, prescribed=at_zero).x
+        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, self.system.progress, at_zero).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
     @cached_property
@@ -278,7 +278,7 @@ class EquationsOfMotion:
         iterate = symmetric and len(reduced.free) > DIRECT_MAX
         method = "amg" if iterate else "direct"
         equations = solvers.LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
-        return lambda f, prescribed: equations.solve(f, 1e-13, prescribed=prescribed).x
+        return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
 
 
 def _checked_rayleigh(rayleigh: tuple[float, float]) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
+from kratos_lite.analysis.static import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
@@ -14,27 +15,39 @@ from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.eigen import DENSE_MODES, modes
 from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
-from kratos_lite.typing import Array, Complexes
+from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import whole_number
 
 FEW = 40
 """Up to this many unknowns there is nothing to iterate for."""
 
 
-def natural_modes(model: Structure, count: int, lumped: bool = False) -> tuple[Array, Array]:
+def natural_modes(
+    model: Structure, count: int, lumped: bool = False, progress: Progress | None = None
+) -> tuple[Array, Array]:
     """Return frequencies (count,) in rad/s and shapes (count, n, 3) of K φ = ω² M φ; see `Model.modes`."""
-    equations = EquationsOfMotion(model, lumped=lumped)
-    K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
-    omega, shapes = modes(K, M, count)
+    phase = Phases(progress)
+    with phase("check"):
+        equations = EquationsOfMotion(model, lumped=lumped, progress=progress)
+    with phase("assemble"):
+        K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
+    with phase("modes"):
+        omega, shapes = modes(K, M, count)
     return omega, expanded(equations, shapes)
 
 
-def complex_modes(model: Structure, count: int) -> tuple[Complexes, Complexes]:
+def complex_modes(
+    model: Structure, count: int, progress: Progress | None = None
+) -> tuple[Complexes, Complexes]:
     """Return λ (count,) and shapes (count, n, 3) of λ² M + λ C + K = 0; see `Model.complex_modes`."""
-    e = EquationsOfMotion(model, steady=True)
-    M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    pencil = Pencil(M, C, K, neutral_motions(M, C, K, _rigid_motions(e)))
-    values, shapes = pencil.modes(whole_number(count, "count"))
+    phase = Phases(progress)
+    with phase("check"):
+        e = EquationsOfMotion(model, steady=True, progress=progress)
+    with phase("assemble"):
+        M, C, K = (reduced(e, e.matrix(0.0, *shares)) for shares in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    with phase("modes"):
+        pencil = Pencil(M, C, K, neutral_motions(M, C, K, _rigid_motions(e)))
+        values, shapes = pencil.modes(whole_number(count, "count"))
     return values, expanded(e, shapes)
 
 

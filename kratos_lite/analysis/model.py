@@ -195,7 +195,9 @@ class Model(Structure):
 
         return TransientAnalysis(self, **options)
 
-    def modes(self, count: int = 6, *, lumped: bool = False) -> tuple[Array, Array]:
+    def modes(
+        self, count: int = 6, *, lumped: bool = False, progress: Progress | None = None
+    ) -> tuple[Array, Array]:
         """Return natural frequencies and mode shapes.
 
         All supported degrees of freedom are fixed at zero.  A motion of the material is ignored: see
@@ -205,6 +207,7 @@ class Model(Structure):
         ----------
         count : number of modes.
         lumped : concentrate the mass at the nodes.
+        progress : called with the phase and the share done, 0 … 1.
 
         Returns
         -------
@@ -220,14 +223,17 @@ class Model(Structure):
         """
         from kratos_lite.analysis.modal import natural_modes
 
-        return natural_modes(self, count, lumped)
+        return natural_modes(self, count, lumped, progress)
 
-    def complex_modes(self, count: int = 6) -> tuple[Complexes, Complexes]:
+    def complex_modes(
+        self, count: int = 6, *, progress: Progress | None = None
+    ) -> tuple[Complexes, Complexes]:
         """Return the complex modes of a model with its motion at the time 0: λ² M + λ C + K is singular.
 
         Parameters
         ----------
         count : number of modes.
+        progress : called with the phase and the share done, 0 … 1.
 
         Returns
         -------
@@ -243,7 +249,7 @@ class Model(Structure):
         """
         from kratos_lite.analysis.modal import complex_modes
 
-        return complex_modes(self, count)
+        return complex_modes(self, count, progress)
 
     # ---- the equations themselves --------------------------------------------------------------
 

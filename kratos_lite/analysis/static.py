@@ -29,19 +29,25 @@ ADJOINT_TOLERANCE = 1e-5
 
 
 class Phases:
-    """Seconds spent in each named phase."""
+    """Seconds spent in each named phase; `progress` is called where one begins and ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, progress: Progress | None = None) -> None:
+        function_or_none(progress, "progress must be a function of a phase and a share")
         self.seconds: dict[str, float] = {}
+        self.progress = progress
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
         """Measure the body of a ``with`` statement."""
         start = perf_counter()
+        if self.progress:
+            self.progress(name, 0.0)
         try:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+        if self.progress:
+            self.progress(name, 1.0)
 
 
 @record(eq=False)
@@ -55,11 +61,10 @@ class LoadSet:
     phase: Phases
 
 
-def check_arguments(solver: str, tolerance: float, progress: Progress | None) -> None:
-    """Raise InputError for an unknown solver, a tolerance beyond 0 … 1, or no function of progress."""
+def check_arguments(solver: str, tolerance: float) -> None:
+    """Raise InputError for an unknown solver, or a tolerance beyond 0 … 1."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    function_or_none(progress, "progress must be a function of a phase and a share")
     solvers.choose(solver, 0)
 
 
@@ -94,11 +99,11 @@ class StaticAnalysis:
         tolerance: float = 1e-10,
         progress: Progress | None = None,
     ) -> None:
-        check_arguments(solver, tolerance, progress)
+        check_arguments(solver, tolerance)
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance, self.progress = model, solver, tolerance, progress
-        self._phase = Phases()
+        self._phase = Phases(progress)
         self._prepare()
 
     def solve(
@@ -132,7 +137,7 @@ class StaticAnalysis:
         self._follow()
         case = self._load(self.model.loads if loads is None else loads)
         if tolerance is not None:
-            check_arguments(self.solver, tolerance, self.progress)
+            check_arguments(self.solver, tolerance)
         if start is not None:
             start = finite(start, "start", (self.model.mesh.n_nodes, 3))
         return self._solve(case, case.moving, tolerance, start)
@@ -191,7 +196,7 @@ class StaticAnalysis:
 
     def _load(self, given: Load | Sequence[Load]) -> LoadSet:
         """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
-        phase, self._phase = self._phase, Phases()
+        phase, self._phase = self._phase, Phases(self.progress)
         if not isinstance(given, (Load, list, tuple)):
             raise InputError(f"a load, or a list of them, is needed; got {type(given).__name__}")
         loads = [given] if isinstance(given, Load) else list(given)

@@ -20,8 +20,8 @@ def solve_steady(
     model: Structure, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
 ) -> Result:
     """Solve (K - rate² H + …) u = f of a model with a motion, at the time 0; see `Model.solve`."""
-    check_arguments(solver, tolerance, progress)
-    phase = Phases()
+    check_arguments(solver, tolerance)
+    phase = Phases(progress)
     with phase("check"):
         e = EquationsOfMotion(model, free=False, steady=True, progress=progress)
         warnings, changing = list(e.warnings), []

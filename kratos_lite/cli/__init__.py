@@ -23,6 +23,7 @@ class Terminated(KeyboardInterrupt):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code, one of `EXIT_CODES`."""
     atexit.register(gc.freeze)  # at its end Python would look through all objects for garbage, for 15 ms
+    gc.set_threshold(100_000)  # and a hundred times while modules are loaded, for 5 ms
     _escape_unknown_characters()
     words = sys.argv[1:] if arguments is None else list(arguments)
     debug = "--debug" in words

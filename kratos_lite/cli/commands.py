@@ -61,14 +61,18 @@ def _solve(options: Namespace, clock: float) -> int:
     reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
-    case = case_of(options)
-    seconds["read"] = perf_counter() - clock
     with TerminalProgress(options.progress) as progress:
+        progress("read", 0.0)
+        case = case_of(options)
+        seconds["read"] = perf_counter() - clock
         outcome = run(case, progress)
     if outcome.result is not None:
         outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
-        _print([] if options.quiet else outcome.summary(verbose=options.verbose))
+        with TerminalProgress(options.progress) as progress:
+            progress("evaluate", 0.0)
+            summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
+        _print(summary)
     except OSError:
         _write(outcome, options)
         raise
@@ -77,7 +81,9 @@ def _solve(options: Namespace, clock: float) -> int:
 
 def _write(outcome: Outcome, options: Namespace) -> int:
     """Write what the end gives, compare it with expected values, and say both; return the exit code."""
-    written, expected = outcome.write(), outcome.compare()
+    with TerminalProgress(options.progress) as progress:
+        progress("write", 0.0)
+        written, expected = outcome.write(), outcome.compare()
     _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
     _print(expected)
     missed = any(" failed " in line for line in expected)

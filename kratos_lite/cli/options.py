@@ -97,7 +97,7 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=Formatter,
     )
     parser.add_argument("--version", action="version", version=f"kratos-lite {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(prog="kratos-lite", dest="command", required=True, metavar="COMMAND")
     _add_solve(commands)
     info = _add(commands, "info", "describe a file without solving it")
     info.add_argument("input", help=f"{MODEL}; or {BODY}")

@@ -65,8 +65,15 @@ void define(py::module_& m, const char* name, const F& f, const char* doc, const
     m.def(name, f, doc, argument(arguments)...);
 }
 
+// Let Python handle signals, as it cannot while a kernel runs.
+inline void handle_signals() {
+    py::gil_scoped_acquire acquire;
+    if (PyErr_CheckSignals()) throw py::error_already_set();
+}
+
 // What every module of kernels offers.
 inline void common(py::module_& m) {
+    interruption() = &handle_signals;
     m.def("set_threads", [](int n) { wanted_threads() = n < 1 ? 1 : n; });
     m.def("isa", &isa_name);
 }

@@ -142,6 +142,7 @@ void for_chunks(const Connectivity& mesh, const Graph& graph, int V, int64_t wor
         const auto& chunks = subdomains.chunks(subdomain);
         const int64_t total = static_cast<int64_t>(chunks.size());
         for (int64_t from = 0; from < total; from += block) {
+            watch().look();
             const int64_t count = std::min(block, total - from);
             for (int64_t i = 0; i < count * V; ++i)
                 elements[i] = static_cast<int64_t>(chunks[from + i / V]) * V + i % V;

@@ -32,6 +32,7 @@ KL_INLINE void galerkin_rows(const Graph& g, const double* A, const Prolongator&
     constexpr int size = b * MODES;
     Doubles product;
     for (int64_t i = 0; i < g.rows; ++i) {
+        if (i % 64 == 0) watch().look();
         const int32_t p0 = P.indptr[i], p1 = P.indptr[i + 1];
         if (p0 == p1 || P.indices[p1 - 1] < first || P.indices[p0] >= last) continue;
         const int32_t start = AP.indptr[i], count = AP.indptr[i + 1] - start;

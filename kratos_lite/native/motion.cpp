@@ -247,6 +247,7 @@ std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Float
 
 PYBIND11_MODULE(_motion, m) {
     kl::common(m);
+    kl::interruption() = nullptr;  // bodies change in place: all of them take the step, or none
     using py::arg;
     const char* one = "q and u at the end of the step; returns the first body that failed, or -1";
     const char* many = "q and u after steps with constant loads; returns the first body that failed and its step";

@@ -5,6 +5,7 @@
 
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
@@ -19,6 +20,47 @@
 #endif
 
 namespace kl {
+
+// What a thread that has called parallel does every 50 ms; it throws to give the work up.  Bindings let it
+// look for signals, so that Ctrl-C ends a kernel.
+inline void (*&interruption())() {
+    static void (*look)() = nullptr;
+    return look;
+}
+
+constexpr std::chrono::milliseconds PATIENCE{50};
+
+// Tasks that take long call look() every now and then: it throws where the work is given up.
+class Watch {
+public:
+    void look() {
+        if (of_pool) {
+            if (given_up()) throw GivenUp{};
+            return;
+        }
+        const auto now = std::chrono::steady_clock::now();
+        if (!interruption() || now - last < PATIENCE) return;
+        last = now;
+        interruption()();
+    }
+
+    // Whether a task of the pool has failed, so that the others need not be finished.
+    static std::atomic<bool>& given_up() {
+        static std::atomic<bool> failed{false};
+        return failed;
+    }
+
+    bool of_pool = false;
+
+private:
+    struct GivenUp {};
+    std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
+};
+
+inline Watch& watch() {
+    static thread_local Watch watch;
+    return watch;
+}
 
 class Pool {
 public:
@@ -47,13 +89,22 @@ public:
             job = &task;
             total = tasks;
             next = 0;
+            Watch::given_up() = false;
             ++generation;
         }
         start.notify_all();
         work(task, tasks);
         std::unique_lock<std::mutex> lock(mutex);
         job = nullptr;
-        done.wait(lock, [this] { return helping == 0; });
+        while (!done.wait_for(lock, PATIENCE, [this] { return helping == 0; })) {
+            lock.unlock();
+            try {
+                watch().look();
+            } catch (...) {
+                give_up();
+            }
+            lock.lock();
+        }
         if (error) std::rethrow_exception(std::exchange(error, nullptr));
     }
 
@@ -62,16 +113,23 @@ private:
     void work(const std::function<void(int64_t)>& task, int64_t tasks) {
         for (int64_t i; (i = next++) < tasks;) {
             try {
+                watch().look();
                 task(i);
             } catch (...) {
-                std::lock_guard<std::mutex> lock(mutex);
-                error = std::current_exception();
+                give_up();
                 next = tasks;
             }
         }
     }
 
+    void give_up() {
+        std::lock_guard<std::mutex> lock(mutex);
+        if (!error) error = std::current_exception();
+        Watch::given_up() = true;
+    }
+
     void wait_for_work() {
+        watch().of_pool = true;
         std::unique_lock<std::mutex> lock(mutex);
         for (uint64_t seen = 0;;) {
             start.wait(lock, [&] { return generation != seen; });
@@ -120,7 +178,10 @@ void parallel(int64_t tasks, const F& f) {
 #endif
     std::unique_lock<std::mutex> lock(busy, std::try_to_lock);
     if (tasks <= 1 || wanted_threads() <= 1 || !lock) {
-        for (int64_t i = 0; i < tasks; ++i) f(i);
+        for (int64_t i = 0; i < tasks; ++i) {
+            watch().look();
+            f(i);
+        }
         return;
     }
     if (!pool || owner != process || size != wanted_threads()) {

@@ -92,7 +92,7 @@ def linear_level(
     parts = [p for group, c in zip(groups, corners, strict=True) for p in _parts(points, group, c, halved)]
     number = np.full(len(points), -1, dtype=np.int32)
     for part in parts:
-        number[part.group.nodes[:, np.unique(part.cells)]] = 0
+        number[part.group.nodes[:, sorted(set(part.cells.ravel().tolist()))]] = 0
     nodes = np.flatnonzero(number == 0)
     number[nodes] = np.arange(len(nodes))
     linear = [_linear(part, cell, number) for part in parts for cell in part.cells]
@@ -130,9 +130,12 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
     order = np.sort(sides, axis=1)
     along = np.where(order[:, 2] > LONG * order[:, 1], sides.argmax(axis=1), -1)
     parts = []
-    for axis in np.unique(along):
+    for axis in (-1, 0, 1, 2):
+        chosen = along == axis
+        if not chosen.any():
+            continue
         cells = None if axis < 0 else halves[axis]
-        some = _some(group, along == axis)
+        some = _some(group, chosen)
         parts.append(_Part(some, element, corners[None] if cells is None else cells))
     return parts
 

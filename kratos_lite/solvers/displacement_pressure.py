@@ -8,7 +8,7 @@ With p = κ D u the equations (A + Dᵀ κ D) u = b are
 which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
 p = -S⁻¹ r_p and one multigrid cycle for A u = r_u - Dᵀ p.  S ≈ D A⁻¹ Dᵀ + 1/κ is
 
-    S = D diag(A)⁻¹ Dᵀ + (means at corner nodes)² / (λ + 2μ) + 1/κ:
+    S = D blocks(A)⁻¹ Dᵀ + (means at corner nodes)² / (λ + 2μ) + 1/κ:
 
 the second term holds for smooth pressures, the first one for those that change sign from element to element.
 Some of these hardly act on the nodes (checkerboards): no element needs to be stable.
@@ -18,17 +18,21 @@ Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.blas import one_thread
+from kratos_lite.solvers.block_inverse import block_inverse
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.iteration import Share
 from kratos_lite.typing import Array, Mask, Progress
+
+if TYPE_CHECKING:
+    from scipy.sparse import bsr_array
 
 DIRECTIONS = 80
 """Iterations after which they start anew from what is left: their directions are kept until then."""
@@ -52,8 +56,8 @@ class DisplacementPressure:
         self._K, self._fixed = K, ~free
         self._cycle = multigrid.multigrid(K.A, free, points, linear)
         self.levels: list[int] = self._cycle.levels
-        inverse = _diagonal_inverse(K, free)
-        size = np.concatenate([np.sqrt(np.einsum("nii->ni", inverse)).ravel(), np.sqrt(K.modulus)])
+        inverse = block_inverse(K.A, free)
+        size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
         self._schur = _Schur(K, inverse, np.asarray(free.reshape(-1, 3).any(axis=1)))
@@ -186,13 +190,11 @@ class _Directions:
 class _Schur:
     """S in single precision, scaled to a diagonal of 1."""
 
-    def __init__(self, K: SplitMatrix, inverse: Array, loose: Mask) -> None:
-        from scipy.sparse import bsr_array, diags_array
+    def __init__(self, K: SplitMatrix, inverse: bsr_array, loose: Mask) -> None:
+        from scipy.sparse import diags_array
 
-        n = len(inverse)
-        blocks = bsr_array((inverse, np.arange(n), np.arange(n + 1)), shape=K.shape)
         means = K.means @ diags_array(loose * 1.0)  # around held nodes checkerboards have means, too
-        S = (K.D @ blocks.tocsr()) @ K.D.T + means @ means.T + diags_array(1 / K.bulk)
+        S = (K.D @ inverse.tocsr()) @ K.D.T + means @ means.T + diags_array(1 / K.bulk)
         self._scale = 1 / np.sqrt(S.diagonal())
         scale = diags_array(self._scale)
         self._S: Any = (scale @ S @ scale).astype(np.float32).tocsr()
@@ -217,15 +219,3 @@ class _Schur:
             p *= np.float32(rr / old)
             p += r
         return self._scale * (size * x.astype(float))
-
-
-def _diagonal_inverse(K: SplitMatrix, free: Mask) -> Array:
-    """Return the inverses (n, 3, 3) of the diagonal blocks of A, zero where components are not free."""
-    mask = free.reshape(-1, 3)
-    diagonal = K.A.diagonal_blocks()
-    rows = K.A.indices[diagonal]
-    both = mask[rows][:, :, None] & mask[rows][:, None, :]
-    blocks = np.where(both, K.A.data[diagonal], np.eye(3))
-    out = np.zeros((len(mask), 3, 3))
-    out[rows] = np.linalg.inv(blocks) * both
-    return out

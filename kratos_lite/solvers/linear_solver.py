@@ -162,7 +162,7 @@ class LinearSolver:
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool = False
     ) -> Solution:
         if self.method == "dense":
-            q = self.factors.solve(b)
+            q = self._made("factors", "factorize", progress).solve(b)
             return Solution(q, "dense", "", 0, backward_error(self._full, q, b))
         why = ""
         if self.method == "amg":
@@ -175,8 +175,17 @@ class LinearSolver:
                     "for plain ones with ν near 0.5 (formulation='non_locking' takes others), or ask for "
                     "solver='direct'"
                 )
-        q = self.factors.solve(b)
+        q = self._made("factors", "factorize", progress).solve(b)
         return Solution(q, "direct", why, 0, backward_error(self._sparse, q, b))
+
+    def _made(self, name: str, phase: str, progress: Progress | None) -> Any:
+        """Return what a method prepares, and report a phase if it is made now."""
+        if progress is None or name in vars(self):
+            return getattr(self, name)
+        progress(phase, 0.0)
+        made = getattr(self, name)
+        progress(phase, 1.0)
+        return made
 
     @cached_property
     def _full(self) -> Array:
@@ -248,7 +257,8 @@ class LinearSolver:
         exact = len(b) <= DIRECT_LIMIT and not continued
         aim = min(tolerance, ROUND_OFF) if exact else tolerance
         forecast = ConvergenceForecast(tolerance) if quick_to_factorize(len(b)) else None
-        x, iterations, converged = self._multigrid.solve(rhs, aim, self._norm, progress, forecast)
+        hierarchy = self._made("_multigrid", "set up", progress)
+        x, iterations, converged = hierarchy.solve(rhs, aim, self._norm, progress, forecast)
         q, scale = x[free], self._norm * np.abs(x).max() + np.abs(b).max()
         error = float(np.abs(b - (self._blocks @ x)[free]).max() / scale) if scale > 0 else 0.0
         stopped = f"multigrid stopped after {iterations} iterations short of {tolerance:g}"

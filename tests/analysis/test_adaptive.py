@@ -73,6 +73,7 @@ def test_the_history_is_in_the_report_and_the_model_stays():
     assert [value for label, value in rows if label == "estimated error"] == [
         f"{history[-1].error:.2%} of the energy norm, from {len(history)} meshes"
     ]
+    assert result.report.formulation == "KinematicLinear3D20N, raised from EnhancedStrain3D8N"
     assert summary(result)["requested_error"]["history"][-1]["error"] == result.report.error
     assert abs(result.report.total_reaction[2] + 1.0) < 1e-9
 

@@ -7,6 +7,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.native import kernels
+from kratos_lite.solvers import block_inverse as block_inverse_module
 from kratos_lite.solvers import dilatation, multigrid
 from kratos_lite.solvers import linear_solver as equations
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -117,6 +118,14 @@ def test_distorted_cells(element):
     check(model, LIMIT.get(element, 45))
 
 
+@pytest.mark.parametrize(
+    ("element", "aspect"),
+    [("BBar3D10N", 10), ("BBar3D10N", 100), ("BBar3D20N", 10), ("BBar3D27N", 10), ("BBar3D27N", 100)],
+)
+def test_flat_cells(element, aspect):
+    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), 70)
+
+
 # ---- materials -------------------------------------------------------------------------------------------
 
 
@@ -145,7 +154,7 @@ def test_a_rubber_with_fibers_is_nearly_incompressible():
 
 def test_elements_with_one_and_with_four_pressures():
     parts = [body("EnhancedStrain3D8N", cells=4).mesh, body("BBar3D27N", cells=2).mesh]
-    points = np.vstack([parts[0].points, parts[1].points + [2.0, 0.0, 0.0]])
+    points = np.vstack([parts[0].points, parts[1].points + np.array([2.0, 0.0, 0.0])])
     (block,) = parts[1].blocks
     beside = kl.Block(block.name, block.nodes + len(parts[0].points))
     model = kl.Model(kl.Mesh(points, [*parts[0].blocks, beside]), rubber())
@@ -189,6 +198,31 @@ def test_what_is_left_is_that_of_an_ordinary_material(element):
     values = np.linalg.eigvalsh(A)
     assert values[0] > -1e-9 * values[-1]
     assert values[-1] < 3 * np.linalg.eigvalsh(ordinary)[-1]
+
+
+@pytest.mark.parametrize("size", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.05)])
+def test_inverse_within_groups_of_nodes(size):
+    system = system_of(body("EnhancedStrain3D8N", cells=4, size=size))
+    A, free = system.K.A, np.ones(375, dtype=bool)
+    free[: 3 * 25 : 2] = False
+    group, place = block_inverse_module._groups(A, A.rows())
+    assert np.bincount(group).max() == (1 if size[2] == 1.0 else 5)
+    assert all(sorted(place[group == one]) == list(range((group == one).sum())) for one in set(group))
+    full, exact = A.scipy().toarray(), np.zeros((375, 375))
+    for one in set(group):
+        dofs = (3 * np.flatnonzero(group == one)[:, None] + np.arange(3)).ravel()
+        dofs = dofs[free[dofs]]
+        exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
+    found = block_inverse_module.block_inverse(A, free).toarray()
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13 * np.abs(exact).max())
+
+
+def test_large_groups_are_single_nodes(monkeypatch):
+    monkeypatch.setattr(block_inverse_module, "LONGEST", 4)
+    A = system_of(body("EnhancedStrain3D8N", cells=4, size=(1.0, 1.0, 0.05))).K.A
+    group, place = block_inverse_module._groups(A, A.rows())
+    assert np.bincount(group).max() == 1
+    assert not place.any()
 
 
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():

@@ -18,6 +18,8 @@ Plain: TypeAlias = Callable[..., int]
 """Takes a step in NumPy; returns the first body that failed, or -1."""
 PlainStep: TypeAlias = Callable[..., tuple[Array, int]]
 """The same under constant loads; returns the load at mid-step too."""
+AT_ONCE = 100_000
+"""Steps of one body in one call of a kernel: they take less than 0.1 s."""
 
 
 def compiled(name: str, *arguments: Any) -> Any:
@@ -72,12 +74,15 @@ class StepKernel:
         work: Array | None,
     ) -> None:
         """Take steps of bodies under constant loads; errors are those of `finish`."""
-        number = self.methods.index(method)
-        failed = compiled(f"{self.word}_steps", *arrays, h, count, number, tolerance, work)
-        if failed is NotImplemented:
-            failed = _in_numpy(plain, arrays, h, count, method, tolerance, work)
-        if failed[0] >= 0:
-            raise self._failure(method, arrays[0], failed[0], h, failed[1])
+        number, u = self.methods.index(method), arrays[1]
+        most = max(1, AT_ONCE * u.shape[-1] // max(u.size, 1))
+        for done in range(0, count, most):  # between calls Python handles signals
+            few = min(most, count - done)
+            failed = compiled(f"{self.word}_steps", *arrays, h, few, number, tolerance, work)
+            if failed is NotImplemented:
+                failed = _in_numpy(plain, arrays, h, few, method, tolerance, work)
+            if failed[0] >= 0:
+                raise self._failure(method, arrays[0], failed[0], h, done + failed[1])
 
     def _failure(self, method: str, q: Array, body: int, h: float, step: int | None = None) -> SolveError:
         """Return the error of a body, counted through all leading axes, whose step failed."""

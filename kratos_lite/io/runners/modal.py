@@ -17,10 +17,10 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     model, count = case.model, case.modes
     head = f"{'mode':>4}  {'frequency Hz':>14}  {'rad/s':>14}"
     if model.motion is None:
-        omega = model.modes(count)[0].tolist()
+        omega = model.modes(count, progress=progress)[0].tolist()
         rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(omega, 1)]
         return Outcome(case, [], lines=[head, *rows])
-    values = [z for z in model.complex_modes(2 * count)[0].tolist() if z.imag >= 0][:count]
+    values = [z for z in model.complex_modes(2 * count, progress=progress)[0].tolist() if z.imag >= 0][:count]
     rows = [
         f"{i:>4}  {z.imag / (2 * pi):>14.8g}  {z.imag:>14.8g}  {z.real:>14.3g}"
         for i, z in enumerate(values, 1)

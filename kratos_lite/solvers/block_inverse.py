@@ -1,0 +1,82 @@
+"""The inverse of a matrix within groups of strongly coupled nodes: lines in flat meshes, or single nodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.typing import Array, Ints, Mask
+
+if TYPE_CHECKING:
+    from scipy.sparse import bsr_array
+
+STRONG = 0.45
+"""Nodes are strongly coupled where |A_ij| exceeds this share of sqrt(|A_ii| |A_jj|)."""
+LONGEST = 40
+"""Nodes of the largest group; larger ones are taken as single nodes."""
+
+
+def block_inverse(A: BlockMatrix, free: Mask) -> bsr_array:
+    """Return the inverse (3n, 3n) of A within each group on its free components, 0 on the others.
+
+    Parameters
+    ----------
+    A : symmetric positive definite on the free components.
+    free : (3n,).
+    """
+    from scipy.sparse import bsr_array
+
+    rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
+    group, place = _groups(A, rows)
+    within = np.flatnonzero(group[rows] == group[columns])
+    rows, columns, data = rows[within], columns[within], A.data[within]
+    size = np.bincount(group)
+    members, mask, found = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
+    for k in np.unique(size):
+        nodes = members[size[group[members]] == k].reshape(-1, k)
+        number = np.empty(len(size), dtype=int)
+        number[group[nodes[:, 0]]] = np.arange(len(nodes))
+        mine = size[group[rows]] == k
+        blocks = np.zeros((len(nodes), k, 3, k, 3))
+        i, j = rows[mine], columns[mine]
+        blocks[number[group[i]], place[i], :, place[j], :] = data[mine]
+        inverse = _inverse(blocks.reshape(-1, 3 * k, 3 * k), mask[nodes].reshape(-1, 3 * k))
+        ends = np.repeat(nodes, k, axis=1), np.tile(nodes, (1, k))
+        found.append((*ends, inverse.reshape(-1, k, 3, k, 3).swapaxes(2, 3)))
+    i, j = (np.concatenate([part[end].ravel() for part in found]) for end in (0, 1))
+    inverses = np.concatenate([part[2].reshape(-1, 3, 3) for part in found])
+    order = np.argsort(i, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))])
+    return bsr_array((inverses[order], j[order], starts), shape=A.shape)
+
+
+def _groups(A: BlockMatrix, rows: Ints) -> tuple[Ints, Ints]:
+    """Return the group of each node, and its place in the group."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(A.indptr) - 1
+    size = np.sqrt(np.einsum("nij,nij->n", A.data, A.data))
+    root = np.zeros(n)
+    on = A.diagonal_blocks()
+    root[A.indices[on]] = np.sqrt(size[on])
+    strong = size > STRONG * root[rows] * root[A.indices]
+    graph = csr_array((np.ones(strong.sum()), (rows[strong], A.indices[strong])), shape=(n, n))
+    group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
+    large = np.bincount(group)[group] > LONGEST
+    group[large] = n + np.arange(large.sum())
+    group = np.unique(group, return_inverse=True)[1].astype(np.int64)
+    order = np.argsort(group, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(group))[:-1]])
+    place = np.empty(n, dtype=np.int64)
+    place[order] = np.arange(n) - first[group[order]]
+    return group, place
+
+
+def _inverse(blocks: Array, free: Mask) -> Array:
+    """Return the inverses of (m, k, k) on their free rows and columns (m, k), 0 on the others."""
+    both = free[:, :, None] & free[:, None, :]
+    inverse: Array = np.linalg.inv(np.where(both, blocks, np.eye(blocks.shape[-1])))
+    return np.where(both, inverse, 0.0)
