@@ -251,10 +251,18 @@ inline Lengths lengths(const Graph& g, const double* X, double far) {
     return out;
 }
 
+// Does each second node have fixed components, as in plane strain?  Rigid modes tell two such planes apart.
+inline bool are_held(const Bytes& fixed, int b) {
+    int64_t held = 0;
+    for (size_t i = 0; i < fixed.size(); i += b) held += std::any_of(&fixed[i], &fixed[i] + b, [](uint8_t f) { return f; });
+    return 2 * b * held > static_cast<int64_t>(fixed.size());
+}
+
 // The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
 // clusters that a gap sets apart from the links between them, and near links alone unless these are
 // cheap to factorize.
-inline Clusters find_clusters(const Graph& g, const double* A, int b, const double* X, double theta, double far) {
+inline Clusters find_clusters(const Graph& g, const double* A, int b, const Bytes& fixed, const double* X,
+                              double theta, double far) {
     if (!is_stretched(g, X, far)) return {};
     const Lengths links = lengths(g, X, far);
     Ints label(g.rows);
@@ -270,16 +278,17 @@ inline Clusters find_clusters(const Graph& g, const double* A, int b, const doub
     Clusters found;
     found.collect(g, label);
     Ints position(g.rows);
-    int64_t envelope = 0, blocks = 0;
+    int64_t envelope = 0, blocks = 0, several = 0;
     for (int64_t c = 0; c < found.count(); ++c) {
         if (found.starts[c + 1] - found.starts[c] == 1) continue;
+        ++several;
         envelope += found.envelope(g, c, position);
         for (int32_t p = found.starts[c]; p < found.starts[c + 1]; ++p)
             blocks += g.indptr[found.members[p] + 1] - g.indptr[found.members[p]];
     }
     if (envelope > FILL * blocks) {
         Clusters none;
-        none.near = links.near;
+        if (several > 2 || !are_held(fixed, b)) none.near = links.near;
         return none;
     }
     const Doubles own = diagonal_norms(g, A, b * b);

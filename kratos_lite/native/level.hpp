@@ -55,7 +55,7 @@ public:
 
     // Solve exactly within clusters of the nodes at X, if it has any.
     void cluster(const double* data, const Bytes& fixed, const double* X, double theta, double far) {
-        clusters = find_clusters(graph, data, b, X, theta, far);
+        clusters = find_clusters(graph, data, b, fixed, X, theta, far);
         if (!clusters.empty()) clusters.factorize(graph, data, b, fixed);
     }
 
