@@ -70,10 +70,11 @@ def linear_level(
 ) -> LinearLevel | None:
     """Return stiffness and interpolation of the linear elements on the corners of `groups`.
 
-    Elements that are linear already take part as they are.  Long ones are halved, as the nodes in their
-    middle are far from their corners compared with the others, which no smoothing of single nodes makes up
-    for.  Each node that is left takes the shape functions of the corners, at its reference place, in the
-    first element that has it; what they interpolate is a linear field wherever cells are straight-sided.
+    Elements that are linear already take part as they are.  Long ones are halved, unless they are few, as
+    the nodes in their middle are far from their corners compared with the others, which no smoothing of
+    single nodes makes up for.  Each node that is left takes the shape functions of the corners, at its
+    reference place, in the first element that has it; what they interpolate is a linear field wherever
+    cells are straight-sided.
 
     Parameters
     ----------
@@ -128,7 +129,10 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
     ends = np.swapaxes(points[group.nodes[:, corners]], 1, 2)
     sides = extent * np.linalg.norm(ends @ element.shape.dN(center), axis=1)
     order = np.sort(sides, axis=1)
-    along = np.where(order[:, 2] > LONG * order[:, 1], sides.argmax(axis=1), -1)
+    long = order[:, 2] > LONG * order[:, 1]
+    if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
+        return [_Part(group, element, corners[None])]
+    along = np.where(long, sides.argmax(axis=1), -1)
     parts = []
     for axis in (-1, 0, 1, 2):
         chosen = along == axis

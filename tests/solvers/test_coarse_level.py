@@ -83,6 +83,15 @@ def test_long_cells_are_halved_beside_others():
     np.testing.assert_allclose(P @ points[level.nodes], points, rtol=0, atol=1e-13)
 
 
+def test_a_few_long_cells_are_left_whole():
+    mesh = kl.box((3.0, 1.0, 1.0), (3, 1, 1), "KinematicLinear3D20N")
+    points = mesh.points.copy()
+    points[:, 0] = np.where(points[:, 0] > 2.0, 2.0 + 9.0 * (points[:, 0] - 2.0), points[:, 0])
+    level = linear_level(points, kl.Model(kl.Mesh(points, mesh.blocks), STEEL).element_groups())
+    assert len(level.nodes) == 16
+    assert not level.halved
+
+
 def test_linear_meshes_have_no_level():
     for suffix in LINEAR_OF.values():
         assert linear_level(*scene(suffix)) is None
