@@ -103,7 +103,8 @@ def test_import_loads_not_even_numpy():
 def test_small_scene_loads_nothing_heavy(cells, element):
     code = (
         "import kratos_lite as kl\n"
-        f"model = kl.Model(kl.box(cells=({cells},) * 3, element={element!r}), kl.Isotropic3D(1.0, 0.3, 1.0))\n"
+        f"mesh = kl.box(cells=({cells},) * 3, element={element!r})\n"
+        "model = kl.Model(mesh, kl.Isotropic3D(1.0, 0.3, 1.0))\n"
         "model.fix('z-')\nmodel.add(kl.Gravity((0, 0, -1)))\nmodel.solve()"
     )
     heavy = {"scipy", "pyamg", "meshio", "matplotlib", "dataclasses"}

@@ -108,10 +108,7 @@ def solve_to(
         start = perf_counter()
         analysis = StaticAnalysis(model, solver, tolerance, progress)
         result, before = _solved(analysis, _started(level, steps), rough), level
-        level = Level(model, result, steps, before)
-        if quantity is not None:
-            level = QuantityLevel(model, result, steps, before, quantity)
-            level.check_value()
+        level = _level(model, result, steps, before, quantity)
         history.append(level.step(perf_counter() - start))
         if before is not None:
             before.before = None  # the meshes before it are needed no more
@@ -131,17 +128,28 @@ def solve_to(
     if result.report.iterations and rough > tolerance:
         result = analysis.solve(start=result.u)
     analysis.release()
-    result.report.warnings += warnings
     if missed:
-        result.report.warnings.append(
+        warnings += [
             f"the error asked for, {aim:.3g}, was not reached: it may be {level.reported:.3g}; {missed}"
-        )
-    result.report.history, result.report.error = history, level.reported
-    result.report.error_asked = aim
+        ]
+    report = result.report
+    report.history, report.error, report.error_asked = history, level.reported, aim
+    report.error_of = "the energy norm" if quantity is None else str(quantity)
+    report.warnings += warnings
     if history[0].kinds != history[-1].kinds:
-        result.report.formulation = f"{history[-1].kinds}, raised from {history[0].kinds}"
-    result.report.error_of = "the energy norm" if quantity is None else str(quantity)
+        report.formulation = f"{history[-1].kinds}, raised from {history[0].kinds}"
     return result
+
+
+def _level(
+    model: Structure, result: Result, steps: Sequence[Finer], before: Level | None, quantity: Quantity | None
+) -> Level:
+    """Return what is known of the error of a result, or of a quantity of it."""
+    if quantity is None:
+        return Level(model, result, steps, before)
+    level = QuantityLevel(model, result, steps, before, quantity)
+    level.check_value()
+    return level
 
 
 def _curved(mesh: Mesh) -> list[str]:
