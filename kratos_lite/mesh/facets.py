@@ -29,7 +29,7 @@ def facets(mesh: Mesh) -> tuple[int, float]:
     >>> from kratos_lite import annulus, box
     >>> facets(box(cells=(3, 3, 3)))
     (0, 0.0)
-    >>> facets(annulus(1.0, 2.0, 1.0, (1, 24, 1)))
+    >>> facets(annulus(1.0, 2.0, 1.0, (1, 24, 1), element="Element3D8N"))
     (48, 15.0)
     """
     edges, faces, normals = (
