@@ -226,6 +226,8 @@ def test_what_the_format_cannot_hold_is_refused_and_the_old_file_stays(tmp_path,
 def test_kratos_itself_reads_the_same(tmp_path):
     document = cube()
     document.mesh = with_block(document.mesh, name="KinematicLinear3D8N")
+    given = document.nodal_data[0]  # a displacement of free nodes is a state that Kratos does not have
+    document.nodal_data[0] = Data(given.variable, given.ids[:1], given.fixed[:1], given.values[:1])
     write_mdpa(tmp_path / "cube.mdpa", document)
     run = subprocess.run(
         [sys.executable, "-c", KRATOS, str(tmp_path / "cube")], capture_output=True, text=True, check=True
