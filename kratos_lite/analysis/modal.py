@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.static import Phases
+from kratos_lite.analysis.solution_checks import Phases
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure

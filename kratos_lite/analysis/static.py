@@ -2,52 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from time import perf_counter
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kratos_lite import solvers
+from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import internal_load
-from kratos_lite.errors import InputError, ModelError, SolveError
-from kratos_lite.mesh import Mesh
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
+from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
 from kratos_lite.typing import Array, Mask, Progress
-from kratos_lite.validation import finite, function_or_none
+from kratos_lite.validation import finite
 
 ADJOINT_TOLERANCE = 1e-5
 """Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
-
-
-class Phases:
-    """Seconds spent in each named phase; `progress` is called where one begins and ends."""
-
-    def __init__(self, progress: Progress | None = None) -> None:
-        function_or_none(progress, "progress must be a function of a phase and a share")
-        self.seconds: dict[str, float] = {}
-        self.progress = progress
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """Measure the body of a ``with`` statement."""
-        start = perf_counter()
-        if self.progress:
-            self.progress(name, 0.0)
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
-        if self.progress:
-            self.progress(name, 1.0)
 
 
 @record(eq=False)
@@ -59,13 +33,6 @@ class LoadSet:
     forces: Array
     moving: Mask
     phase: Phases
-
-
-def check_arguments(solver: str, tolerance: float) -> None:
-    """Raise InputError for an unknown solver, or a tolerance beyond 0 … 1."""
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
-        raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    solvers.choose(solver, 0)
 
 
 class StaticAnalysis:
@@ -388,58 +355,6 @@ class _Origin:
         if self.version != self.analysis.model.version:
             raise ModelError("the model has changed since this solution; solve it again")
         return self.analysis
-
-
-def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:
-    """Return how a solution was found and how good it is, by the names of a `Report`."""
-    return {
-        "solver": solution.method,
-        "reason": solution.reason,
-        "iterations": solution.iterations,
-        "backward_error": solution.backward_error,
-        "force_error": balance[0],
-        "moment_error": balance[1],
-    }
-
-
-def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:
-    """Raise SolveError for a solution that does not solve its equations or is not in equilibrium."""
-    if not np.isfinite(u).all() or solution.backward_error > 1e-8:
-        raise SolveError(
-            f"{solution.method} solver reached a backward error of {solution.backward_error:.1e} only; "
-            "ask for a smaller tolerance, or look for very thin elements, a large stiffness contrast or "
-            "nearly free parts"
-        )
-    if max(balance) > 1e-2:
-        raise SolveError(
-            f"loads, reactions and stresses miss equilibrium by {balance[0]:.1e} (forces) and "
-            f"{balance[1]:.1e} (moments) of their size; look for a large stiffness contrast, spurious modes, "
-            "nearly free parts or an element class whose stiffness is not that of its stresses, and please "
-            "report a model that has none"
-        )
-
-
-def external_loads(mesh: Mesh, groups: Sequence[ElementGroup], loads: Sequence[Load]) -> Array:
-    """Return the nodal forces (n, 3) in N of all loads."""
-    total = np.zeros_like(mesh.points)
-    for load in loads:
-        total += load.forces(mesh, groups)
-    return total
-
-
-def initial_loads(model: Structure, groups: Sequence[ElementGroup]) -> Array | None:
-    """Return ∫ B^T (σ0 - C ε0) dV: what prestress and stress-free displacement put on the nodes."""
-    u0 = model.initial_displacement
-    if u0 is None and model.prestress is None:
-        return None
-    start = np.zeros_like(model.mesh.points) if u0 is None else -u0
-    return internal_load(model.mesh.points, groups, start)
-
-
-def stress_load(model: Structure, groups: Sequence[ElementGroup], u: Array) -> Array:
-    """Return ∫ B^T σ dV (n, 3) in N of the stresses that a result of u shows, with those of prestress."""
-    u0 = model.initial_displacement
-    return internal_load(model.mesh.points, groups, u if u0 is None else u - u0)
 
 
 def _any_axis(mask: Mask) -> Mask:

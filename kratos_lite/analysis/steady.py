@@ -7,9 +7,10 @@ from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
 from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
+from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
-from kratos_lite.analysis.static import Phases, check_arguments, initial_loads, judge, quality, stress_load
+from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization

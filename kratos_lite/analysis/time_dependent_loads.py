@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kratos_lite.analysis.static import initial_loads
+from kratos_lite.analysis.nodal_loads import initial_loads
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.model.checks import check_carried
 from kratos_lite.model.loads import Load, TimeDependentLoad

@@ -238,31 +238,23 @@ class Recovery:
         With recovered and with averaged σ*.  Prestress is given and no part of the error.  σ* is kept for the
         first of them alone.
         """
-        found = np.zeros((2, n_elements))
-        both = zip(self.regions, self._recovered(u), self._recovered(z, keep=False), strict=True)
-        for region, (values, nodal), (others, other_nodal) in both:
-            stars = (nodal, other_nodal), (region.averaged(values), region.averaged(others))
+        found, mine = np.zeros((2, n_elements)), self._recovered(u)
+        theirs = mine if z is u else self._recovered(z, keep=False)
+        for region, (values, nodal), (others, other_nodal) in zip(self.regions, mine, theirs, strict=True):
+            averaged = region.averaged(values)
+            other_averaged = averaged if z is u else region.averaged(others)
+            stars = (nodal, other_nodal), (averaged, other_averaged)
             for group, nodes, value, other in zip(region.groups, region.cells, values, others, strict=True):
                 fine, N, dV, S = self._tables(group)
-                raw, other_raw = (
-                    known if fine is group else at_gauss(self.points, fine, field)
-                    for known, field in ((value, u), (other, z))
-                )
+                raw = value if fine is group else at_gauss(self.points, fine, u)
+                other_raw = raw if z is u else other if fine is group else at_gauss(self.points, fine, z)
                 for row, (star, other_star) in zip(found, stars, strict=True):
                     row[group.rows] = _products((star, raw), (other_star, other_raw), nodes, N, dV, S)
         return found[0], found[1]
 
     def squared_errors(self, u: Array, n_elements: int) -> tuple[Array, Array]:
         """Return ∫ (σ* - σ) : C⁻¹ : (σ* - σ) dV of each element, (m,) in J, of recovered and averaged σ*."""
-        found = np.zeros((2, n_elements))
-        for region, (values, nodal) in zip(self.regions, self._recovered(u), strict=True):
-            averaged = region.averaged(values)
-            for group, nodes, value in zip(region.groups, region.cells, values, strict=True):
-                fine, N, dV, S = self._tables(group)
-                raw = value if fine is group else at_gauss(self.points, fine, u)
-                for row, star in zip(found, (nodal, averaged), strict=True):
-                    row[group.rows] = _products((star, raw), (star, raw), nodes, N, dV, S)
-        return found[0], found[1]
+        return self.products(u, u, n_elements)
 
     def _recovered(self, u: Array, keep: bool = True) -> list[tuple[list[Array], Array]]:
         """Return C ε at the points of the groups, and recovered at the nodes, of each region."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.analysis.static import external_loads
+from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads import Gravity, NodalForces, Pressure, Traction

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.analysis.static import external_loads
+from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.mesh.order import raised
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.loads import ConditionLoads, Load

@@ -456,7 +456,12 @@ MUTATIONS = [
         "velocity = (e.prescribed(short) - g) / short",
         SIGNS,
     ),
-    Mutation("analysis/static.py", "solution.backward_error > 1e-8", "solution.backward_error > 1e-3", SIGNS),
+    Mutation(
+        "analysis/solution_checks.py",
+        "solution.backward_error > 1e-8",
+        "solution.backward_error > 1e-3",
+        SIGNS,
+    ),
     # ---- files
     Mutation(
         "io/kratos/properties.py",

@@ -5,7 +5,7 @@ import pytest
 from meshes import elsewhere
 
 import kratos_lite as kl
-from kratos_lite.analysis import static as statics
+from kratos_lite.analysis.nodal_loads import initial_loads
 from kratos_lite.solvers import constrained_system as system
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
@@ -36,7 +36,7 @@ def everything(model, result, solver="direct"):
         tolerance=1e-13,
     )
     forces = np.array(result.loads)
-    initial = statics.initial_loads(model, model.element_groups())
+    initial = initial_loads(model, model.element_groups())
     forces = forces if initial is None else forces - initial
     u, _ = whole.solve(forces)
     assert len(whole.nodes) == model.mesh.used_nodes().sum()
