@@ -153,47 +153,38 @@ void for_chunks(const Connectivity& mesh, const Graph& graph, int V, int64_t wor
     });
 }
 
-template <int V, int... I>
-KL_INLINE void pick(vec<double, V>& to, const vec<double, V>& a, const vec<double, V>& b) {
-#if defined(__clang__) || __GNUC__ >= 12
-    to = __builtin_shufflevector(a, b, I...);
-#else
-    to = __builtin_shuffle(a, b, vec<int64_t, V>{I...});
-#endif
-}
-
 // r[l][e] = v[e][l]
 KL_INLINE void transpose(const vec<double, 2>* v, vec<double, 2>* r) {
-    pick<2, 0, 2>(r[0], v[0], v[1]);
-    pick<2, 1, 3>(r[1], v[0], v[1]);
+    pick<double, 2, 0, 2>(r[0], v[0], v[1]);
+    pick<double, 2, 1, 3>(r[1], v[0], v[1]);
 }
 
 KL_INLINE void transpose(const vec<double, 4>* v, vec<double, 4>* r) {
     vec<double, 4> t[4];
     for (int i = 0; i < 2; ++i) {
-        pick<4, 0, 4, 2, 6>(t[2 * i], v[2 * i], v[2 * i + 1]);
-        pick<4, 1, 5, 3, 7>(t[2 * i + 1], v[2 * i], v[2 * i + 1]);
+        pick<double, 4, 0, 4, 2, 6>(t[2 * i], v[2 * i], v[2 * i + 1]);
+        pick<double, 4, 1, 5, 3, 7>(t[2 * i + 1], v[2 * i], v[2 * i + 1]);
     }
     for (int i = 0; i < 2; ++i) {
-        pick<4, 0, 1, 4, 5>(r[i], t[i], t[2 + i]);
-        pick<4, 2, 3, 6, 7>(r[2 + i], t[i], t[2 + i]);
+        pick<double, 4, 0, 1, 4, 5>(r[i], t[i], t[2 + i]);
+        pick<double, 4, 2, 3, 6, 7>(r[2 + i], t[i], t[2 + i]);
     }
 }
 
 KL_INLINE void transpose(const vec<double, 8>* v, vec<double, 8>* r) {
     vec<double, 8> t[8], s[8];
     for (int i = 0; i < 4; ++i) {
-        pick<8, 0, 8, 2, 10, 4, 12, 6, 14>(t[2 * i], v[2 * i], v[2 * i + 1]);
-        pick<8, 1, 9, 3, 11, 5, 13, 7, 15>(t[2 * i + 1], v[2 * i], v[2 * i + 1]);
+        pick<double, 8, 0, 8, 2, 10, 4, 12, 6, 14>(t[2 * i], v[2 * i], v[2 * i + 1]);
+        pick<double, 8, 1, 9, 3, 11, 5, 13, 7, 15>(t[2 * i + 1], v[2 * i], v[2 * i + 1]);
     }
     for (int i = 0; i < 8; i += 4)
         for (int j = 0; j < 2; ++j) {
-            pick<8, 0, 1, 8, 9, 4, 5, 12, 13>(s[i + j], t[i + j], t[i + 2 + j]);
-            pick<8, 2, 3, 10, 11, 6, 7, 14, 15>(s[i + 2 + j], t[i + j], t[i + 2 + j]);
+            pick<double, 8, 0, 1, 8, 9, 4, 5, 12, 13>(s[i + j], t[i + j], t[i + 2 + j]);
+            pick<double, 8, 2, 3, 10, 11, 6, 7, 14, 15>(s[i + 2 + j], t[i + j], t[i + 2 + j]);
         }
     for (int j = 0; j < 4; ++j) {
-        pick<8, 0, 1, 2, 3, 8, 9, 10, 11>(r[j], s[j], s[4 + j]);
-        pick<8, 4, 5, 6, 7, 12, 13, 14, 15>(r[4 + j], s[j], s[4 + j]);
+        pick<double, 8, 0, 1, 2, 3, 8, 9, 10, 11>(r[j], s[j], s[4 + j]);
+        pick<double, 8, 4, 5, 6, 7, 12, 13, 14, 15>(r[4 + j], s[j], s[4 + j]);
     }
 }
 

@@ -16,11 +16,11 @@ constexpr int STALLED = 200;  // iterations without a new smallest residual; thi
 
 // Conjugate gradients on A x = b with the V-cycle; A's rows at fixed components are left out.
 // Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
-inline Outcome conjugate_gradients(const BlockMatrix& A, const Bytes& fixed, Hierarchy& M,
-                                   const double* b, double* x, double tolerance, double norm_A, int most,
-                                   const std::function<bool(double)>& each) {
-    const int64_t n = 3 * A.rows;
-    Doubles r(b, b + n), z(n), p(n), Ap(n);
+template <class Product>
+Outcome conjugate_gradients(const Product& times_A, const Bytes& fixed, Hierarchy& M, const double* b, double* x,
+                            double tolerance, double norm_A, int most, const std::function<bool(double)>& each) {
+    const int64_t n = static_cast<int64_t>(fixed.size());
+    Doubles r(b, b + n), z(n + 1), p, Ap(n);  // products without a matrix read a number behind the last
     std::fill(x, x + n, 0.0);
     const double norm_b = std::sqrt(dot(b, b, n));
     if (norm_b == 0) return {0, true};
@@ -29,20 +29,22 @@ inline Outcome conjugate_gradients(const BlockMatrix& A, const Bytes& fixed, Hie
     double rz = dot(r.data(), z.data(), n), best = INFINITY;  // residuals may grow at first
     int best_at = 0;
     for (int k = 1; k <= most; ++k) {
-        multiply(A, p.data(), Ap.data());
-        for_each(n, [&](int64_t i) {
+        times_A(p.data(), Ap.data());
+        const double curvature = sums<1>(n, [&](int64_t i, auto& sum) {
             if (fixed[i]) Ap[i] = 0;
-        });
-        const double curvature = dot(p.data(), Ap.data(), n);
+            sum[0] += p[i] * Ap[i];
+        })[0];
         if (!(curvature > 0 && rz > 0)) return {k, false};
         const double alpha = rz / curvature;
-        for_each(n, [&](int64_t i) {
+        const auto [rr, xx] = sums<2>(n, [&](int64_t i, auto& sum) {
             x[i] += alpha * p[i];
             r[i] -= alpha * Ap[i];
+            sum[0] += r[i] * r[i];
+            sum[1] += x[i] * x[i];
         });
-        const double norm = std::sqrt(dot(r.data(), r.data(), n));
+        const double norm = std::sqrt(rr);
         if (!each(norm / norm_b)) return {k, false};
-        const double floor = 2 * 2.2e-16 * (norm_A * std::sqrt(dot(x, x, n)) + norm_b);
+        const double floor = 2 * 2.2e-16 * (norm_A * std::sqrt(xx) + norm_b);
         if (norm <= std::fmax(tolerance * norm_b, floor)) return {k, true};
         if (norm < best) {
             best = norm;

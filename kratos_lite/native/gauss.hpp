@@ -136,11 +136,10 @@ KL_INLINE void largest(const vec<double, V>* values, int count, vec<double, V>& 
     }
 }
 
-// Whether J differs between Gauss points by no more than the rounding of its sums.
+// Whether J differs between Gauss points by no more than the rounding of coordinates as large as `size` at most.
 template <int V>
-KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double, V>* J) {
-    vec<double, V> size, change = {};
-    largest<V>(X, 3 * k, size);
+KL_INLINE bool constant(int g, const vec<double, V>& size, const vec<double, V>* J) {
+    vec<double, V> change = {};
     for (int q = 1; q < g; ++q)
         for (int c = 0; c < 9; ++c) {
             vec<double, V> x;

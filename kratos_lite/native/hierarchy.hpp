@@ -29,6 +29,14 @@ public:
         levels.back().largest = largest_eigenvalue(levels.back());
     }
 
+    // The finest level without a matrix, with nodes at points (n, 3).
+    void add_elements(const MatrixFree& product, const Bytes& fixed, Doubles points) {
+        levels.emplace_back();
+        X = std::move(points);
+        inverse = levels.back().set_elements(product, fixed);
+        levels.back().largest = largest_eigenvalue(levels.back());
+    }
+
     // The linear level of quadratic elements below the level that is last: weights (n, m) from its
     // nodes to all.
     void add_linear(const Graph& g, const double* data, Bytes fixed, Transfer transfer,
@@ -45,10 +53,10 @@ public:
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
     // B (n, 3, 6 sets) are its rigid modes and others that take little energy, zero at fixed components.
-    void coarsen(const double* data, Bytes fixed, Doubles B) {
+    void coarsen(Graph graph, const double* data, Bytes fixed, Doubles B) {
         sets = static_cast<int>(B.size() / (fixed.size() * MODES));
         CoarseMatrix matrix;
-        Graph graph = levels.back().graph;
+        levels.back().graph = graph;
         while (true) {
             Level& fine = levels.back();
             if (fine.size() <= settings.full || levels.size() > 20) break;

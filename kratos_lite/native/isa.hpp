@@ -62,6 +62,17 @@ struct vec_of {
 template <class T, int V>
 using vec = typename vec_of<T, V>::type;
 
+// Numbers I of a and b, one after the other.
+template <class T, int V, int... I>
+KL_INLINE void pick(vec<T, V>& to, const vec<T, V>& a, const vec<T, V>& b) {
+#if defined(__clang__) || __GNUC__ >= 12
+    to = __builtin_shufflevector(a, b, I...);
+#else
+    typedef std::conditional_t<sizeof(T) == 4, int32_t, int64_t> Index;
+    to = __builtin_shuffle(a, b, vec<Index, V>{I...});
+#endif
+}
+
 // Working memory, aligned for vectors.
 class Workspace {
 public:

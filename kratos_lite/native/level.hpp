@@ -2,6 +2,7 @@
 
 #pragma once
 #include "clusters.hpp"
+#include "matrix_free.hpp"
 
 namespace kl {
 
@@ -45,13 +46,15 @@ public:
     Graph graph{};
     Ints own_indptr, own_indices;  // where the pattern is not borrowed
     Floats A, Dinv;
+    const MatrixFree* elements = nullptr;  // in place of A, with the components that are fixed
+    Bytes held;
     float largest = 0;  // eigenvalue of D^-1 A, from above
     Floats x, y, d, c;
     Clusters clusters;  // where D is more than the diagonal blocks
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
-    int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes(); }
+    int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes() + (elements ? elements->bytes() : 0); }
 
     // Solve exactly within clusters of the nodes at X, if it has any.
     void cluster(const double* data, const Bytes& fixed, const double* X, double theta, double far) {
@@ -84,8 +87,29 @@ public:
         return inverse;
     }
 
+    // Take the product of elements in place of a matrix; return the inverse of the diagonal blocks in double.
+    Doubles set_elements(const MatrixFree& product, const Bytes& fixed) {
+        elements = &product;
+        held = fixed;
+        n = product.n;
+        Dinv.assign(static_cast<size_t>(n) * 9 + 8, 0.0f);
+        Doubles D = product.diagonal();
+        parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
+            for (int64_t i = first; i < last; ++i) {
+                double block[9];
+                for (int e = 0; e < 9; ++e)
+                    block[e] = e % 4 && (fixed[3 * i + e / 3] || fixed[3 * i + e % 3]) ? 0.0 : D[9 * i + e];
+                invert<3>(block, &D[9 * i]);
+                std::copy(&D[9 * i], &D[9 * i] + 9, &Dinv[9 * i]);
+            }
+        });
+        for (Floats* v : {&x, &y, &d, &c}) v->assign(size() + 8, 0.0f);
+        return D;
+    }
+
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
+        if (elements) return step_elements(from, to, alpha, beta, smooth);
         const float* inverse = smooth && clusters.empty() ? Dinv.data() : nullptr;
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             b == 3 ? step<3>(inverse, from, to, alpha, beta, first, last)
@@ -127,6 +151,23 @@ public:
     void residual(Floats& out) { step(x.data(), out.data(), 0, 0, false); }
 
 private:
+    void step_elements(const float* from, float* to, float alpha, float beta, bool smooth) {
+        elements->multiply(from, elements->floats, [&](int64_t i, const float* sum) {
+            float r[3];
+            for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
+            if (!smooth) {
+                std::copy(r, r + 3, to + 3 * i);
+                return;
+            }
+            const float* D = &Dinv[9 * i];
+            for (int j = 0; j < 3; ++j) {
+                float& change = d[3 * i + j];
+                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
+                to[3 * i + j] = from[3 * i + j] + change;
+            }
+        });
+    }
+
     template <int B>
     void step(const float* inverse, const float* from, float* to, float alpha, float beta, int64_t first,
               int64_t last) {
@@ -193,7 +234,7 @@ inline float largest_eigenvalue(Level& level, int steps = 15) {
     uint32_t noise = 12345;
     for (int64_t i = 0; i < size; ++i) {
         noise = noise * 1664525u + 1013904223u;
-        r[i] = static_cast<float>(noise >> 8) / 16777216.0f - 0.5f;
+        if (level.held.empty() || !level.held[i]) r[i] = static_cast<float>(noise >> 8) / 16777216.0f - 0.5f;
     }
     std::fill(level.c.begin(), level.c.end(), 0.0f);
     Doubles diagonal, off_diagonal;

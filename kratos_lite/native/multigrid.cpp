@@ -1,7 +1,7 @@
 // Algebraic multigrid for matrices of 3x3 blocks, as a preconditioner and as a solver.
 
-#include "arrays.hpp"
 #include "conjugate_gradients.hpp"
+#include "elements.hpp"
 
 namespace {
 
@@ -22,6 +22,76 @@ struct Matrix {
     int64_t rows() const { return indptr.size() - 1; }
     Graph graph() const { return {rows(), indptr.data(), indices.data()}; }
     BlockMatrix blocks() const { return {graph(), data.data(), static_cast<uint32_t>(rows())}; }
+};
+
+// From places to points and to slopes (n, n), and from nodes to places (n^3, k), of a tensor product rule whose
+// points come in the order of the places.
+using Factors = std::optional<std::tuple<Array<double>, Array<double>, Array<double>>>;
+
+TensorTables<double> tensor_tables(const Factors& factors, const Elements& w) {
+    TensorTables<double> t;
+    if (!factors) return t;
+    const auto& [values, slopes, places] = *factors;
+    t.n = static_cast<int>(values.shape(0));
+    require((t.n == 2 || t.n == 3) && has_shape(values, t.n, t.n) && has_shape(slopes, t.n, t.n) &&
+                w.g == t.n * t.n * t.n && has_shape(places, w.g, w.k),
+            "factors must be two (n, n) with n = 2 or 3, and (n^3, k)");
+    std::copy(values.data(), values.data() + values.size(), t.values);
+    std::copy(slopes.data(), slopes.data() + slopes.size(), t.slopes);
+    t.place.assign(w.k, -1);
+    for (int p = 0; p < w.g; ++p) {
+        const double* row = places.data() + static_cast<int64_t>(p) * w.k;
+        const auto is_one = [](double weight) { return weight == 1; };
+        const bool single = std::count(row, row + w.k, 0.0) == w.k - 1 && std::count_if(row, row + w.k, is_one);
+        if (single)
+            t.place[std::find_if(row, row + w.k, is_one) - row] = p;
+        else {
+            t.extra.push_back(p);
+            t.weights.insert(t.weights.end(), row, row + w.k);
+        }
+    }
+    for (int p : t.place) require(p >= 0, "each node must have a place");
+    return t;
+}
+
+// Elements of a kind (nodes, dN, weights, C, factors), whose arrays are kept.
+using ElementTables = std::tuple<Array<int32_t>, Array<double>, Array<double>, Array<double>, Factors>;
+
+class Product : public MatrixFree {
+public:
+    Product(Numbers points, std::vector<ElementTables> groups)
+        : MatrixFree(points.size() / 3, points.data()), groups(std::move(groups)) {
+        for (const auto& [nodes, dN, weights, C, factors] : this->groups) {
+            Elements w = elements(points, nodes, dN, weights);
+            set_law(w, C, {});
+            add(w, tensor_tables(factors, w));
+        }
+        py::gil_scoped_release release;
+        prepare();
+    }
+
+    Array<double> times(Array<double> x) const {
+        require(x.size() == 3 * n, "x must have three numbers for each point");
+        Array<double> y(3 * n);
+        Doubles from(x.data(), x.data() + 3 * n);
+        from.push_back(0);
+        double* to = y.mutable_data();
+        py::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(busy);
+        multiply(from.data(), to);
+        return y;
+    }
+
+    double largest_row_sum() const {
+        py::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(busy);
+        return norm();
+    }
+
+    mutable std::mutex busy;  // the element vectors serve one product at a time
+
+private:
+    std::vector<ElementTables> groups;
 };
 
 Bytes bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
@@ -52,12 +122,24 @@ public:
         hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed, std::move(X));
     }
 
-    // Smoothed aggregation below the finest level.
-    void aggregate(Array<double> modes) {
+    Multigrid(std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, Settings settings)
+        : elements(std::move(product)), fixed(bytes_of(fixed)), hierarchy(settings) {
+        require(fixed.size() == 3 * elements->n, "fixed must have one entry for each unknown");
+        Doubles X = coordinates(points, this->fixed.size());
+        py::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(elements->busy);
+        hierarchy.add_elements(*elements, this->fixed, std::move(X));
+    }
+
+    // Smoothed aggregation below the finest level, of its matrix; where it works without one, of that given.
+    void aggregate(Array<double> modes, std::optional<Matrix> matrix) {
         require(hierarchy.levels.size() == 1, "aggregated already");
+        require(matrix.has_value() == (elements != nullptr), "a matrix is needed where elements take its place");
+        const Matrix& finest = matrix ? *matrix : A;
+        require(3 * finest.rows() == static_cast<int64_t>(fixed.size()), "the matrix must have a row for each unknown");
         Doubles B = free_modes(modes, fixed);
         py::gil_scoped_release release;
-        hierarchy.coarsen(A.data.data(), fixed, std::move(B));
+        hierarchy.coarsen(finest.graph(), finest.data.data(), fixed, std::move(B));
     }
 
     // A linear level below the finest one, and smoothed aggregation below that.
@@ -67,7 +149,7 @@ public:
         require(hierarchy.levels.size() == 1, "aggregated already");
         below = std::move(linear);
         require(linear_fixed.size() == 3 * below.rows(), "one entry for each linear unknown");
-        require(indptr.size() == A.indptr.size(), "weights must have one row for each node");
+        require(3 * (indptr.size() - 1) == static_cast<int64_t>(fixed.size()), "weights must have one row for each node");
         require(weights.size() == indices.size(), "one weight for each index is needed");
         check_rows(indptr, indices.size());
         require(are_rows(indices, below.rows()), "indices must be nodes of the linear level");
@@ -80,7 +162,7 @@ public:
         py::gil_scoped_release release;
         hierarchy.add_linear(below.graph(), below.data.data(), coarse_fixed, std::move(transfer), fixed,
                              std::move(X));
-        hierarchy.coarsen(below.data.data(), coarse_fixed, std::move(B));
+        hierarchy.coarsen(below.graph(), below.data.data(), coarse_fixed, std::move(B));
     }
 
     Array<double> cycle(Array<double> r) {
@@ -90,6 +172,7 @@ public:
         double* to = z.mutable_data();
         py::gil_scoped_release release;
         std::lock_guard<std::mutex> lock(busy);
+        const auto lock_elements = occupied();
         hierarchy.cycle(from, to);
         return z;
     }
@@ -109,7 +192,11 @@ public:
         {
             py::gil_scoped_release release;
             std::lock_guard<std::mutex> lock(busy);
-            outcome = conjugate_gradients(A.blocks(), fixed, hierarchy, from, to, tolerance, norm, most, each);
+            const auto lock_elements = occupied();
+            const auto times_A = [&](const double* p, double* Ap) {
+                elements ? elements->multiply(p, Ap) : multiply(A.blocks(), p, Ap);
+            };
+            outcome = conjugate_gradients(times_A, fixed, hierarchy, from, to, tolerance, norm, most, each);
         }
         return py::make_tuple(x, outcome.iterations, outcome.converged);
     }
@@ -127,10 +214,15 @@ public:
     }
 
     Matrix A, below;
+    std::shared_ptr<Product> elements;  // in place of A
     Bytes fixed;
     Hierarchy hierarchy;
 
 private:
+    std::unique_lock<std::mutex> occupied() const {
+        return elements ? std::unique_lock<std::mutex>(elements->busy) : std::unique_lock<std::mutex>();
+    }
+
     std::mutex busy;  // the levels' vectors serve one solution at a time
 };
 
@@ -141,12 +233,21 @@ PYBIND11_MODULE(_multigrid, m) {
     py::class_<Matrix>(m, "Matrix")
         .def(py::init<Array<int32_t>, Array<int32_t>, Array<double>>(), argument("indptr"), argument("indices"),
              argument("data"));
+    py::class_<Product, std::shared_ptr<Product>>(m, "Product")
+        .def(py::init<Numbers, std::vector<ElementTables>>(), argument("points"), py::arg("groups"))
+        .def("times", &Product::times)
+        .def("norm", &Product::largest_row_sum)
+        .def("bytes", [](const Product& product) { return product.bytes(); });
     py::class_<Multigrid>(m, "Multigrid")
         .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
                          double theta) {
             return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta});
         }))
-        .def("aggregate", &Multigrid::aggregate)
+        .def(py::init([](std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, int degree,
+                         float ratio, double theta) {
+            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta});
+        }))
+        .def("aggregate", &Multigrid::aggregate, py::arg("modes"), py::arg("matrix") = py::none())
         .def("aggregate_linear", &Multigrid::aggregate_linear)
         .def("cycle", &Multigrid::cycle)
         .def("solve", &Multigrid::solve)

@@ -2,6 +2,7 @@
 
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
@@ -78,19 +79,26 @@ void for_each(int64_t n, const F& f) {
     });
 }
 
-// The sum of x y in double, the same for any number of threads.
-template <class T>
-double dot(const T* x, const T* y, int64_t n) {
+// Sums of the `count` numbers that f(i, sums) adds for all numbers of a vector, the same for any number of threads.
+template <int count, class F>
+std::array<double, count> sums(int64_t n, const F& f) {
     constexpr int64_t PART = 8192;
-    std::vector<double> parts((n + PART - 1) / PART);
+    std::vector<std::array<double, count>> parts((n + PART - 1) / PART);
     parallel_ranges(n, PART, [&](int64_t first, int64_t last) {
-        double sum = 0;
-        for (int64_t i = first; i < last; ++i) sum += static_cast<double>(x[i]) * y[i];
+        std::array<double, count> sum = {};
+        for (int64_t i = first; i < last; ++i) f(i, sum);
         parts[first / PART] = sum;
     });
-    double sum = 0;
-    for (double part : parts) sum += part;
-    return sum;
+    std::array<double, count> total = {};
+    for (const auto& part : parts)
+        for (int c = 0; c < count; ++c) total[c] += part[c];
+    return total;
+}
+
+// The sum of x y in double.
+template <class T>
+double dot(const T* x, const T* y, int64_t n) {
+    return sums<1>(n, [&](int64_t i, auto& sum) { sum[0] += static_cast<double>(x[i]) * y[i]; })[0];
 }
 
 }  // namespace kl

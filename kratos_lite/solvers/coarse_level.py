@@ -51,6 +51,10 @@ class LinearLevel:
     halved: bool = False
 
 
+STRETCHED = 3.0
+"""Longest to shortest side of a cell above which smoothing single nodes is slow."""
+SAMPLE = 2000
+"""Cells of a group that show whether it is stretched."""
 LONG = 3.0
 """Length of a cell to its second length from which its halves are the linear elements."""
 
@@ -103,6 +107,25 @@ def linear_level(
     return level if hanging is None else _continuous(level, groups, number, hanging)
 
 
+def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
+    """Return whether one of twenty elements, of some of each group, is long or flat."""
+    seen = stretched = 0
+    for group in groups:
+        linear = group.element.shape.linear() or group.element.shape
+        some = slice(None, None, max(1, len(group) // SAMPLE))
+        corners = points[group.nodes[some, : linear.corners]]
+        sides = _sides(linear, corners)
+        seen += len(sides)
+        stretched += np.count_nonzero(sides.max(axis=1) > STRETCHED * sides.min(axis=1))
+    return 20 * stretched > seen
+
+
+def _sides(shape: type[Shape], corners: Array) -> Array:
+    """Return the lengths (m, 3) of elements of a linear shape along its axes, with corners (m, c, 3)."""
+    center, extent = shape.nodes.mean(axis=0), np.ptp(shape.nodes, axis=0)
+    return extent * np.linalg.norm(np.swapaxes(corners, 1, 2) @ shape.dN(center), axis=1)
+
+
 def _corners(shape: type[Shape]) -> Ints | None:
     """Return the rows among the nodes of a shape that are the nodes of its linear element."""
     linear = shape.linear()
@@ -125,10 +148,7 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
     halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
     if all(cells is None for cells in halves):
         return [_Part(group, element, corners[None])]
-    center, extent = element.shape.nodes.mean(axis=0), np.ptp(element.shape.nodes, axis=0)
-    ends = np.swapaxes(points[group.nodes[:, corners]], 1, 2)
-    sides = extent * np.linalg.norm(ends @ element.shape.dN(center), axis=1)
-    order = np.sort(sides, axis=1)
+    order = np.sort(_sides(element.shape, points[group.nodes[:, corners]]), axis=1)
     long = order[:, 2] > LONG * order[:, 1]
     if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
         return [_Part(group, element, corners[None])]
@@ -190,25 +210,29 @@ def _weights(part: _Part) -> Array:
 
 def _interpolation(parts: Sequence[_Part], number: Rows) -> tuple[Rows, Rows, Array]:
     """Return rows (indptr, indices, weights) from corners to all nodes; `number` is that of each corner."""
-    corners = np.flatnonzero(number >= 0)
-    entries = [(corners, number[corners], np.ones(len(corners)))]
-    missing = number < 0
+    owner, counts = np.full(len(number), -1), (number >= 0).astype(np.int64)
+    found = []
     for part in parts:
-        group = part.group
+        group, N = part.group, _weights(part)
         k = group.nodes.shape[1]
         first = np.full(len(number), -1)
         flat = group.nodes.ravel()
         first[flat[::-1]] = np.arange(len(flat))[::-1]  # the first element with a node is written last
-        rows = np.flatnonzero((first >= 0) & missing)
-        missing[rows] = False
-        element, local = np.divmod(first[rows], k)
-        N = _weights(part)[local]
-        at, corner = np.nonzero(N)
-        entries.append((rows[at], number[group.nodes[element[at], corner]], N[at, corner]))
-    rows, columns, weights = (np.concatenate(part) for part in zip(*entries, strict=True))
-    order = np.lexsort((columns, rows))
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(number)))])
-    return indptr.astype(np.int32), columns[order].astype(np.int32), weights[order]
+        rows = np.flatnonzero((first >= 0) & (number < 0) & (owner < 0))
+        owner[rows], local = np.divmod(first[rows], k)
+        for node in range(k):
+            mine, corners = rows[local == node], np.flatnonzero(N[node])
+            if len(mine):
+                counts[mine] = len(corners)
+                found.append((mine, number[group.nodes[owner[mine]][:, corners]], N[node, corners]))
+    indptr = np.concatenate([[0], np.cumsum(counts)])
+    indices, weights = np.empty(indptr[-1], dtype=np.int32), np.ones(indptr[-1])
+    indices[indptr[:-1][number >= 0]] = number[number >= 0]
+    for mine, columns, N in found:
+        at = indptr[mine][:, None] + np.arange(len(N))
+        order = columns.argsort(axis=1)
+        indices[at], weights[at] = np.take_along_axis(columns, order, axis=1), N[order]
+    return indptr.astype(np.int32), indices, weights
 
 
 def _continuous(

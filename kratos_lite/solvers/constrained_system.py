@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 
 from kratos_lite import solvers
 from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.gauss_point_fields import internal_load
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import replace
-from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.coarse_level import is_stretched, linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.dilatation import SplitMatrix, split
 from kratos_lite.solvers.linear_solver import DENSE_MAX
 from kratos_lite.typing import Array, Ints, Progress
+LARGEST_CONTRAST = 1e3
+"""Stiffest to softest material up to which products without a matrix leave soft parts as exact as with one."""
 
 
 class ConstrainedSystem:
@@ -99,14 +103,32 @@ class ConstrainedSystem:
     def K(self) -> Any:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
 
-        For the method ``amg`` it is a SplitMatrix where elements are nearly incompressible.
+        For the method ``amg`` it is a MatrixFree where elements are quadratic, and a SplitMatrix where they
+        are nearly incompressible.
         """
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
+        if self._is_matrix_free():
+            return MatrixFree(self.points, self.groups, self._assembled)
+        K = self._assembled()
+        return split(K, self.points, self.groups, self.pattern) if self.method == "amg" else K
+
+    def _assembled(self) -> BlockMatrix:
         skipped: set[str] = set()
         K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
-        return split(K, self.points, self.groups, self.pattern) if self.method == "amg" else K
+        return K
+
+    def _is_matrix_free(self) -> bool:
+        """Return whether multigrid smooths well with the product of K alone: no element is stretched."""
+        return (
+            self.method == "amg"
+            and self.reduced.T is None
+            and self._hanging is None
+            and all(map(MatrixFree.takes, self.groups))
+            and stiffness_contrast(self.groups) <= LARGEST_CONTRAST
+            and not is_stretched(self.points, self.groups)
+        )
 
     @cached_property
     def norm(self) -> float:
@@ -180,6 +202,12 @@ class ConstrainedSystem:
         out = np.zeros((self.n_nodes, 3))
         out[self.nodes] = values.reshape(-1, 3)
         return out
+
+
+def stiffness_contrast(groups: Sequence[ElementGroup]) -> float:
+    """Return the largest modulus of the stiffest material to that of the softest."""
+    moduli = [float(np.abs(group.material.C).max()) for group in groups]
+    return max(moduli) / min(moduli)
 
 
 def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[ElementGroup]]:

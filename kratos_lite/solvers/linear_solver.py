@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 from kratos_lite.records import record, replace
@@ -210,7 +211,7 @@ class LinearSolver:
         )
 
     @cached_property
-    def _blocks(self) -> BlockMatrix | SplitMatrix:
+    def _blocks(self) -> BlockMatrix | MatrixFree | SplitMatrix:
         """The matrix on all components, constraints worked in, of which only the free ones count."""
         T, free = self.reduced.T, self.reduced.free
         if T is None:
@@ -294,7 +295,7 @@ def on_all(T: Any, free: Ints) -> Any:
 
 def matrix_norm(A: Any) -> float:
     """Return the largest row sum of |A|."""
-    if isinstance(A, (BlockMatrix, SplitMatrix)):
+    if isinstance(A, (BlockMatrix, MatrixFree, SplitMatrix)):
         return A.norm()
     return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
 

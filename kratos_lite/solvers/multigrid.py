@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.native import kernels
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.coarse_level import LinearLevel
@@ -54,23 +55,28 @@ class Solver(Protocol):
 
 
 def multigrid(
-    A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None
+    A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: LinearLevel | None = None
 ) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,).
 
     Parameters
     ----------
-    A : blocks, (3n, 3n).
+    A : blocks, (3n, 3n), or their product alone, which needs the linear elements.
     free : (3n,) the components that are unknown; rows and columns of the others do not matter.
     points : (n, 3) m, from which come the rigid modes.
     linear : the linear elements within quadratic ones.
     """
     compiled = kernels("multigrid")
-    return Pyamg(A, free, points, linear) if compiled is None else Compiled(compiled, A, free, points, linear)
+    if compiled is None:
+        return Pyamg(A.assembled() if isinstance(A, MatrixFree) else A, free, points, linear)
+    return Compiled(compiled, A, free, points, linear)
 
 
 class Compiled:
     """The hierarchy of the kernels.  It keeps the memory of A, which must not change.
+
+    Where A is a product alone, its matrix is made for aggregation and forgotten, and not made at all with linear
+    elements below.
 
     Attributes
     ----------
@@ -80,14 +86,14 @@ class Compiled:
     complexity : numbers in the matrices of all levels to those of the finest one.
     """
 
-    def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
+    def __init__(self, module: Any, A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: LinearLevel | None):
         fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
         axes, places = plate_axes(points, free), points
         if axes is not None:
             normal = axes[:, 0]
             places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
-        matrix = module.Matrix(A.indptr, A.indices, A.data)
-        self._kernel = module.Multigrid(matrix, fixed, places, DEGREE, RATIO, STRENGTH)
+        finest = A.product if isinstance(A, MatrixFree) else _matrix(module, A)
+        self._kernel = module.Multigrid(finest, fixed, places, DEGREE, RATIO, STRENGTH)
         if linear is not None and self._kernel.has_planes() and not linear.halved:
             linear = None  # tetrahedra: their middle nodes are too far from their corners
         if linear is not None:
@@ -97,11 +103,10 @@ class Compiled:
         else:
             modes = bending_modes(points, axes)
         if linear is None:
-            self._kernel.aggregate(modes)
+            self._kernel.aggregate(modes, _matrix(module, A.assembled()) if isinstance(A, MatrixFree) else None)
         else:
-            K = linear.K
             self._kernel.aggregate_linear(
-                module.Matrix(K.indptr, K.indices, K.data),
+                _matrix(module, linear.K),
                 np.ascontiguousarray(fixed.reshape(-1, 3)[linear.nodes]).ravel(),
                 linear.indptr,
                 linear.indices,
@@ -133,6 +138,10 @@ class Compiled:
         if share and converged:
             share.finish()
         return x, iterations, converged
+
+
+def _matrix(module: Any, A: BlockMatrix) -> Any:
+    return module.Matrix(A.indptr, A.indices, A.data)
 
 
 def plate_axes(points: Array, free: Mask) -> Array | None:

@@ -5,6 +5,8 @@ import pytest
 from own_elements import tetrahedron_of_seven_nodes
 
 import kratos_lite as kl
+from kratos_lite.assembly.matrix_free import MatrixFree
+from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.mesh.blocks import Block
 from kratos_lite.native import kernels
@@ -19,9 +21,11 @@ MODULE = kernels("multigrid")
 compiled = pytest.mark.skipif(MODULE is None, reason="the compiled kernels were not built")
 
 
-@pytest.fixture(params=["compiled", "pyamg"])
+@pytest.fixture(params=["compiled", "with a matrix", "pyamg"])
 def path(request, monkeypatch):
-    """Run a test with both hierarchies."""
+    """Run a test with both hierarchies, the compiled one without and with a matrix."""
+    if request.param != "compiled":
+        monkeypatch.setattr(MatrixFree, "takes", lambda group: False)
     if request.param == "pyamg":
         monkeypatch.setattr(multigrid, "kernels", lambda name: None)
     elif MODULE is None:
@@ -432,11 +436,15 @@ def test_numbers_that_are_not_finite_end_the_iteration(path):
     assert iterations <= 2
 
 
+def matrix_of(system):
+    return assemble_stiffness(system.points, system.groups, system.pattern)
+
+
 @compiled
 def test_wrong_shapes_are_refused():
     model = clamped(box())
     system, b = equations(model)
-    K, free = system.K, system._equations._free
+    K, free = matrix_of(system), system._equations._free
     modes = np.zeros((K.shape[0], 6))
     points = np.zeros((K.shape[0] // 3, 3))
     options = (points, 2, 12.0, 0.0)
@@ -469,7 +477,7 @@ def test_wrong_shapes_are_refused():
 def test_a_linear_level_of_the_wrong_shape_is_refused():
     model = clamped(box(kind="20N", cells=(2, 2, 2)))
     system, _ = equations(model)
-    K, level = system.K, linear_level(system.points, system.groups)
+    K, level = matrix_of(system), linear_level(system.points, system.groups)
     below = MODULE.Matrix(level.K.indptr, level.K.indices, level.K.data)
     fixed, corners = np.zeros(K.shape[0], np.uint8), np.zeros(level.K.shape[0], np.uint8)
     points, inner = np.zeros((K.shape[0] // 3, 3)), np.zeros((len(corners) // 3, 3))
@@ -492,7 +500,7 @@ def test_a_linear_level_of_the_wrong_shape_is_refused():
 @compiled
 def test_parts_without_stiffness_do_no_harm():
     system, b = equations(clamped(box()))
-    K, free = system.K, system._equations._free
+    K, free = matrix_of(system), system._equations._free
     K.data[K.rows() < 9] = 0.0
     K.data[K.indices < 9] = 0.0
     b[:27] = 0.0

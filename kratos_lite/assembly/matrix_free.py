@@ -1,0 +1,140 @@
+"""The stiffness of elements as a product with vectors, element by element: the matrix is never made.
+
+Reading a matrix of quadratic elements takes three to ten times as long as computing its product anew.
+Source: Kronbichler & Kormann, Computers & Fluids 63 (2012) 135-147.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
+from kratos_lite.elements.geometry import GEOMETRY
+from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.quadrature import Rule
+from kratos_lite.registry import remembered
+from kratos_lite.shapes import Shape
+from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import bsr_array
+
+
+class MatrixFree:
+    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
+
+    Attributes
+    ----------
+    points : (n, 3) m.
+    groups : the elements.
+    assembled : makes the matrix, for what needs it.
+    product : what the kernels have prepared.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from kratos_lite import Isotropic3D, Model, box
+    >>> model = Model(box(element="KinematicLinear3D27N"), Isotropic3D(E=1e9, nu=0.3))
+    >>> K = MatrixFree(model.mesh.points, model.element_groups())
+    >>> rigid = np.tile([1.0, 0.0, 0.0], model.mesh.n_nodes)
+    >>> bool(np.abs(K @ rigid).max() < 1e-6 * K.norm())
+    True
+    """
+
+    def __init__(
+        self, points: Array, groups: Sequence[ElementGroup], assembled: Callable[[], BlockMatrix] | None = None
+    ) -> None:
+        self.points, self.groups = floats(points), list(groups)
+        self.assembled = self._assembled if assembled is None else assembled
+        module = compiled("multigrid", self.groups[0].element)
+        self.product: Any = module.Product(self.points, list(map(_tables, self.groups)))
+
+    @staticmethod
+    def takes(group: ElementGroup) -> bool:
+        """Return whether the kernels know the stiffness of a group, and their product pays.
+
+        Of linear elements it does for hexahedra.
+        """
+        if compiled("multigrid", group.element, *GEOMETRY, *MECHANICS) is None or group.strain_tables() is not None:
+            return False
+        shape = group.element.shape
+        return len(shape.nodes) > shape.corners or factors(shape, group.rule) is not None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of rows and columns."""
+        return 3 * len(self.points), 3 * len(self.points)
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return K x of a vector (3n,)."""
+        return self.product.times(np.ascontiguousarray(x, dtype=float))
+
+    def norm(self) -> float:
+        """Return the largest row sum of |K| over the nodes of an element at the stiffest node."""
+        return float(self.product.norm())
+
+    def scipy(self) -> bsr_array:
+        """Return the matrix itself, made now."""
+        return self.assembled().scipy()
+
+    def _assembled(self) -> BlockMatrix:
+        pattern = Pattern(len(self.points), [group.nodes for group in self.groups])
+        return assemble_stiffness(self.points, self.groups, pattern)
+
+
+def _tables(group: ElementGroup) -> tuple[Any, ...]:
+    """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
+    nodes, _, dN, weights = group.tables()
+    found = factors(group.element.shape, group.rule)
+    if found is not None:
+        order, *found = found
+        dN, weights = floats(dN[order]), floats(weights[order])
+    return nodes, dN, weights, group.law()[0], found
+
+
+@remembered
+def factors(shape: type[Shape], rule: Rule) -> tuple[Array, Array, Array, Array] | None:
+    """Return how the gradients of a shape at the points of a rule fall apart into factors, if they do.
+
+    They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
+    higher degree than n - 1 in any coordinate.
+
+    Returns
+    -------
+    order : (g,) the points by z, y and x.
+    values : (n, n) Lagrange polynomials of n equidistant places, at the points on an axis.
+    slopes : (n, n) derivatives at these of the Lagrange polynomials of the points.
+    places : (g, k) shape functions at the grid of places.
+    """
+    n = round(len(rule.weights) ** (1 / 3))
+    order = np.lexsort(np.round(rule.points, 12).T)
+    axis = rule.points[order[:n], 0]
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
+    if n not in (2, 3) or len(grid) != len(order) or np.abs(grid - rule.points[order]).max() > 1e-12:
+        return None
+    even = np.linspace(-1.0, 1.0, n)
+    values, slopes = _lagrange(even, axis)[0], _lagrange(axis, axis)[1]
+    at = np.stack(np.meshgrid(even, even, even, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
+    places = np.array([shape.N(xi) for xi in at])
+    places = np.where(np.abs(places - np.round(places)) < 1e-14, np.round(places), places)
+    one, all_values = np.eye(n), np.kron(np.kron(values, values), values) @ places
+    along = [np.kron(one, np.kron(one, slopes)), np.kron(one, np.kron(slopes, one)), np.kron(slopes, np.kron(one, one))]
+    found = np.stack([D @ all_values for D in along], axis=-1)
+    exact = np.abs(found - tabulate(shape, rule)[1][order]).max() < 1e-12
+    return (order, floats(values), floats(slopes), floats(places)) if exact else None
+
+
+def _lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:
+    """Return the Lagrange polynomials of `nodes` and their derivatives at x, each (x, nodes)."""
+    powers = np.vander(nodes, increasing=True)
+    degree = np.arange(len(nodes))
+    slopes = degree * x[:, None] ** np.maximum(degree - 1, 0)
+    inverse = np.linalg.inv(powers)
+    return x[:, None] ** degree @ inverse, slopes @ inverse
