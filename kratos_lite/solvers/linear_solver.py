@@ -216,7 +216,11 @@ class LinearSolver:
         if T is None:
             return self.K
         if isinstance(self.K, SplitMatrix):
-            return replace(self.K, A=constrained(self.K.A, T, free), D=self.K.D @ on_all(T, free))
+            return replace(
+                self.K,
+                A=constrained(self.K.A, T, free),
+                D=(self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize),
+            )
         return constrained(self.K, T, free)
 
     @cached_property
