@@ -1,7 +1,7 @@
-"""K of nearly incompressible elements, split into their dilatations and a stiffness without them.
+"""K of nearly incompressible elements, split into their dilatations and a stiffness without most of them.
 
 K = A + Dᵀ κ D, where D u are the dilatations that elements have, by orthonormal polynomials, κ is the bulk
-modulus that is taken off the material, and A is the stiffness with what is left of it: λ = 0.
+modulus that is taken off the material, and A is the stiffness with what is left of it: λ = μ.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ if TYPE_CHECKING:
 
 NEAR_HALF = 99.0
 """Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
-KEPT = 2 / 3
-"""Bulk over shear modulus that A keeps: λ = 0."""
+REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
+"""Reason for the method ``displacement-pressure``."""
+KEPT = 1.0
+"""λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 
 
 @record(eq=False)
@@ -42,15 +44,17 @@ class SplitMatrix:
     A : the stiffness without most of the bulk modulus.
     D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
     bulk : (p,) Pa, κ.
+    kept : (p,) Pa, λ in A.
     modulus : (p,) Pa, λ + 2μ in A.
     means : (p, n) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
-        stiffest element there.
+        stiffest element there, λ = 0 in those that are split.
     groups : the elements, with materials as in A.
     """
 
     A: BlockMatrix
     D: csr_array
     bulk: Array
+    kept: Array
     modulus: Array
     means: csr_array
     groups: list[ElementGroup]
@@ -90,17 +94,22 @@ def split(
     """
     if not any(map(is_split, groups)):
         return K
-    left, parts = list(groups), []
+    left, soft, parts = list(groups), list(groups), []
     for number, group in enumerate(groups):
         if is_split(group):
-            taken = _moduli(group.material.C)[0] - KEPT * _moduli(group.material.C)[1]
-            left[number] = _softened(group, taken)
-            parts.append(_Part(group, taken, _longitudinal(left[number]), _dilatations(points, group)))
-            parts[-1].take_off(K, pattern, number)
-    bulk = np.concatenate([np.full(part.count, part.bulk) for part in parts])
-    modulus = np.concatenate([np.full(part.count, part.modulus) for part in parts])
-    means = _means(points, parts, _stiffest(len(points), left))
-    return SplitMatrix(K, _assembled(len(points), parts), bulk, modulus, means, left)
+            bulk, shear = _moduli(group.material.C)
+            part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+            part.take_off(K, pattern, number)
+            parts.append(part)
+            left[number] = _softened(group, part.bulk)
+            soft[number] = _softened(left[number], KEPT * shear)
+    taken, shears = (
+        np.concatenate([np.full(part.count, getattr(part, name)) for part in parts])
+        for name in ("bulk", "shear")
+    )
+    means = _means(points, parts, _stiffest(len(points), soft))
+    D = _assembled(len(points), parts)
+    return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
 
 
 def is_split(group: ElementGroup) -> bool:
@@ -115,11 +124,11 @@ def is_split(group: ElementGroup) -> bool:
 
 @record(eq=False)
 class _Part:
-    """A group, the bulk modulus taken off it, λ + 2μ that it keeps, and its dilatations (m, r, 3k)."""
+    """A group, the bulk modulus taken off it, its shear modulus, and its dilatations (m, r, 3k)."""
 
     group: ElementGroup
     bulk: float
-    modulus: float
+    shear: float
     D: Array
 
     @property

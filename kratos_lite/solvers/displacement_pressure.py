@@ -6,14 +6,16 @@ With p = κ D u the equations (A + Dᵀ κ D) u = b are
     [D  -1/κ] [p] = [0],
 
 which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
-p = -S⁻¹ r_p and one multigrid cycle for A u = r_u - Dᵀ p.  S ≈ D A⁻¹ Dᵀ + 1/κ is
+p = -(S⁻¹ + λ) r_p, with λ in A, and one multigrid cycle for A u = r_u - Dᵀ p.  With A₀ = A - Dᵀ λ D,
 
-    S = D blocks(A)⁻¹ Dᵀ + (means at corner nodes)² / (λ + 2μ) + 1/κ:
+    S = D blocks(A₀)⁻¹ Dᵀ + (means at corner nodes)² / 2μ + 1/κ  ≈  D A₀⁻¹ Dᵀ + 1/κ:
 
 the second term holds for smooth pressures, the first one for those that change sign from element to element.
-Some of these hardly act on the nodes (checkerboards): no element needs to be stable.
+Some of these hardly act on the nodes (checkerboards): no element needs to be stable.  For the others
+S⁻¹ + λ = (D A⁻¹ Dᵀ)⁻¹ is nearer to λ + 2μ the more of λ is kept (augmented Lagrangian).
 
-Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (2014), chapter 4.
+Sources: Elman, Silvester & Wathen, Finite Elements and Fast Iterative Solvers (2014), chapter 4; Benzi &
+Olshanskii, SIAM J. Sci. Comput. 28 (2006) 2095-2113 (augmented Lagrangian).
 """
 
 from __future__ import annotations
@@ -40,6 +42,8 @@ REDUCED = 1e-10
 """Share of the residual at which they start anew, as rounding leaves no more."""
 MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
+DEGREE = 3
+"""Degree of the smoother: an iteration more takes longer than a better cycle."""
 INNER, INNER_MAX = 0.06, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
@@ -53,10 +57,12 @@ class DisplacementPressure:
     """
 
     def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
+        from scipy.sparse import diags_array
+
         self._K, self._fixed = K, ~free
-        self._cycle = multigrid.multigrid(K.A, free, points, linear)
+        self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
-        inverse = block_inverse(K.A, free)
+        inverse = block_inverse(K.A, free, diags_array(np.sqrt(K.kept)) @ K.D)
         size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
@@ -131,7 +137,7 @@ class DisplacementPressure:
 
     def _precondition(self, r: Array) -> Array:
         n = self._K.shape[0]
-        p = -self._schur.solve(r[n:])
+        p = -self._schur.solve(r[n:]) - self._K.kept * r[n:]
         forces = r[:n] - self._K.D.T @ p
         forces[self._fixed] = 0.0
         return np.concatenate([self._cycle.precondition(forces), p])

@@ -54,7 +54,7 @@ class Solver(Protocol):
 
 
 def multigrid(
-    A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None
+    A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None = None, degree: int = DEGREE
 ) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,).
 
@@ -64,9 +64,12 @@ def multigrid(
     free : (3n,) the components that are unknown; rows and columns of the others do not matter.
     points : (n, 3) m, from which come the rigid modes.
     linear : the linear elements within quadratic ones.
+    degree : of the smoother of the kernels.
     """
     compiled = kernels("multigrid")
-    return Pyamg(A, free, points, linear) if compiled is None else Compiled(compiled, A, free, points, linear)
+    if compiled is None:
+        return Pyamg(A, free, points, linear)
+    return Compiled(compiled, A, free, points, linear, degree)
 
 
 class Compiled:
@@ -80,14 +83,22 @@ class Compiled:
     complexity : numbers in the matrices of all levels to those of the finest one.
     """
 
-    def __init__(self, module: Any, A: BlockMatrix, free: Mask, points: Array, linear: LinearLevel | None):
+    def __init__(
+        self,
+        module: Any,
+        A: BlockMatrix,
+        free: Mask,
+        points: Array,
+        linear: LinearLevel | None,
+        degree: int = DEGREE,
+    ) -> None:
         fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
         axes, places = plate_axes(points, free), points
         if axes is not None:
             normal = axes[:, 0]
             places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
-        self._kernel = module.Multigrid(matrix, fixed, places, DEGREE, RATIO, STRENGTH)
+        self._kernel = module.Multigrid(matrix, fixed, places, degree, RATIO, STRENGTH)
         if linear is not None and self._kernel.has_planes() and not linear.halved:
             linear = None  # tetrahedra: their middle nodes are too far from their corners
         if linear is not None:

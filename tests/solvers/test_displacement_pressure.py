@@ -23,7 +23,7 @@ CELLS = {
     "BBar3D20N": 4,
     "BBar3D27N": 3,
 }
-LIMIT = {"BBar3D13N": 60, "BBar3D15N": 65, "BBar3D20N": 65}
+LIMIT = {"BBar3D15N": 45}
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 
@@ -84,7 +84,7 @@ def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
     found = model.solve("amg", tolerance=1e-8)
     assert found.report.solver == "displacement-pressure", found.report.reason
-    assert found.report.iterations <= LIMIT.get(element, 45)
+    assert found.report.iterations <= LIMIT.get(element, 40)
     exact = model.solve("direct").u
     # both are off by rounding times the condition of K, which ν makes large
     np.testing.assert_allclose(found.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
@@ -191,7 +191,7 @@ def test_what_is_left_is_that_of_an_ordinary_material(element):
     A = system_of(model).K.A.scipy().toarray()
     shear = 3e6 / (2 * 1.49999)
     ordinary = assemble_dense(
-        model.mesh.points, kl.Model(model.mesh, kl.Isotropic3D(E=2 * shear, nu=0.0)).element_groups()
+        model.mesh.points, kl.Model(model.mesh, kl.Isotropic3D(E=2.5 * shear, nu=0.25)).element_groups()
     )
     if element.startswith("BBar") and element != "BBar3D10N":  # the others depend on the material
         np.testing.assert_allclose(A, ordinary, rtol=0, atol=1e-9 * np.abs(ordinary).max())
@@ -208,12 +208,13 @@ def test_inverse_within_groups_of_nodes(size):
     group, place = block_inverse_module._groups(A, A.rows())
     assert np.bincount(group).max() == (1 if size[2] == 1.0 else 5)
     assert all(sorted(place[group == one]) == list(range((group == one).sum())) for one in set(group))
-    full, exact = A.scipy().toarray(), np.zeros((375, 375))
+    D = system.K.D * np.sqrt(system.K.kept[:, None])
+    full, exact = (A.scipy() - D.T @ D).toarray(), np.zeros((375, 375))
     for one in set(group):
         dofs = (3 * np.flatnonzero(group == one)[:, None] + np.arange(3)).ravel()
         dofs = dofs[free[dofs]]
         exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
-    found = block_inverse_module.block_inverse(A, free).toarray()
+    found = block_inverse_module.block_inverse(A, free, D).toarray()
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13 * np.abs(exact).max())
 
 
@@ -228,7 +229,7 @@ def test_large_groups_are_single_nodes(monkeypatch):
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():
     with ELEMENTS.temporary():
 
-        class Own8N(kl.elements.EnhancedStrain3D8N):
+        class Own8N(kl.EnhancedStrain3D8N):
             def B_at_gauss_points(self, C=None):
                 return 1.01 * super().B_at_gauss_points(C)
 
