@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import kratos_lite as kl
-from kratos_lite.mesh.order import raise_order
+from kratos_lite.mesh.centers import raise_order
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.typing import Array, Ints
 from kratos_lite.verification.meshes import element, kind_of
