@@ -55,7 +55,8 @@ def degree_of(shape: type[Shape]) -> int:
 
     Functions that are no polynomials count as those that they span, `Shape.degree`.
 
-    >>> from kratos_lite.shapes import Hexahedron20, Tetrahedron4
+    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
+    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
     (2, 1)
     """

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import keys_of
-from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.native import kernels
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.hanging import HangingNodes
 
 Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
 """Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
@@ -201,7 +203,7 @@ def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
 def mirror(shape: type[Shape]) -> Ints:
     """Return the node order of the mirror image of a cell: its reflection in r = s.
 
-    >>> from kratos_lite.shapes import Tetrahedron4
+    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> mirror(Tetrahedron4).tolist()
     [0, 2, 1, 3]
     """

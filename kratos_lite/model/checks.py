@@ -18,7 +18,8 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.model.loads import Gravity, Load
+from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered

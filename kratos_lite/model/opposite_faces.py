@@ -17,7 +17,7 @@ from kratos_lite.typing import Array, Ints
 def opposite_of(shape: type[Shape]) -> tuple[int, ...]:
     """Return the face of a cell that shares no corner with each of its faces, -1 where there is none.
 
-    >>> from kratos_lite.shapes import Wedge6
+    >>> from kratos_lite.shapes.wedges import Wedge6
     >>> opposite_of(Wedge6)
     (1, 0, -1, -1, -1)
     """

@@ -12,8 +12,8 @@ from kratos_lite.typing import Array
 
 SHAPES: Registry[type[Shape]] = Registry("shape")
 """Every shape by its class name."""
-LINEAR: dict[str, type[Shape]] = {}
-"""The shape of the corners alone, by family of cells; `kratos_lite.shapes` fills it."""
+LINEAR: Registry[type[Shape]] = Registry("cell")
+"""The shape of the corners alone, by family of cells."""
 
 
 class Shape:
@@ -69,11 +69,11 @@ class Shape:
 
         Examples
         --------
-        >>> from kratos_lite.shapes import Hexahedron20
+        >>> from kratos_lite.shapes.hexahedra import Hexahedron20
         >>> Hexahedron20.linear().__name__
         'Hexahedron8'
         """
-        return LINEAR.get(cls.cell)
+        return LINEAR[cls.cell] if cls.cell in LINEAR else None
 
     @staticmethod
     def N(xi: ArrayLike) -> Array:

@@ -11,13 +11,11 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements import (
-    KinematicLinear,
-    KinematicLinear3D4N,
-    KinematicLinear3D5N,
-    KinematicLinear3D6N,
-    KinematicLinear3D8N,
-)
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
+from kratos_lite.elements.kinematic_linear_3d5n import KinematicLinear3D5N
+from kratos_lite.elements.kinematic_linear_3d6n import KinematicLinear3D6N
+from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import record, replace

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite import solvers
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.errors import InputError
-from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import replace
-from kratos_lite.solvers.coarse_level import linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.dilatation import SplitMatrix, split
-from kratos_lite.solvers.linear_solver import DENSE_MAX
+from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.hanging import HangingNodes
+    from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.typing import Array, Ints, Progress
 
 
@@ -86,7 +86,7 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
-        self.method, self.reason = solvers.choose(solver, len(self.reduced.free), dofs)
+        self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
         if self.method == "dense" and dofs > DENSE_MAX:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
 
@@ -106,7 +106,11 @@ class ConstrainedSystem:
         skipped: set[str] = set()
         K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
-        return split(K, self.points, self.groups, self.pattern) if self.method == "amg" else K
+        if self.method != "amg":
+            return K
+        from kratos_lite.solvers.dilatation import split  # a quick start for small models
+
+        return split(K, self.points, self.groups, self.pattern)
 
     @cached_property
     def norm(self) -> float:
@@ -114,16 +118,14 @@ class ConstrainedSystem:
         return self._equations.norm
 
     @cached_property
-    def _equations(self) -> solvers.LinearSolver:
-        groups = self.K.groups if isinstance(self.K, SplitMatrix) else self.groups
-        return solvers.LinearSolver(
-            self.K,
-            self.reduced,
-            self.points,
-            self.method,
-            self.reason,
-            lambda: linear_level(self.points, groups, self._hanging),
-        )
+    def _equations(self) -> LinearSolver:
+        return LinearSolver(self.K, self.reduced, self.points, self.method, self.reason, self._linear_level)
+
+    def _linear_level(self) -> LinearLevel | None:
+        from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
+
+        groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
+        return linear_level(self.points, groups, self._hanging)
 
     def solve(
         self,
@@ -131,7 +133,7 @@ class ConstrainedSystem:
         prescribed: Array | None = None,
         tolerance: float | None = None,
         start: Array | None = None,
-    ) -> tuple[Array, solvers.Solution]:
+    ) -> tuple[Array, Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
 
         Parameters

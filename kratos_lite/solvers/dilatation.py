@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 NEAR_HALF = 99.0
 """Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
+REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
+"""Reason for the method ``displacement-pressure``."""
 KEPT = 1.0
 """λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 

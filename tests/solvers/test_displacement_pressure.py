@@ -234,7 +234,7 @@ def test_large_groups_are_single_nodes(monkeypatch):
 def test_an_element_of_a_user_with_a_strain_of_its_own_has_no_pressures():
     with ELEMENTS.temporary():
 
-        class Own8N(kl.elements.EnhancedStrain3D8N):
+        class Own8N(kl.EnhancedStrain3D8N):
             def B_at_gauss_points(self, C=None):
                 return 1.01 * super().B_at_gauss_points(C)
 
