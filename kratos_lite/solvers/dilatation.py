@@ -25,7 +25,7 @@ from kratos_lite.records import record, replace
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import bsr_array, csr_array
 
 NEAR_HALF = 99.0
 """Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
@@ -42,7 +42,7 @@ class SplitMatrix:
     Attributes
     ----------
     A : the stiffness without most of the bulk modulus.
-    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
+    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m, R x 3 blocks with R = 1 or 4.
     bulk : (p,) Pa, κ.
     kept : (p,) Pa, λ in A.
     modulus : (p,) Pa, λ + 2μ in A.
@@ -52,7 +52,7 @@ class SplitMatrix:
     """
 
     A: BlockMatrix
-    D: csr_array
+    D: bsr_array
     bulk: Array
     kept: Array
     modulus: Array
@@ -70,14 +70,15 @@ class SplitMatrix:
 
     def norm(self) -> float:
         """Return the largest row sum of |A| and |D|ᵀ κ |D|: no less than that of |K|."""
-        size = abs(self.D)
+        size = abs(self.D.tocsr())
         return self.A.norm() + float((size.T @ (self.bulk * size.sum(axis=1))).max(initial=0.0))
 
     def scipy(self) -> csr_array:
         """Return K as a scipy.sparse.csr_array."""
         from scipy.sparse import diags_array
 
-        return (self.A.scipy().tocsr() + self.D.T @ diags_array(self.bulk) @ self.D).tocsr()
+        D = self.D.tocsr()
+        return (self.A.scipy().tocsr() + D.T @ diags_array(self.bulk) @ D).tocsr()
 
 
 def split(
@@ -197,18 +198,22 @@ def _softened(group: ElementGroup, taken: float) -> ElementGroup:
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
-    """Return D (p, 3n) of the dilatations of each group."""
-    from scipy.sparse import csr_array, vstack
+def _assembled(n_nodes: int, parts: Sequence[_Part]) -> bsr_array:
+    """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
+    from scipy.sparse import bsr_array
 
-    rows = []
+    sizes = {part.D.shape[1] for part in parts}
+    R = sizes.pop() if len(sizes) == 1 else 1
+    blocks, columns, counts = [], [], []
     for part in parts:
-        (m, r, size), D = part.D.shape, part.D
-        dofs = (3 * part.group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
-        columns = np.repeat(dofs, r, axis=1).ravel()
-        starts = np.arange(0, D.size + 1, size, dtype=np.int32)
-        rows.append(csr_array((D.ravel(), columns, starts), shape=(m * r, 3 * n_nodes)))
-    return rows[0] if len(rows) == 1 else vstack(rows, format="csr")
+        m, r, size = part.D.shape
+        k = size // 3
+        blocks.append(part.D.reshape(m, r // R, R, k, 3).swapaxes(2, 3).reshape(-1, R, 3))
+        columns.append(np.repeat(part.group.nodes[:, None], r // R, axis=1).ravel())
+        counts.append(np.full(m * r // R, k))
+    starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    data = np.concatenate(blocks), np.concatenate(columns).astype(np.int32), starts
+    return bsr_array(data, shape=(R * (len(starts) - 1), 3 * n_nodes))
 
 
 def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:

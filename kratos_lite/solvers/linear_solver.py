@@ -215,7 +215,8 @@ class LinearSolver:
             return self.K
         if isinstance(self.K, BlockMatrix):
             return constrained(self.K, T, free)
-        return replace(self.K, A=constrained(self.K.A, T, free), D=self.K.D @ on_all(T, free))
+        D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
+        return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
     @cached_property
     def _free(self) -> Mask:
