@@ -13,15 +13,20 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import InputError
 from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.direct import is_quick
 from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.typing import Array, Ints, Progress
+
+NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
+"""Reason for the method ``direct``."""
 
 
 class ConstrainedSystem:
@@ -87,8 +92,15 @@ class ConstrainedSystem:
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
         self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
+        if solver == "auto" and self.method == "amg" and self._is_soon_factorized():
+            self.method, self.reason = "direct", NEARLY
         if self.method == "dense" and dofs > DENSE_MAX:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+
+    def _is_soon_factorized(self) -> bool:
+        """Return whether a material is nearly incompressible, and a factorization faster than iterations."""
+        nearly = any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
+        return nearly and is_quick(len(self.reduced.free), lambda: self.pattern)
 
     @cached_property
     def pattern(self) -> Pattern:
