@@ -18,7 +18,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.direct import is_quick
-from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose
+from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
@@ -27,6 +27,8 @@ from kratos_lite.typing import Array, Ints, Progress
 
 NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
 """Reason for the method ``direct``."""
+LOCKED = 3000.0
+"""Bulk over shear modulus (ν = 0.4998) from which plain elements take too many iterations."""
 
 
 class ConstrainedSystem:
@@ -99,8 +101,16 @@ class ConstrainedSystem:
 
     def _is_soon_factorized(self) -> bool:
         """Return whether a material is nearly incompressible, and a factorization faster than iterations."""
-        nearly = any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
-        return nearly and is_quick(len(self.reduced.free), lambda: self.pattern)
+        ratios = [bulk_over_shear(group.material.C) for group in self.groups]
+        if max(ratios, default=0.0) <= NEAR_HALF:
+            return False
+        unknowns = len(self.reduced.free)
+        if is_quick(unknowns, lambda: self.pattern):
+            return True
+        from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
+
+        locked = (group for group, ratio in zip(self.groups, ratios, strict=True) if ratio > LOCKED)
+        return quick_to_factorize(unknowns) and not all(map(is_split, locked))
 
     @cached_property
     def pattern(self) -> Pattern:

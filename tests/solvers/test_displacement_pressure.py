@@ -180,6 +180,7 @@ def test_compressible_bodies_have_no_pressures():
         ("EnhancedStrain3D8N", (9, 9, 9), "displacement-pressure"),
         ("BBar3D27N", (4, 4, 4), "displacement-pressure"),
         ("KinematicLinear3D8N", (5, 5, 5), "direct"),
+        ("KinematicLinear3D8N", (10, 10, 10), "direct"),
     ],
 )
 def test_few_unknowns_are_factorized(element, cells, method):
