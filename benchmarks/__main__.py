@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import cases, curves, effectivity, report, requested, scenes, sets
+from benchmarks import stall as stalling
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
 from benchmarks.tables import Row
@@ -61,8 +62,7 @@ def growth(options: argparse.Namespace, folder: Path) -> list[Run]:
 
 def stall(options: argparse.Namespace, folder: Path) -> list[Run]:
     """Return the scenes on which multigrid may stall."""
-    sizes = {kind: options.cells[0] for kind in scenes.KINDS} if options.cells else None
-    return sets.stall_runs(options.programs, sizes)
+    return stalling.runs(options.programs, options.unknowns, options.scenes)
 
 
 def assembly(options: argparse.Namespace, folder: Path) -> list[Run]:
@@ -92,7 +92,9 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Path], list[Run]]] = {
     "motion": lambda options, folder: sets.motion_runs(options.programs),
     "ale": lambda options, folder: sets.ale_runs(options.programs),
 }
-REPEATS = {"growth": 1, "stall": 3, "full": 3, "cube1": 11, "quick": 1, "error": 1}
+REPEATS = {"growth": 1, "stall": 1, "full": 3, "cube1": 11, "quick": 1, "error": 1}
+LIMITS = {"stall": 75.0}
+"""Seconds after which one run is stopped; else half an hour."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -111,7 +113,8 @@ def main(words: Sequence[str] | None = None) -> int:
         return references(options.cells or (4, 8, 16))
     with scratch() as name:
         repeats = options.repeats or REPEATS.get(options.command, 5)
-        limits = options.limit, options.memory * 1e9, options.point, options.budget
+        limit = options.limit or LIMITS.get(options.command, 1800.0)
+        limits = limit, options.memory * 1e9, options.point, options.budget
         driver = Driver(Path(name), repeats, options.pythons, *limits)
         runs = COMMANDS[options.command](options, Path(name))
         if options.out is not None:
@@ -152,7 +155,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         nargs="+",
         choices=sorted({*scenes.SCENES, *requested.MAKERS}),
         metavar="NAME",
-        help="for error: some of its scenes",
+        help="for error, stall: some of their scenes",
     )
     add(
         "--elements",
@@ -167,7 +170,9 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         help="interpreter of the other programs, or of one; or KRATOS_LITE_BENCH_PYTHON")  # fmt: skip
     add("--cases", type=Path, default=ROOT.parent / "shared" / "cases", metavar="FOLDER",
         help="real scenes, each a folder with case.json")  # fmt: skip
-    add("--limit", type=float, default=1800.0, metavar="SECONDS", help="after which one run is stopped")
+    add("--limit", type=float, metavar="SECONDS", help="after which one run is stopped")
+    add("--unknowns", type=float, default=stalling.UNKNOWNS, metavar="N",
+        help="for stall: of each scene, about")  # fmt: skip
     add(
         "--point",
         type=float,

@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import statistics
 import subprocess
 import sys
@@ -199,11 +200,11 @@ class Driver:
         if run.place not in self.stems:
             if run.task == "ale":
                 self.stems[run.place] = ale.write(self.folder, run.kind, run.n)
-            elif run.n < LARGE:
+            elif run.n < LARGE and run.task != "linear":
                 self.made[run.place] = scenes.make(*run.place)
                 self.stems[run.place] = scenes.write(self.made[run.place], self.folder)
             else:
-                words = [*map(str, run.place), str(self.folder)]
+                words = [*map(str, run.place), str(self.folder), run.task]
                 command = [sys.executable, "-m", "benchmarks.scenes", *words]
                 subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=True)
                 self.stems[run.place] = self.folder / scenes.stem(*run.place)
@@ -216,6 +217,7 @@ class Driver:
         for old in (answer, report, displacement):
             old.unlink(missing_ok=True)
         words = {"task": run.task, "stem": str(self.stem(run)), "kind": run.kind, "folder": str(self.folder)}
+        words |= {"scene": run.scene, "n": run.n, "program": run.program}
         words |= {"answer": str(answer), "displacement": str(displacement)} | dict(run.options)
         job.write_text(json.dumps(words))
         program = (PROGRAMS | HELPERS)[run.program]
@@ -238,7 +240,8 @@ class Driver:
     def _command(self, name: str, program: Program, job: Path) -> list[str]:
         if program.code:
             return [self.python(name), "-c", program.code]
-        return [self.python(name), "-m", f"benchmarks.programs.{program.module}", str(job)]
+        launcher = program.launcher if program.launcher and shutil.which(program.launcher[0]) else ()
+        return [*launcher, self.python(name), "-m", f"benchmarks.programs.{program.module}", str(job)]
 
     def launch(self, command: list[str], report: Path, environment: dict[str, str]) -> dict[str, Any]:
         """Run a command through the launcher and return what it measured."""
@@ -303,6 +306,8 @@ class Driver:
             "unknowns",
             "iterations",
             "residual",
+            "rounding",
+            "memory",
             "solver",
             "version",
             "errors",

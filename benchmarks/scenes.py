@@ -14,6 +14,7 @@ import numpy as np
 
 import kratos_lite as kl
 from benchmarks.cases import write_for_kratos
+from benchmarks.hard_scenes import HARD, write_system
 from benchmarks.programs import ALL, FORMULATIONS
 from kratos_lite.verification import concentrations
 from kratos_lite.verification import scenes as shared
@@ -67,70 +68,14 @@ def hole_incompressible(kind: str, n: int) -> Scene:
     return replace(concentrations.hole(kind, n, nu=0.4999), name="hole_incompressible")
 
 
-def block(kind: str, n: int, nu: float = 0.3) -> Scene:
+def block(kind: str, n: int) -> Scene:
     """Return the unit block of n³ cells, clamped at its bottom, under gravity in three directions."""
     model = kl.Model(
-        kl.box(cells=(n, n, n), element=element(kind)), kl.Isotropic3D(E=210e6, nu=nu, density=7620.0)
+        kl.box(cells=(n, n, n), element=element(kind)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
     )
     model.fix("z-")
     model.add(kl.Gravity((3.0, 2.0, -9.81)))
-    return Scene("block", kind, n, model, energy=ENERGIES["block"] if nu == 0.3 else None)
-
-
-# ---- scenes on which multigrid may stall, beside the block -------------------------------------------
-
-
-def _nearly_incompressible(nu: float) -> Callable[[str, int], Scene]:
-    """Return what makes the clamped block of a ratio of Poisson."""
-    return lambda kind, n: replace(block(kind, n, nu), name=_named(nu))
-
-
-def _named(nu: float) -> str:
-    """Return the name of the block of a ratio of Poisson.
-
-    >>> _named(0.4999)
-    'block_nu_4999'
-    """
-    return f"block_nu_{str(nu)[2:]}"
-
-
-def _stretched(
-    size: tuple[float, float, float], layers: int = 0, sides: tuple[str, ...] = ("z-",)
-) -> Callable[[str, int], Scene]:
-    """Return what makes a box under gravity with about n³ cells, `layers` of them across z if given."""
-
-    def make(kind: str, n: int) -> Scene:
-        m = round((n**3 / (2 * layers)) ** 0.5) if layers else n
-        model = kl.Model(
-            kl.box(size, (m, m, layers or n), element(kind)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
-        )
-        for side in sides:
-            model.fix(side)
-        model.add(kl.Gravity((3.0, 2.0, -9.81)))
-        return Scene("", kind, n, model)
-
-    return make
-
-
-def _called(name: str) -> Callable[[str, int], Scene]:
-    """Return what makes the stretched box of a name."""
-    return lambda kind, n: replace(STRETCHED[name](kind, n), name=name)
-
-
-RIM = ("x-", "x+", "y-", "y+")
-STRETCHED = {
-    "flat_10": _stretched((1.0, 1.0, 0.1)),
-    "flat_100": _stretched((1.0, 1.0, 0.01)),
-    "flat_1000": _stretched((1.0, 1.0, 0.001)),
-    "needles_10": _stretched((1.0, 1.0, 10.0)),
-    "needles_one_layer": _stretched((1.0, 1.0, 0.5), 1),
-    "plate_100": _stretched((1.0, 1.0, 0.01), 1, RIM),
-    "plate_1000": _stretched((1.0, 1.0, 0.001), 1, RIM),
-    "cantilever_plate_100": _stretched((1.0, 1.0, 0.01), 1, ("x-",)),
-    "cantilever_plate_100_layers": _stretched((1.0, 1.0, 0.01), 3, ("x-",)),
-    "cantilever_plate_1000": _stretched((1.0, 1.0, 0.001), 1, ("x-",)),
-}
-"""Boxes of thin and of long cells by name."""
+    return Scene("block", kind, n, model, energy=ENERGIES["block"])
 
 
 # ---- scenes for what can be skipped ------------------------------------------------------------------
@@ -192,15 +137,13 @@ def held(kind: str, n: int) -> Scene:
 
 ENERGIES: dict[str, float | None] = {"cook": 457.481, "cantilever": 0.215581, "block": 6.8668}
 """J, of the exact solutions, good to 1e-4: from ``python -m benchmarks references`` (27N, extrapolated)."""
-STALL = {_named(nu): _nearly_incompressible(nu) for nu in (0.45, 0.49, 0.4999, 0.499999)}
-"""Scenes that are compared with the block, as their solution may take many more iterations."""
 SCENES: dict[str, Callable[[str, int], Scene]] = {
     made.__name__: made
     for made in (
         manufactured, sphere, bending, cook, l_domain, cavity, hole_incompressible, cantilever, block, cube,
         two_bodies, half_unloaded, unloaded, unreferenced, warped, held,
     )
-} | STALL | {name: _called(name) for name in STRETCHED}  # fmt: skip
+} | HARD  # fmt: skip
 """Every scene by name."""
 
 
@@ -210,4 +153,9 @@ def make(name: str, kind: str, n: int) -> Scene:
 
 
 if __name__ == "__main__":  # a process of its own, so that large scenes leave no memory behind
-    write(make(sys.argv[1], sys.argv[2], int(sys.argv[3])), Path(sys.argv[4]))
+    name, kind, n, folder, task = sys.argv[1:]
+    scene = make(name, kind, int(n))
+    if task == "linear":
+        write_system(scene, Path(folder) / f"{stem(name, kind, int(n))}.npz")
+    else:
+        write(scene, Path(folder))

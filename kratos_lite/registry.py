@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from importlib import import_module
 from typing import Generic, ParamSpec, TypeVar, cast
 
 from kratos_lite.errors import InputError, nearest
@@ -36,32 +37,52 @@ class Registry(Generic[T]):
         self.kind = kind
         self._items: dict[str, T] = {}
         self._aliases: dict[str, str] = {}
+        self._expected: dict[str, str] = {}
+
+    def expect(self, name: str, module: str, aliases: Iterable[str] = ()) -> None:
+        """Know of an item that a module registers; the module is imported when the item is asked for."""
+        self._expected[name] = module
+        self._aliases.update(dict.fromkeys(aliases, name))
 
     def add(self, name: str, item: T, aliases: Iterable[str] = ()) -> None:
         """Register `item`; a later one of the same name replaces it (a script may be run twice)."""
+        if name in self._expected and item.__module__ != self._expected[name]:
+            self._import(name)  # so that it is not the later one
         self._items[name] = item
-        for alias in aliases:
-            self._aliases[alias] = name
+        self._aliases.update(dict.fromkeys(aliases, name))
+
+    def _import(self, *names: str) -> None:
+        """Import the modules of items that are expected."""
+        for name in names:
+            if name in self._expected and name not in self._items:
+                import_module(self._expected[name])
 
     def __getitem__(self, name: str) -> T:
-        key = name if name in self._items else self._aliases.get(name, name)
-        if key not in self._items:
-            known = [*self._items, *self._aliases]
+        if name not in self:
+            known = [*self, *self._aliases]
             hint = nearest(name, known) if isinstance(name, str) else ""
             if not hint and 0 < len(known) <= FEW:
                 hint = f" There are {', '.join(known)}"
             raise InputError(f"unknown {self.kind} {name!r}.{hint}")
+        key = name if self._has(name) else self._aliases[name]
+        self._import(key)
         return self._items[key]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._items or name in self._aliases
+        if not (self._has(name) or name in self._aliases):
+            self._import(*self._expected)  # one of the modules may add it as an alias
+        return self._has(name) or name in self._aliases
+
+    def _has(self, name: object) -> bool:
+        return name in self._items or name in self._expected
 
     def __iter__(self) -> Iterator[str]:
-        return iter(list(self._items))
+        return iter(list(self._expected | self._items))
 
-    def values(self) -> list[T]:
-        """Return the registered classes in the order in which they came."""
-        return list(self._items.values())
+    def values(self, ending: str = "") -> list[T]:
+        """Return the registered classes; of those not imported yet, the ones whose names end like this."""
+        self._import(*(name for name in self._expected if name.endswith(ending)))
+        return [self._items[name] for name in self if name in self._items]
 
     def aliases(self, name: str) -> list[str]:
         """Return the other names under which `name` is found."""
@@ -77,6 +98,7 @@ class Registry(Generic[T]):
         >>> "red" in colors
         False
         """
+        self._import(*self._expected)
         items, aliases = dict(self._items), dict(self._aliases)
         try:
             yield

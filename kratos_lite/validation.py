@@ -25,14 +25,16 @@ import operator
 from collections.abc import Iterable
 from contextlib import suppress
 from os import PathLike
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.typing import Array, Numbers
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
@@ -294,6 +296,8 @@ def path_of(value: Any) -> Path:
     """
     if not isinstance(value, (str, PathLike)):
         raise InputError(f"a path to a file must be text or a pathlib.Path; got {short(value)}")
+    from pathlib import Path  # a quick start without files
+
     return Path(value)
 
 
@@ -320,6 +324,8 @@ def instance(
 
 def free_memory() -> float:
     """Return the bytes that this process may still take; infinite where the system does not tell."""
+    from pathlib import Path
+
     found = [math.inf]
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/meminfo").read_text().splitlines():

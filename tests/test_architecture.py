@@ -99,17 +99,35 @@ def test_import_loads_not_even_numpy():
     assert not {"numpy", "scipy", "pyamg", "meshio"} & loaded("import kratos_lite")
 
 
-@pytest.mark.parametrize(("cells", "element"), [(1, "Element3D8N"), (3, "Element3D8N"), (2, "Element3D27N")])
-def test_small_scene_loads_nothing_heavy(cells, element):
-    code = (
+def small_scene(cells, element):
+    """Return the modules loaded by the solution of a box."""
+    return loaded(
         "import kratos_lite as kl\n"
         f"mesh = kl.box(cells=({cells},) * 3, element={element!r})\n"
         "model = kl.Model(mesh, kl.Isotropic3D(1.0, 0.3, 1.0))\n"
         "model.fix('z-')\nmodel.add(kl.Gravity((0, 0, -1)))\nmodel.solve()"
     )
+
+
+@pytest.mark.parametrize(("cells", "element"), [(1, "Element3D8N"), (3, "Element3D8N"), (2, "Element3D27N")])
+def test_small_scene_loads_nothing_heavy(cells, element):
     heavy = {"scipy", "pyamg", "meshio", "matplotlib", "dataclasses"}
     heavy |= {f"numpy.{name}" for name in ("ma", "polynomial", "random")}
-    assert not heavy & loaded(code) - loaded("import numpy")
+    assert not heavy & small_scene(cells, element) - loaded("import numpy")
+
+
+def test_a_scene_loads_its_own_element_and_family_of_shapes_alone():
+    names = small_scene(1, "KinematicLinear3D8N")
+    assert [name for name in names if "_3d" in name] == ["kratos_lite.elements.kinematic_linear_3d8n"]
+    families = ("hexahedra", "pyramids", "tetrahedra", "wedges")
+    assert [name for name in families if f"kratos_lite.shapes.{name}" in names] == ["hexahedra"]
+
+
+def test_one_element_loads_nothing_of_what_larger_models_and_results_need():
+    larger = ("mesh.hanging", "mesh.finer", "mesh.locate", "mesh.order", "model.loads.surface")
+    larger += ("solvers.multigrid", "solvers.coarse_level", "solvers.dilatation", "analysis.error_estimate")
+    names = small_scene(1, "Element3D8N") - loaded("import numpy")
+    assert not {"pathlib", *(f"kratos_lite.{name}" for name in larger)} & names
 
 
 SOLVED_AT_REST = {

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import OURS
+from scipy import sparse
 
 import kratos_lite as kl
 
@@ -24,13 +25,15 @@ from benchmarks import (  # noqa: E402
     cases,
     curves,
     driver,
+    hard_scenes,
     motion,
     report,
     scenes,
     sets,
+    stall,
     tables,
 )
-from benchmarks.programs import PROGRAMS  # noqa: E402
+from benchmarks.programs import PROGRAMS, SOLVERS  # noqa: E402
 from kratos_lite.verification import errors, fields  # noqa: E402
 
 E, NU = 1.0, 0.3
@@ -252,16 +255,61 @@ def test_wheels_have_rows_beside_getfem():
     assert text.count("\n") == 5
 
 
-def test_scenes_that_may_stall_have_ratios_to_the_block():
-    common = {"kind": "8N enhanced", "n": 8, "unknowns": 1000, "solver": "amg"}
+def stall_row(scene, program="kratos_lite", kind="8N enhanced", **words):
+    phases = {"setup": 0.25, "solve": 0.75}
+    plain = {"group": "stall", "n": 8, "unknowns": 1000, "phases": phases, "iterations": 13, "memory": 10**6}
+    plain |= {"solver": "amg", "residual": 5e-9, "rounding": 1e-12}
+    return plain | {"scene": scene, "program": program, "kind": kind} | words
+
+
+def test_scenes_that_may_stall_have_ratios_to_the_block_and_to_other_solvers():
     rows = [
-        common | {"scene": "block", "work": 1.0, "peak": 100, "iterations": 13},
-        common | {"scene": "block_nu_4999", "work": 2.0, "peak": 150, "iterations": 40},
-        common | {"scene": "block_nu_49", "kind": "27N B-bar", "work": 2.0, "peak": 150, "iterations": 40},
+        stall_row("block"),
+        stall_row("block", "PARDISO", phases={"setup": 4.0, "solve": 1.0}, iterations=0),
+        stall_row("flat_100", phases={"setup": 2.0, "solve": 2.0}, iterations=90, memory=2 * 10**6),
+        stall_row("flat_100", "pyamg", residual=1e-3, iterations=1000),
+        {"group": "stall", "scene": "flat_100", "kind": "8N enhanced", "n": 8, "program": "Kratos"}
+        | {"failed": "stopped at the time limit"},
+        stall_row("block_nu_49", kind="27N B-bar"),
     ]
-    text = report.stalls(rows)
-    assert "| block_nu_4999 8N enhanced n = 8 | 1000 | amg, 40 | 2 | 2 | 1.5 |" in text
-    assert "27N" not in text
+    text = stall.tables(rows)
+    assert "| block | 8N enhanced | 1000 | amg, 13 | 0.250 | 0.750 | 1 | 1 | 1 | 5e-09 |" in text
+    assert "| flat_100 | 8N enhanced | 1000 | amg, 90 | 2 | 2 | 4 | 2 | 2 | 5e-09 |" in text
+    assert "| block_nu_49 | 27N B-bar | 1000 | amg, 13 | 0.250 | 0.750 |  | 1 |  | 5e-09 |" in text
+    assert "| block 8N enhanced | 1 (13), 1 MB |  |  | 5, 1 MB | PARDISO | 0.2 |" in text
+    failed = "stopped at the time limit | residual 1e-03 (1000) |"
+    assert f"| flat_100 8N enhanced | 4 (90), 2 MB | {failed}  |  |  |" in text
+    assert "- more than 3 times the time of the block: 1\n" in text
+    assert "- more than 40 iterations, or a factorization: 1\n" in text
+    assert report.failures(rows) == ""
+
+
+@pytest.mark.parametrize("name", [tables.OURS, *SOLVERS])
+def test_solvers_take_one_linear_system(name, tmp_path):
+    runs = stall.runs([name], 250, ["links_bonded"])
+    measured = driver.Driver(tmp_path, 1, command.arguments(["stall"]).pythons, tell=lambda line: None)
+    rows = measured.measure([run for run in runs if (run.scene, run.kind) == ("links_bonded", "8N")])
+    if name in measured.absent:
+        pytest.skip(f"{name} is absent: {measured.absent[name]}")
+    (row,) = rows
+    assert row["residual"] < 3e-8
+    assert row["unknowns"] == 246
+    assert set(row["phases"]) >= {"solve"}
+
+
+@pytest.mark.parametrize("name", hard_scenes.MAKERS)
+def test_systems_of_files_are_those_of_the_models(name, tmp_path):
+    scene = scenes.make(name, stall.ELEMENTS[name][-1], 2)
+    hard_scenes.write_system(scene, tmp_path / "system.npz")
+    with np.load(tmp_path / "system.npz") as file:
+        A = sparse.bsr_array((file["data"], file["indices"], file["indptr"])).toarray()
+        q, points = np.linalg.solve(A, file["load"]), file["points"]
+    u = scene.model.solve(tolerance=1e-13).displacement()
+    free = scene.model.supports.constraint_map(np.arange(len(u))).free
+    assert len(q) == len(free)
+    off = q - u.ravel()[free]
+    assert off @ A @ off < 1e-6 * (q @ A @ q)  # rounding leaves thin plates few digits
+    np.testing.assert_array_equal(points, scene.model.mesh.points[free[::3] // 3])
 
 
 # ---- sets, results and report --------------------------------------------------------------------------
@@ -388,7 +436,7 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [curves, tables, sets, report, command])
+@pytest.mark.parametrize("module", [curves, tables, sets, stall, hard_scenes, report, command])
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 

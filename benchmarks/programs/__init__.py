@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 ALL = ("4N", "8N", "10N", "20N", "27N")
 FORMULATIONS = {
     "8N enhanced": "EnhancedStrain3D8N",
+    "10N B-bar": "BBar3D10N",
     "20N reduced": "Reduced3D20N",
     "20N B-bar": "BBar3D20N",
     "27N B-bar": "BBar3D27N",
@@ -32,6 +33,7 @@ class Program:
     environment : variables of its process.
     digits : of its displacements, where it prints fewer than it computes.
     code : run as ``python -c`` in place of a module.
+    launcher : words before the interpreter, where there is such a command.
     """
 
     module: str
@@ -40,9 +42,12 @@ class Program:
     environment: dict[str, str] = field(default_factory=dict)
     digits: int = 15
     code: str = ""
+    launcher: tuple[str, ...] = ()
 
 
 ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+TWO_PROCESSES = ("mpiexec", "-n", "2")
+AS_ANYONE = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
 QUADRATIC = ("10N", "20N", "27N")
 CALCULIX = ("4N", "6N", "8N", "10N", "15N", "20N", "20N reduced")
 OWN = ALL + tuple(FORMULATIONS)
@@ -66,7 +71,13 @@ PEERS = ("scikit-fem", "FElupe", "fedoo", "SfePy", "NGSolve", "GetFEM", "torch-f
 """Those of them that are Python libraries."""
 HELPERS = {
     "pyamg": Program("pyamg_"),
+    "PETSc GAMG": Program("petsc_", environment=AS_ANYONE, launcher=TWO_PROCESSES),
+    "PETSc BoomerAMG": Program("petsc_", environment=AS_ANYONE, launcher=TWO_PROCESSES),
+    "PARDISO": Program("direct"),
+    "CHOLMOD": Program("direct"),
     "meshio": Program("meshio_"),
     "import numpy": Program("", code="import numpy"),
 }
-"""What else is timed: pyamg as it comes on our matrix, a reader, and the least that NumPy takes to start."""
+"""What else is timed: solvers on our matrix, a reader, and the least that NumPy takes to start."""
+SOLVERS = ("Kratos", "pyamg", "PETSc GAMG", "PETSc BoomerAMG", "PARDISO", "CHOLMOD")
+"""Programs that solve the linear system of a file."""

@@ -29,6 +29,11 @@ def work(job: Job) -> Array | None:
         from benchmarks import ale
 
         return ale.work(job, kl)
+    if job.task == "linear":
+        from benchmarks.programs import linear
+
+        linear.ours(job, kl)
+        return None
     with job.phase("read"):
         model = from_arrays(job, kl) if job.given.get("arrays") else kl.read(f"{job.stem}.mdpa")
     if job.task == "parse":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.programs import linear
 from benchmarks.programs.common import Array, Job, rigid_modes, run, uncoupled
 
 
@@ -17,6 +18,9 @@ def work(job: Job) -> Array | None:
         from kratos_lite.assembly.sparsity_pattern import PatternCache
         from kratos_lite.assembly.stiffness import assemble_stiffness
     job.answer["version"] = pyamg.__version__
+    if job.task == "linear":
+        solve(job)
+        return None
     job.read()
     with job.phase("matrix"):
         model = kl.read(f"{job.stem}.mdpa")
@@ -34,6 +38,21 @@ def work(job: Job) -> Array | None:
         x = hierarchy.solve(b, tol=job.tolerance, accel="cg", maxiter=500, residuals=residuals)
     job.answer |= {"iterations": len(residuals) - 1, "unknowns": int((~fixed).sum())}
     return np.asarray(np.where(fixed, u, x)).reshape(-1, 3)
+
+
+def solve(job: Job) -> None:
+    """Solve the system of a file."""
+    import pyamg
+
+    A, b, points = linear.read(job)
+    modes, residuals = rigid_modes(points), []
+    with linear.measured(job):
+        with job.phase("setup"):
+            hierarchy = pyamg.smoothed_aggregation_solver(A, B=modes)
+        with job.phase("solve"):
+            words = {"accel": "cg", "maxiter": linear.MAX_ITERATIONS, "residuals": residuals}
+            x = hierarchy.solve(b, tol=job.tolerance, **words)
+    linear.judge(job, A, b, x, len(residuals) - 1)
 
 
 if __name__ == "__main__":

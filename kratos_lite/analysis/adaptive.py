@@ -26,8 +26,9 @@ from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_own
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Finer, Mesh, with_rows
+from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.mesh.facets import facets
+from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.order import quadratic, raised
 from kratos_lite.mesh.refinement import refine
 from kratos_lite.model.refined import refined

@@ -13,7 +13,7 @@ from kratos_lite.analysis.report import RefinementStep
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Finer
+from kratos_lite.mesh.finer import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints

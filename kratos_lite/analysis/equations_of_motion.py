@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite import solvers
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.rotational_symmetry import check_materials
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
@@ -18,6 +17,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.rigid_body_modes import check_supports
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite
@@ -181,7 +181,7 @@ class EquationsOfMotion:
         """Stiffness by the stress of the centrifugal load for the rate 1, data (nnz,) in kg/s²."""
         assert self.terms is not None
         reduced = self.system.reduced
-        equations = solvers.LinearSolver(self.K, reduced, self.system.points, "direct", "")
+        equations = LinearSolver(self.K, reduced, self.system.points, "direct", "")
         at_zero = np.zeros_like(reduced.c)
         u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, self.system.progress, at_zero).x
         return self.terms.stiffening(u0.reshape(-1, 3))
@@ -277,7 +277,7 @@ class EquationsOfMotion:
         reduced = self.system.reduced
         iterate = symmetric and len(reduced.free) > DIRECT_MAX
         method = "amg" if iterate else "direct"
-        equations = solvers.LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
+        equations = LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
         return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
 
 

@@ -14,8 +14,10 @@ from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import STRESS
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import BodyForce, LineLoad, Load, Pressure, TimeDependentLoad, Traction
+from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.base import ScaledLoad
+from kratos_lite.model.loads.body import BodyForce
+from kratos_lite.model.loads.surface import LineLoad, Pressure, Traction
 from kratos_lite.typing import Array, Mask
 
 

@@ -12,7 +12,8 @@ from kratos_lite.assembly.element_groups import group_of_element
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.elements.overridden_steps import stiffness_of
 from kratos_lite.elements.stiffness import by_dof
-from kratos_lite.model.loads import BodyForce, ScaledLoad
+from kratos_lite.model.loads import ScaledLoad
+from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints

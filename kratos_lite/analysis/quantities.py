@@ -14,8 +14,9 @@ from kratos_lite.assembly.gauss_point_fields import body_force, volumes
 from kratos_lite.elements.overridden_steps import internal_load_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Located, Mesh, Where
-from kratos_lite.model.loads import Traction
+from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh.locate import Located
+from kratos_lite.model.loads.surface import Traction
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite

@@ -10,21 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
-from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError, energy_error
-from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints
 from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
-from kratos_lite.assembly.nodal_values import averages, extrapolated
-from kratos_lite.assembly.point_fields import at_located
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Located, Mesh, Where
+from kratos_lite.mesh import Mesh, Where
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, instance
 
 if TYPE_CHECKING:
+    from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.assembly.recovery import Recovery
+    from kratos_lite.mesh.locate import Located
 
 At: TypeAlias = "str | ArrayLike | Located"
 """Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
@@ -114,12 +112,16 @@ class Result:
 
     def _field(self, at: At, stress: bool) -> Any:
         if not (at is None or isinstance(at, str)):
+            from kratos_lite.assembly.point_fields import at_located  # as for the recovery
+
             return at_located(self.groups, self._located(at), self._strained, stress=stress)
         place = choice(at, "at", PLACES)
         if place == "gauss":
             points, u = self.mesh.points, self._strained
             return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
         if place == "raw":
+            from kratos_lite.assembly.nodal_values import extrapolated
+
             points, u = self.mesh.points, self._strained
             return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
         if place == "node":
@@ -134,6 +136,8 @@ class Result:
 
     def _located(self, at: ArrayLike | Located) -> Located:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""
+        from kratos_lite.mesh.locate import Located  # as for the recovery
+
         if not isinstance(at, Located):
             return self.mesh.locate(at, required=True)
         if at.mesh is not self.mesh:
@@ -145,6 +149,8 @@ class Result:
 
     def _averages(self, stress: bool) -> tuple[Array, Array]:
         """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
+        from kratos_lite.assembly.nodal_values import averages  # as for the recovery
+
         m = self.mesh.n_elements
         return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
 
@@ -300,6 +306,8 @@ class Result:
         >>> bool(abs(energy / result.energy() - 1) < 1e-12)
         True
         """
+        from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints  # rarely needed
+
         quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
         groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
         made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
@@ -406,6 +414,8 @@ class Result:
 
     @cached_property
     def _error(self) -> ErrorEstimate:
+        from kratos_lite.analysis.error_estimate import energy_error  # as for the recovery
+
         squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
         return energy_error(*squares, 2 * self.energy(), self.groups)
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite import solvers
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.solvers.linear_solver import Solution, choose
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import function_or_none
 
@@ -41,10 +41,10 @@ def check_arguments(solver: str, tolerance: float) -> None:
     """Raise InputError for an unknown solver, or a tolerance beyond 0 … 1."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    solvers.choose(solver, 0)
+    choose(solver, 0)
 
 
-def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[str, Any]:
+def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
     """Return how a solution was found and how good it is, by the names of a `Report`."""
     return {
         "solver": solution.method,
@@ -56,7 +56,7 @@ def quality(solution: solvers.Solution, balance: tuple[float, float]) -> dict[st
     }
 
 
-def judge(solution: solvers.Solution, u: Array, balance: tuple[float, float]) -> None:
+def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:
     """Raise SolveError for a solution that does not solve its equations or is not in equilibrium."""
     if not np.isfinite(u).all() or solution.backward_error > 1e-8:
         raise SolveError(

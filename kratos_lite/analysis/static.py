@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kratos_lite import solvers
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
@@ -17,6 +16,7 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
+from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
 
@@ -211,7 +211,7 @@ class StaticAnalysis:
         model, phase = self.model, case.phase
         warnings = self.warnings + checks.check_loads(case.loads, self.groups, case.forces, model.supports)
         u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
-        solution = solvers.Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
+        solution = Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():
             with phase("assemble"):
                 system = self._system_of(moving)
@@ -283,7 +283,7 @@ class StaticAnalysis:
     def _report(
         self,
         case: LoadSet,
-        solution: solvers.Solution,
+        solution: Solution,
         reactions: Array,
         balance: tuple[float, float],
         warnings: list[str],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kratos_lite import solvers
 from kratos_lite.ale.checks import critical_rate_estimate, near_critical
 from kratos_lite.analysis.derived_quantities import motion_summary
 from kratos_lite.analysis.equations_of_motion import DIRECT_MAX, EquationsOfMotion
@@ -14,6 +13,7 @@ from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge,
 from kratos_lite.model.checks import check_loads, equilibrium
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
+from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.typing import Progress
 
 
@@ -40,9 +40,7 @@ def solve_steady(
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
     with phase("solve"):
         method, why = _way(e, solver, symmetric)
-        equations = solvers.LinearSolver(
-            A, e.system.reduced, e.system.points, method, why, symmetric=symmetric
-        )
+        equations = LinearSolver(A, e.system.reduced, e.system.points, method, why, symmetric=symmetric)
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x

@@ -48,8 +48,13 @@ class MatrixFree:
     True
     """
 
+    is_split = False
+
     def __init__(
-        self, points: Array, groups: Sequence[ElementGroup], assembled: Callable[[], BlockMatrix] | None = None
+        self,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        assembled: Callable[[], BlockMatrix] | None = None,
     ) -> None:
         self.points, self.groups = floats(points), list(groups)
         self.assembled = self._assembled if assembled is None else assembled
@@ -62,7 +67,10 @@ class MatrixFree:
 
         Of linear elements it does for hexahedra.
         """
-        if compiled("multigrid", group.element, *GEOMETRY, *MECHANICS) is None or group.strain_tables() is not None:
+        if (
+            compiled("multigrid", group.element, *GEOMETRY, *MECHANICS) is None
+            or group.strain_tables() is not None
+        ):
             return False
         shape = group.element.shape
         return len(shape.nodes) > shape.corners or factors(shape, group.rule) is not None
@@ -125,7 +133,11 @@ def factors(shape: type[Shape], rule: Rule) -> tuple[Array, Array, Array, Array]
     places = np.array([shape.N(xi) for xi in at])
     places = np.where(np.abs(places - np.round(places)) < 1e-14, np.round(places), places)
     one, all_values = np.eye(n), np.kron(np.kron(values, values), values) @ places
-    along = [np.kron(one, np.kron(one, slopes)), np.kron(one, np.kron(slopes, one)), np.kron(slopes, np.kron(one, one))]
+    along = [
+        np.kron(one, np.kron(one, slopes)),
+        np.kron(one, np.kron(slopes, one)),
+        np.kron(slopes, np.kron(one, one)),
+    ]
     found = np.stack([D @ all_values for D in along], axis=-1)
     exact = np.abs(found - tabulate(shape, rule)[1][order]).max() < 1e-12
     return (order, floats(values), floats(slopes), floats(places)) if exact else None

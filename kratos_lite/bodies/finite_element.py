@@ -23,7 +23,8 @@ from kratos_lite.bodies.rotations import check_rotation
 from kratos_lite.bodies.validation import Material, elements_of, fitting, one_point, points_of, vector_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Located, Mesh
+from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.locate import Located
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.solvers.eigen import modes
 from kratos_lite.solvers.mass import Mass

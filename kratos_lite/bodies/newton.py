@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite import solvers
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.bodies.linear_algebra import Entries
+from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
+from kratos_lite.solvers.linear_solver import LinearSolver, choose
 from kratos_lite.typing import Array, Ints
 
 
@@ -50,10 +51,10 @@ def _eliminated(
     prescribed, free = np.zeros(n), np.ones(n, dtype=bool)
     prescribed[dof], free[dof] = -gap / value, False
     constraints = ConstraintMap(np.flatnonzero(free), prescribed)
-    method, reason = solvers.choose("auto", len(constraints.free), n)
+    method, reason = choose("auto", len(constraints.free), n)
     method = method if symmetric or method == "dense" else "direct"
     matrix: Any = K if method != "dense" else K.scipy().toarray()
-    solver = solvers.LinearSolver(matrix, constraints, points, method, reason, symmetric=symmetric)
+    solver = LinearSolver(matrix, constraints, points, method, reason, symmetric=symmetric)
     x = solver.solve(residual, 1e-12).x
     reaction = (K @ x - residual)[dof] / value
     twice = np.bincount(dof, minlength=n)[dof]
@@ -78,5 +79,5 @@ def _with_multipliers(K: BlockMatrix, residual: Array, entries: Entries, gap: Ar
     H = csr_array((value, (row, dof)), shape=(c, n)) * size
     soft = -1e-11 * size * eye_array(c)  # lets rows that say the same share their reaction
     A = block_array([[K.scipy(), H.T], [H, soft]], format="csr") if c else K.scipy().tocsr()
-    x = solvers.direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
+    x = direct.factorize(csr_array(A), symmetric=False).solve(np.concatenate([residual, -gap * size]))
     return x[:n], -x[n:] * size

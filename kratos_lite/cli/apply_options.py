@@ -13,7 +13,10 @@ from kratos_lite.errors import InputError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model.loads import Gravity, Load, PointLoad, Pressure, Traction
+from kratos_lite.model.loads import Load
+from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.nodal import PointLoad
+from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.records import replace
 from kratos_lite.validation import whole_number
 

@@ -10,7 +10,7 @@ from kratos_lite.elements.b_bar import BBar
 from kratos_lite.elements.tables import StrainTables
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, tetrahedron
-from kratos_lite.shapes import Tetrahedron10
+from kratos_lite.shapes.tetrahedra import Tetrahedron10
 from kratos_lite.typing import Array
 
 

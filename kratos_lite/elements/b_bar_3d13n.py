@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.b_bar import BBar
 from kratos_lite.quadrature import pyramid
-from kratos_lite.shapes import Pyramid13
+from kratos_lite.shapes.pyramids import Pyramid13
 
 
 class BBar3D13N(BBar):

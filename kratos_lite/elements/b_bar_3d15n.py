@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.b_bar import BBar
 from kratos_lite.quadrature import wedge
-from kratos_lite.shapes import Wedge15
+from kratos_lite.shapes.wedges import Wedge15
 
 
 class BBar3D15N(BBar):

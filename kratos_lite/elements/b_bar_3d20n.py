@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.b_bar import BBar
 from kratos_lite.quadrature import hexahedron
-from kratos_lite.shapes import Hexahedron20
+from kratos_lite.shapes.hexahedra import Hexahedron20
 
 
 class BBar3D20N(BBar):

@@ -14,7 +14,7 @@ from kratos_lite.elements.tables import StrainTables, cofactors, determinant
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, hexahedron
 from kratos_lite.registry import remembered
-from kratos_lite.shapes import Hexahedron8
+from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array
 from kratos_lite.voigt import PAIRS
 

@@ -55,7 +55,8 @@ def degree_of(shape: type[Shape]) -> int:
 
     Functions that are no polynomials count as those that they span, `Shape.degree`.
 
-    >>> from kratos_lite.shapes import Hexahedron20, Tetrahedron4
+    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
+    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
     (2, 1)
     """
@@ -104,7 +105,7 @@ def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
     xi = shape.nodes
     base = [0]  # corners that span the cell
     for a in range(1, shape.corners):
-        if np.linalg.matrix_rank(xi[[*base[1:], a]] - xi[0]) == len(base):
+        if len(base) < 4 and np.linalg.matrix_rank(xi[[*base[1:], a]] - xi[0]) == len(base):
             base.append(a)
 
     def affine(points: Array) -> Array:

@@ -19,11 +19,11 @@ INCOMPRESSIBLE = 2 * (1 + 0.45) / (3 * (1 - 2 * 0.45)) * (1 + 1e-9)
 def formulations_of(shape: type[Shape]) -> dict[str, type[KinematicLinear]]:
     """Return the element class of each formulation of a shape, those of the library before those of users.
 
-    >>> from kratos_lite.shapes import Hexahedron8
+    >>> from kratos_lite.shapes.hexahedra import Hexahedron8
     >>> {word: element.__name__ for word, element in formulations_of(Hexahedron8).items()}
     {'standard': 'KinematicLinear3D8N', 'enhanced': 'EnhancedStrain3D8N', 'b_bar': 'BBar3D8N'}
     """
-    alike = [element for element in ELEMENTS.values() if element.shape is shape]
+    alike = [element for element in ELEMENTS.values(f"3D{len(shape.nodes)}N") if element.shape is shape]
     alike.sort(key=lambda element: (element.formulation, not is_own(element)))
     return {element.formulation: element for element in reversed(alike)}
 
@@ -101,6 +101,10 @@ def is_nearly_incompressible(C: Array) -> bool:
     [False, False, True]
     """
     return bulk_over_shear(C) > INCOMPRESSIBLE
+
+
+NEAR_HALF = 99.0
+"""Bulk over shear modulus (ν = 0.495) from which pressures beside displacements, or a factorization, pay."""
 
 
 def bulk_over_shear(C: Array) -> float:

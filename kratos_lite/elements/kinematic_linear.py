@@ -51,6 +51,16 @@ UNNAMED = "Element3D"
 """Start of the names that say the number of nodes alone; see `elements.formulations`."""
 
 
+def same_names(name: str) -> list[str]:
+    """Return the names in files that mean the element class of a name.
+
+    >>> same_names("KinematicLinear3D8N")[:2], same_names("BBar3D8N")
+    (['SmallDisplacementElement3D8N', 'TotalLagrangian3D8N'], [])
+    """
+    suffix = name.removeprefix("KinematicLinear")
+    return [] if suffix == name else [prefix + suffix for prefix in SAME_ELEMENT]
+
+
 class KinematicLinear(CellMass):
     """A small-strain solid element: shape × rule × the B-operator.
 
@@ -99,9 +109,7 @@ class KinematicLinear(CellMass):
         if not (hasattr(cls, "shape") and hasattr(cls, "rule")):
             return  # a family of elements, not an element
         cls.nodes = cls.shape.nodes
-        suffix = cls.__name__.removeprefix("KinematicLinear")
-        same = [] if suffix == cls.__name__ else [prefix + suffix for prefix in SAME_ELEMENT]
-        ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same])
+        ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same_names(cls.__name__)])
 
     @classmethod
     def inherits(cls, *methods: str) -> bool:

@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import tetrahedron
-from kratos_lite.shapes import Tetrahedron10
+from kratos_lite.shapes.tetrahedra import Tetrahedron10
 
 
 class KinematicLinear3D10N(KinematicLinear):

@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import pyramid
-from kratos_lite.shapes import Pyramid13
+from kratos_lite.shapes.pyramids import Pyramid13
 
 
 class KinematicLinear3D13N(KinematicLinear):

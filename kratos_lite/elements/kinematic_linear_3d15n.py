@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import wedge
-from kratos_lite.shapes import Wedge15
+from kratos_lite.shapes.wedges import Wedge15
 
 
 class KinematicLinear3D15N(KinematicLinear):

@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import tetrahedron
-from kratos_lite.shapes import Tetrahedron4
+from kratos_lite.shapes.tetrahedra import Tetrahedron4
 
 
 class KinematicLinear3D4N(KinematicLinear):

@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import pyramid
-from kratos_lite.shapes import Pyramid5
+from kratos_lite.shapes.pyramids import Pyramid5
 
 
 class KinematicLinear3D5N(KinematicLinear):

@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import wedge
-from kratos_lite.shapes import Wedge6
+from kratos_lite.shapes.wedges import Wedge6
 
 
 class KinematicLinear3D6N(KinematicLinear):

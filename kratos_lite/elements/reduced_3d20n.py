@@ -2,7 +2,7 @@
 
 from kratos_lite.elements.kinematic_linear import KinematicLinear
 from kratos_lite.quadrature import hexahedron
-from kratos_lite.shapes import Hexahedron20
+from kratos_lite.shapes.hexahedra import Hexahedron20
 
 
 class Reduced3D20N(KinematicLinear):

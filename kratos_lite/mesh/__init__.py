@@ -11,8 +11,6 @@ from kratos_lite.mesh.blocks import (
     with_rows,
     without_repeats,
 )
-from kratos_lite.mesh.finer import Finer
-from kratos_lite.mesh.locate import Located
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import SIDES, Where, WhereElements
 from kratos_lite.mesh.topology import Faces, components, equal_sets, outward_signs
@@ -22,8 +20,6 @@ __all__ = [
     "SIDES",
     "Block",
     "Faces",
-    "Finer",
-    "Located",
     "Mesh",
     "Part",
     "Where",

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, blocks_of, ids_of, rows_of_ids
-from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.mesh.topology import Faces
 from kratos_lite.typing import Array, Ints, Mask
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.validation import finite, read_only, whole_numbers
 
 

@@ -48,6 +48,30 @@ def corners_around(cell: str, xi: Array) -> tuple[int, ...]:
     return tuple(np.flatnonzero(np.abs(LINEAR[cell].N(xi)) > 1e-12).tolist())
 
 
+def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
+    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
+
+    Parameters
+    ----------
+    points : (n, 3) float.
+    corners : (m, c) int, corner nodes of each cell in Kratos order.
+    shape : the shape wanted.
+
+    Returns
+    -------
+    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
+    """
+    around = surroundings(shape)
+    nodes = [corners]
+    for size in sorted({len(among) for among in around}):
+        group = [among for among in around if len(among) == size]
+        keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)
+        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
+        nodes.append(len(points) + inverse.reshape(len(corners), len(group)))
+        points = np.vstack([points, points[unique].mean(axis=1)])
+    return points, np.hstack(nodes)
+
+
 class Centers:
     """Which node lies in the middle of which corners.
 

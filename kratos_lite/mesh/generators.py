@@ -11,8 +11,9 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import SIDES, Mesh, Part
-from kratos_lite.mesh.order import raise_order
-from kratos_lite.shapes import Hexahedron8, Shape
+from kratos_lite.mesh.centers import raise_order
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, fits_memory
 

@@ -207,7 +207,7 @@ def _compressed(sources: Sequence[tuple[Ints, Array]]) -> tuple[Ints, Ints, Arra
 def name_of(name: str, shape: type[Shape]) -> str:
     """Return the name of the same kind of element or condition with another shape.
 
-    >>> from kratos_lite.shapes import Hexahedron20
+    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
     >>> name_of("KinematicLinear3D8N", Hexahedron20)
     'KinematicLinear3D20N'
     """

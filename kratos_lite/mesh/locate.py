@@ -15,8 +15,8 @@ from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.nearest import nearest_element
 from kratos_lite.records import record
-from kratos_lite.shapes import Shape, inverse_map
-from kratos_lite.shapes.inverse import outside_by
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
 

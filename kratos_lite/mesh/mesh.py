@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part, blocks_of, select
 from kratos_lite.mesh.cells import Cells
-from kratos_lite.mesh.hanging import HangingNodes
-from kratos_lite.mesh.locate import Located, locate
 from kratos_lite.mesh.selection import (
     Where,
     WhereElements,
@@ -26,6 +24,10 @@ from kratos_lite.mesh.topology import inverted, mirror
 from kratos_lite.records import replace
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.hanging import HangingNodes
+    from kratos_lite.mesh.locate import Located
 
 PART = "kl.Part(nodes=[4, 5])"
 
@@ -274,6 +276,8 @@ class Mesh(Cells):
         >>> found.rows.tolist(), found.xi[0].tolist()
         ([1, -1], [0.0, 0.0, 0.0])
         """
+        from kratos_lite.mesh.locate import locate  # a quick start without it
+
         found = locate(self, points)
         return found.require() if required else found
 

@@ -9,54 +9,22 @@ import numpy as np
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block
-from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.growth import Cut, Growth, name_of
 from kratos_lite.mesh.hanging import known_centers
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import unchanged
-from kratos_lite.shapes import (
-    Hexahedron20,
-    Line3,
-    Pyramid13,
-    Quadrilateral8,
-    Quadrilateral9,
-    Shape,
-    Tetrahedron10,
-    Triangle6,
-    Wedge15,
-)
-from kratos_lite.typing import Array, Ints
+from kratos_lite.shapes import Line3, Quadrilateral8, Quadrilateral9, Shape, Triangle6
+from kratos_lite.shapes.hexahedra import Hexahedron20
+from kratos_lite.shapes.pyramids import Pyramid13
+from kratos_lite.shapes.tetrahedra import Tetrahedron10
+from kratos_lite.shapes.wedges import Wedge15
 
 QUADRATIC: dict[str, type[Shape]] = {
     shape.cell: shape
     for shape in (Line3, Triangle6, Quadrilateral8, Tetrahedron10, Pyramid13, Wedge15, Hexahedron20)
 }
 """The quadratic shape of each family with the fewest nodes."""
-
-
-def raise_order(points: Array, corners: Ints, shape: type[Shape]) -> tuple[Array, Ints]:
-    """Add the mid-edge, face and center nodes that `shape` has beyond its corners.
-
-    Parameters
-    ----------
-    points : (n, 3) float.
-    corners : (m, c) int, corner nodes of each cell in Kratos order.
-    shape : the shape wanted.
-
-    Returns
-    -------
-    points (n', 3), nodes (m, k); each new node lies in the middle of its corners.
-    """
-    around = surroundings(shape)
-    nodes = [corners]
-    for size in sorted({len(among) for among in around}):
-        group = [among for among in around if len(among) == size]
-        keys = np.sort(corners[:, np.array(group)], axis=2).reshape(-1, size)
-        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
-        nodes.append(len(points) + inverse.reshape(len(corners), len(group)))
-        points = np.vstack([points, points[unique].mean(axis=1)])
-    return points, np.hstack(nodes)
 
 
 def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Finer:

@@ -24,7 +24,8 @@ from kratos_lite.mesh.hanging import (
 )
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import across, pieces, shortest_diagonal
-from kratos_lite.shapes import Shape, Tetrahedron4, Tetrahedron10
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, whole_numbers
 

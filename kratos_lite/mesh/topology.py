@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import keys_of
-from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.native import kernels
 from kratos_lite.shapes import FACE_SHAPES, Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 
+if TYPE_CHECKING:
+    from kratos_lite.mesh.hanging import HangingNodes
+
 Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
 """Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
+FEW_SETS = 100
+"""Up to this many no kernel needs to be loaded."""
 
 
 def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
@@ -30,7 +34,8 @@ def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
     >>> one.tolist(), other.tolist()
     ([2], [3])
     """
-    compiled = kernels("mesh")
+    few = sum(len(cells) * len(columns) for cells, columns in groups) <= FEW_SETS
+    compiled = None if few else kernels("mesh")
     if compiled is None:
         return _equal_keys(set_keys(groups))
     nodes = [np.ascontiguousarray(cells, dtype=np.int32) for cells, _ in groups]
@@ -76,7 +81,7 @@ def components(n: int, pairs: Ints) -> Ints:
     >>> components(5, np.array([[3, 1], [4, 3]])).tolist()
     [0, 1, 2, 1, 1]
     """
-    compiled = kernels("mesh")
+    compiled = kernels("mesh") if len(pairs) else None
     if compiled is not None:
         return compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64))
     labels = np.arange(n)
@@ -201,7 +206,7 @@ def outward_signs(boundary: Sequence[Block], block: Block) -> Array:
 def mirror(shape: type[Shape]) -> Ints:
     """Return the node order of the mirror image of a cell: its reflection in r = s.
 
-    >>> from kratos_lite.shapes import Tetrahedron4
+    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> mirror(Tetrahedron4).tolist()
     [0, 2, 1, 3]
     """

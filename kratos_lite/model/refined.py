@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Finer
+from kratos_lite.mesh.finer import Finer
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Fixing
 from kratos_lite.quadrature import Rule

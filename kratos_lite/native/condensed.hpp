@@ -113,9 +113,7 @@ KL_INLINE void find_modes(const Elements& w, const vec<double, V>* X, const vec<
             for (int v = 0; v < 6; ++v) sum += m.strain[c][v] * m.stress[d][v];
             m.energy[c][d] = m.energy[d][c] = sum;
         }
-    Vec size;
-    largest<V>(X, 3 * w.k, size);
-    m.affine = w.addition.orthogonal && constant<V>(w.g, size, &J[0][0][0]);
+    m.affine = w.addition.orthogonal && constant<V>(w.k, w.g, X, &J[0][0][0]);
     for (int p = 0; p < MONOMIALS; ++p) {
         for (int o = 0; o < MONOMIALS; ++o) m.weight[p][o] = Vec{};
         for (int h = 0; h < PRODUCTS; ++h)

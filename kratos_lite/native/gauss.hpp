@@ -136,10 +136,20 @@ KL_INLINE void largest(const vec<double, V>* values, int count, vec<double, V>& 
     }
 }
 
-// Whether J differs between Gauss points by no more than the rounding of coordinates as large as `size` at most.
+constexpr double FAR_ROUNDING = 1e-12;  // of coordinates far away, beside the size of an element, that is neglected
+
+// Whether J differs between Gauss points by no more than the rounding of the coordinates X.
 template <int V>
-KL_INLINE bool constant(int g, const vec<double, V>& size, const vec<double, V>* J) {
-    vec<double, V> change = {};
+KL_INLINE bool constant(int k, int g, const vec<double, V>* X, const vec<double, V>* J) {
+    vec<double, V> reach, size = {}, change = {};
+    largest<V>(X, 3 * k, reach);
+    for (int c = 3; c < 3 * k; ++c) {
+        vec<double, V> x;
+        absolute<V>(X[c] - X[c % 3], x);
+        size = x > size ? x : size;
+    }
+    size *= FAR_ROUNDING / (8 * DBL_EPSILON);
+    size = reach < size ? reach : size;
     for (int q = 1; q < g; ++q)
         for (int c = 0; c < 9; ++c) {
             vec<double, V> x;

@@ -310,22 +310,14 @@ KL_INLINE void store_geometry(FreeGroup& s, int64_t first, int64_t last, vec<dou
     }
 }
 
-constexpr double FAR_ROUNDING = 1e-12;  // of coordinates, to the size of an element, that is still neglected
-
 // Whether J is constant in all elements of a place.
 template <int V>
 KL_INLINE bool is_affine(const FreeGroup& s, int64_t place, vec<double, V>* X) {
     vec<double, V>(*J)[3][3] = reinterpret_cast<vec<double, V>(*)[3][3]>(X + 3 * s.w.k);
     for (int64_t e = place * s.width; e < (place + 1) * s.width; e += V) {
-        vec<double, V> reach, size;
         gather_nodal<double, V>(s, s.w.points, e, X);
-        largest<V>(X, 3 * s.w.k, reach);
-        shift_to_first_node<V>(X, s.w.k);
-        largest<V>(X, 3 * s.w.k, size);
-        size *= FAR_ROUNDING / (8 * DBL_EPSILON);
-        size = reach < size ? reach : size;
         for (int q = 0; q < s.w.g; ++q) reference_gradient_of<double, V>(X, s.w.dN_at(q), s.w.k, J[q]);
-        if (!constant<V>(s.w.g, size, &J[0][0][0])) return false;
+        if (!constant<V>(s.w.k, s.w.g, X, &J[0][0][0])) return false;
     }
     return true;
 }

@@ -223,10 +223,8 @@ KL_INLINE bool add_stiffness(const Stiffness& w, Chunk chunk, int k, int g) {
     vec<double, V>* X = reinterpret_cast<vec<double, V>*>(chunk.work);
     auto* J = reinterpret_cast<vec<double, V>(*)[3][3]>(X + 3 * k);
     gather<V>(w, w.points, chunk.first, X);
-    vec<double, V> size;
-    largest<V>(X, 3 * k, size);
     for (int q = 0; q < g; ++q) reference_gradient<V>(X, w.dN_at(q), k, J[q]);
-    const bool affine = !w.products.empty() && constant<V>(g, size, &J[0][0][0]);
+    const bool affine = !w.products.empty() && constant<V>(k, g, X, &J[0][0][0]);
     Added added(w, X, J, X + w.added_from());
     if (affine)
         by_products<V>(w, chunk, k, J[0], added);

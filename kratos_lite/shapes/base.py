@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +13,8 @@ from kratos_lite.typing import Array
 
 SHAPES: Registry[type[Shape]] = Registry("shape")
 """Every shape by its class name."""
-LINEAR: dict[str, type[Shape]] = {}
-"""The shape of the corners alone, by family of cells; `kratos_lite.shapes` fills it."""
+LINEAR: Registry[type[Shape]] = Registry("cell")
+"""The shape of the corners alone, by family of cells."""
 
 
 class Shape:
@@ -69,11 +70,11 @@ class Shape:
 
         Examples
         --------
-        >>> from kratos_lite.shapes import Hexahedron20
+        >>> from kratos_lite.shapes.hexahedra import Hexahedron20
         >>> Hexahedron20.linear().__name__
         'Hexahedron8'
         """
-        return LINEAR.get(cls.cell)
+        return LINEAR[cls.cell] if cls.cell in LINEAR else None
 
     @staticmethod
     def N(xi: ArrayLike) -> Array:
@@ -112,6 +113,13 @@ class Shape:
             If the subclass does not define it.
         """
         raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
+
+
+def at_points(function: Callable[[ArrayLike], Array], points: Array) -> Array:
+    """Return N or dN of a shape at points (g, d); those of users, which may not broadcast, one by one."""
+    if function.__module__.startswith("kratos_lite.shapes."):
+        return function(points)
+    return np.array([function(xi) for xi in points])
 
 
 def mid_edges(corners: ArrayLike, edges: tuple[tuple[int, int], ...]) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Shape, mid_edges
+from kratos_lite.shapes.base import LINEAR, Shape, mid_edges
 from kratos_lite.shapes.simplex import Linear, Quadratic
 from kratos_lite.shapes.tensor import Lagrange, Multilinear, Serendipity
 from kratos_lite.typing import Array
@@ -89,6 +89,9 @@ class Quadrilateral9(Lagrange):
     nodes, edges = np.vstack([mid_edges(_SQUARE, _SQUARE_EDGES), [[0, 0]]]), _SQUARE_EDGES
     vtk, gmsh = 28, 10
 
+
+for _shape in (Point1, Line2, Triangle3, Quadrilateral4):
+    LINEAR.add(_shape.cell, _shape)
 
 FACE_SHAPES: dict[int, type[Shape]] = {
     1: Point1, 2: Line2, 3: Triangle3, 4: Quadrilateral4, 6: Triangle6, 8: Quadrilateral8, 9: Quadrilateral9,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.shapes.base import mid_edges, quadratic_faces
+from kratos_lite.shapes.base import LINEAR, mid_edges, quadratic_faces
 from kratos_lite.shapes.tensor import Lagrange, Multilinear, Serendipity
 
 _CORNERS = np.array(
@@ -54,3 +54,6 @@ class Hexahedron27(Lagrange):
     vtk, gmsh = 29, 12
     to_vtk = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 24, 22, 21, 23, 20, 25, 26)
     to_gmsh = (*range(8), 8, 11, 12, 9, 13, 10, 14, 15, 16, 19, 17, 18, 20, 21, 24, 22, 23, 25, 26)
+
+
+LINEAR.add(Hexahedron8.cell, Hexahedron8)

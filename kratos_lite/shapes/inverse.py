@@ -79,7 +79,7 @@ def inverse_map(
 
     Examples
     --------
-    >>> from kratos_lite.shapes import Hexahedron8
+    >>> from kratos_lite.shapes.hexahedra import Hexahedron8
     >>> found = inverse_map(Hexahedron8, Hexahedron8.nodes * 2, [1.0, 0.5, -1.0])
     >>> found.xi.tolist(), bool(found.inside), found.iterations
     ([0.5, 0.25, -0.5], True, 1)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Shape, mid_edges, quadratic_faces
+from kratos_lite.shapes.base import LINEAR, Shape, mid_edges, quadratic_faces
 from kratos_lite.typing import Array
 
 _CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 1]], dtype=float)
@@ -104,3 +104,6 @@ class Pyramid13(Shape):
         middle = np.stack([d * Ga, d * Gb, Gz], axis=-1) / 2
         rising = np.stack([z * Fa, z * Fb, d * F + z * Fz], axis=-1)
         return np.concatenate([corner, apex, middle, rising], axis=-2)
+
+
+LINEAR.add(Pyramid5.cell, Pyramid5)

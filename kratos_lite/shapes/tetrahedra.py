@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.shapes.base import mid_edges, quadratic_faces
+from kratos_lite.shapes.base import LINEAR, mid_edges, quadratic_faces
 from kratos_lite.shapes.simplex import Linear, Quadratic
 
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
@@ -28,3 +28,6 @@ class Tetrahedron10(Quadratic):
     faces = quadratic_faces(_FACES, _EDGES, 4)
     vtk, gmsh = 24, 11
     to_gmsh = (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)
+
+
+LINEAR.add(Tetrahedron4.cell, Tetrahedron4)

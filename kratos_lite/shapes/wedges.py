@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.shapes.base import Shape, mid_edges, quadratic_faces
+from kratos_lite.shapes.base import LINEAR, Shape, mid_edges, quadratic_faces
 from kratos_lite.shapes.simplex import barycentric
 from kratos_lite.typing import Array
 
@@ -80,3 +80,6 @@ class Wedge15(Shape):
             edge.append((2 * h[..., None] * pair, 2 * k * L * M))
         upright = ((1 - t * t)[..., None] * dL, -2 * t * L)
         return _derivatives([*corner, edge[0], upright, edge[1]])
+
+
+LINEAR.add(Wedge6.cell, Wedge6)

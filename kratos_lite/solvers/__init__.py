@@ -4,7 +4,3 @@
 sides as asked.  Every answer carries its backward error |b - A x| / (|A| |x| + |b|) in the maximum
 norm: the size of the smallest change of A and b for which x would be exact.
 """
-
-from kratos_lite.solvers.linear_solver import LinearSolver, Solution, choose
-
-__all__ = ["LinearSolver", "Solution", "choose"]

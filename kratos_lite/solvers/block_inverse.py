@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
@@ -18,30 +18,35 @@ LONGEST = 40
 """Nodes of the largest group; larger ones are taken as single nodes."""
 
 
-def block_inverse(A: BlockMatrix, free: Mask) -> bsr_array:
-    """Return the inverse (3n, 3n) of A within each group on its free components, 0 on the others.
+def block_inverse(A: BlockMatrix, free: Mask, D: bsr_array, factor: Array) -> bsr_array:
+    """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
 
     Parameters
     ----------
-    A : symmetric positive definite on the free components.
+    A : symmetric, positive definite on the free components, less Dᵀ factor D, too.
     free : (3n,).
+    D : (p, 3n) sparse, of R x 3 blocks; nodes that share a row share a block of A.
+    factor : (p,).
     """
     from scipy.sparse import bsr_array
 
     rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
     group, place = _groups(A, rows)
     within = np.flatnonzero(group[rows] == group[columns])
-    rows, columns, data = rows[within], columns[within], A.data[within]
+    own = rows[within], columns[within], A.data[within]
+    square = _square(D, factor, group)
+    less = block_rows(square.indptr), square.indices, square.data
     size = np.bincount(group)
     members, mask, found = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
     for k in np.unique(size):
         nodes = members[size[group[members]] == k].reshape(-1, k)
         number = np.empty(len(size), dtype=int)
         number[group[nodes[:, 0]]] = np.arange(len(nodes))
-        mine = size[group[rows]] == k
         blocks = np.zeros((len(nodes), k, 3, k, 3))
-        i, j = rows[mine], columns[mine]
-        blocks[number[group[i]], place[i], :, place[j], :] = data[mine]
+        for sign, (rows, columns, data) in ((1, own), (-1, less)):
+            mine = size[group[rows]] == k
+            i, j = rows[mine], columns[mine]
+            blocks[number[group[i]], place[i], :, place[j], :] += sign * data[mine]
         inverse = _inverse(blocks.reshape(-1, 3 * k, 3 * k), mask[nodes].reshape(-1, 3 * k))
         ends = np.repeat(nodes, k, axis=1), np.tile(nodes, (1, k))
         found.append((*ends, inverse.reshape(-1, k, 3, k, 3).swapaxes(2, 3)))
@@ -50,6 +55,22 @@ def block_inverse(A: BlockMatrix, free: Mask) -> bsr_array:
     order = np.argsort(i, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))])
     return bsr_array((inverses[order], j[order], starts), shape=A.shape)
+
+
+def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:
+    """Return Dᵀ factor D (3n, 3n) within each group of nodes."""
+    from scipy.sparse import bsr_array
+
+    row, R = block_rows(D.indptr), D.blocksize[0]
+    data = D.data * np.sqrt(factor).reshape(-1, R, 1)[row]
+    if group.max(initial=0) < len(group) - 1:  # what a row has within a group is a row of its own
+        row = np.unique(row * len(group) + group[D.indices], return_inverse=True)[1]
+    else:
+        row = np.arange(len(row))
+    order = np.argsort(row, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(row))])
+    B = bsr_array((data[order], D.indices[order], starts), shape=(R * (len(starts) - 1), D.shape[1]))
+    return B.T @ B
 
 
 def _groups(A: BlockMatrix, rows: Ints) -> tuple[Ints, Ints]:

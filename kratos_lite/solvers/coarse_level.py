@@ -11,13 +11,11 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements import (
-    KinematicLinear,
-    KinematicLinear3D4N,
-    KinematicLinear3D5N,
-    KinematicLinear3D6N,
-    KinematicLinear3D8N,
-)
+from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
+from kratos_lite.elements.kinematic_linear_3d5n import KinematicLinear3D5N
+from kratos_lite.elements.kinematic_linear_3d6n import KinematicLinear3D6N
+from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import record, replace
@@ -148,7 +146,8 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
     halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
     if all(cells is None for cells in halves):
         return [_Part(group, element, corners[None])]
-    order = np.sort(_sides(element.shape, points[group.nodes[:, corners]]), axis=1)
+    sides = _sides(element.shape, points[group.nodes[:, corners]])
+    order = np.sort(sides, axis=1)
     long = order[:, 2] > LONG * order[:, 1]
     if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
         return [_Part(group, element, corners[None])]

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kratos_lite import solvers
-from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
-from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import InputError
-from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.records import replace
-from kratos_lite.solvers.coarse_level import is_stretched, linear_level
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.dilatation import SplitMatrix, split
-from kratos_lite.solvers.linear_solver import DENSE_MAX
+from kratos_lite.solvers.direct import is_quick
+from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
 from kratos_lite.typing import Array, Ints, Progress
+
+if TYPE_CHECKING:
+    from kratos_lite.assembly.matrix_free import MatrixFree
+    from kratos_lite.mesh.hanging import HangingNodes
+    from kratos_lite.solvers.coarse_level import LinearLevel
+
 LARGEST_CONTRAST = 1e3
 """Stiffest to softest material up to which products without a matrix leave soft parts as exact as with one."""
+
+NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
+"""Reason for the method ``direct``."""
+LOCKED = 3000.0
+"""Bulk over shear modulus (ν = 0.4998) from which plain elements take too many iterations."""
 
 
 class ConstrainedSystem:
@@ -90,9 +98,24 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
-        self.method, self.reason = solvers.choose(solver, len(self.reduced.free), dofs)
+        self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
+        if solver == "auto" and self.method == "amg" and self._is_soon_factorized():
+            self.method, self.reason = "direct", NEARLY
         if self.method == "dense" and dofs > DENSE_MAX:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+
+    def _is_soon_factorized(self) -> bool:
+        """Return whether a material is nearly incompressible, and a factorization faster than iterations."""
+        ratios = [bulk_over_shear(group.material.C) for group in self.groups]
+        if max(ratios, default=0.0) <= NEAR_HALF:
+            return False
+        unknowns = len(self.reduced.free)
+        if is_quick(unknowns, lambda: self.pattern):
+            return True
+        from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
+
+        locked = (group for group, ratio in zip(self.groups, ratios, strict=True) if ratio > LOCKED)
+        return quick_to_factorize(unknowns) and not all(map(is_split, locked))
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -108,10 +131,15 @@ class ConstrainedSystem:
         """
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
-        if self._is_matrix_free():
-            return MatrixFree(self.points, self.groups, self._assembled)
+        product = self._matrix_free()
+        if product is not None:
+            return product
         K = self._assembled()
-        return split(K, self.points, self.groups, self.pattern) if self.method == "amg" else K
+        if self.method != "amg":
+            return K
+        from kratos_lite.solvers.dilatation import split  # a quick start for small models
+
+        return split(K, self.points, self.groups, self.pattern)
 
     def _assembled(self) -> BlockMatrix:
         skipped: set[str] = set()
@@ -119,16 +147,27 @@ class ConstrainedSystem:
         self.skipped += sorted(skipped)
         return K
 
-    def _is_matrix_free(self) -> bool:
-        """Return whether multigrid smooths well with the product of K alone: no element is stretched."""
-        return (
-            self.method == "amg"
-            and self.reduced.T is None
-            and self._hanging is None
-            and all(map(MatrixFree.takes, self.groups))
-            and stiffness_contrast(self.groups) <= LARGEST_CONTRAST
-            and not is_stretched(self.points, self.groups)
-        )
+    def _matrix_free(self) -> MatrixFree | None:
+        """Return the product of K alone, if multigrid smooths well with it.
+
+        A plate, stretched cells and materials of a large contrast need a matrix.
+        """
+        if self.method != "amg" or self.reduced.T is not None or self._hanging is not None:
+            return None
+        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
+        from kratos_lite.solvers.coarse_level import is_stretched
+        from kratos_lite.solvers.multigrid import plate_axes
+
+        free = np.zeros(3 * len(self.points), dtype=bool)
+        free[self.reduced.free] = True
+        if (
+            not all(map(MatrixFree.takes, self.groups))
+            or stiffness_contrast(self.groups) > LARGEST_CONTRAST
+            or is_stretched(self.points, self.groups)
+            or plate_axes(self.points, free) is not None
+        ):
+            return None
+        return MatrixFree(self.points, self.groups, self._assembled)
 
     @cached_property
     def norm(self) -> float:
@@ -136,16 +175,14 @@ class ConstrainedSystem:
         return self._equations.norm
 
     @cached_property
-    def _equations(self) -> solvers.LinearSolver:
-        groups = self.K.groups if isinstance(self.K, SplitMatrix) else self.groups
-        return solvers.LinearSolver(
-            self.K,
-            self.reduced,
-            self.points,
-            self.method,
-            self.reason,
-            lambda: linear_level(self.points, groups, self._hanging),
-        )
+    def _equations(self) -> LinearSolver:
+        return LinearSolver(self.K, self.reduced, self.points, self.method, self.reason, self._linear_level)
+
+    def _linear_level(self) -> LinearLevel | None:
+        from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
+
+        groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
+        return linear_level(self.points, groups, self._hanging)
 
     def solve(
         self,
@@ -153,7 +190,7 @@ class ConstrainedSystem:
         prescribed: Array | None = None,
         tolerance: float | None = None,
         start: Array | None = None,
-    ) -> tuple[Array, solvers.Solution]:
+    ) -> tuple[Array, Solution]:
         """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
 
         Parameters

@@ -1,7 +1,7 @@
-"""K of nearly incompressible elements, split into their dilatations and a stiffness without them.
+"""K of nearly incompressible elements, split into their dilatations and a stiffness without most of them.
 
 K = A + Dᵀ κ D, where D u are the dilatations that elements have, by orthonormal polynomials, κ is the bulk
-modulus that is taken off the material, and A is the stiffness with what is left of it: λ = 0.
+modulus that is taken off the material, and A is the stiffness with what is left of it: λ = μ.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
-from kratos_lite.elements.formulations import bulk_over_shear
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.materials import LinearMaterial
@@ -25,12 +25,12 @@ from kratos_lite.records import record, replace
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import bsr_array, csr_array
 
-NEAR_HALF = 99.0
-"""Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
-KEPT = 2 / 3
-"""Bulk over shear modulus that A keeps: λ = 0."""
+REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
+"""Reason for the method ``displacement-pressure``."""
+KEPT = 1.0
+"""λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 
 
 @record(eq=False)
@@ -40,20 +40,23 @@ class SplitMatrix:
     Attributes
     ----------
     A : the stiffness without most of the bulk modulus.
-    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
+    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m, R x 3 blocks with R = 1 or 4.
     bulk : (p,) Pa, κ.
+    kept : (p,) Pa, λ in A.
     modulus : (p,) Pa, λ + 2μ in A.
     means : (p, n) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
-        stiffest element there.
+        stiffest element there, λ = 0 in those that are split.
     groups : the elements, with materials as in A.
     """
 
     A: BlockMatrix
-    D: csr_array
+    D: bsr_array
     bulk: Array
+    kept: Array
     modulus: Array
     means: csr_array
     groups: list[ElementGroup]
+    is_split = True
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -66,14 +69,15 @@ class SplitMatrix:
 
     def norm(self) -> float:
         """Return the largest row sum of |A| and |D|ᵀ κ |D|: no less than that of |K|."""
-        size = abs(self.D)
+        size = abs(self.D.tocsr())
         return self.A.norm() + float((size.T @ (self.bulk * size.sum(axis=1))).max(initial=0.0))
 
     def scipy(self) -> csr_array:
         """Return K as a scipy.sparse.csr_array."""
         from scipy.sparse import diags_array
 
-        return (self.A.scipy().tocsr() + self.D.T @ diags_array(self.bulk) @ self.D).tocsr()
+        D = self.D.tocsr()
+        return (self.A.scipy().tocsr() + D.T @ diags_array(self.bulk) @ D).tocsr()
 
 
 def split(
@@ -90,17 +94,22 @@ def split(
     """
     if not any(map(is_split, groups)):
         return K
-    left, parts = list(groups), []
+    left, soft, parts = list(groups), list(groups), []
     for number, group in enumerate(groups):
         if is_split(group):
-            taken = _moduli(group.material.C)[0] - KEPT * _moduli(group.material.C)[1]
-            left[number] = _softened(group, taken)
-            parts.append(_Part(group, taken, _longitudinal(left[number]), _dilatations(points, group)))
-            parts[-1].take_off(K, pattern, number)
-    bulk = np.concatenate([np.full(part.count, part.bulk) for part in parts])
-    modulus = np.concatenate([np.full(part.count, part.modulus) for part in parts])
-    means = _means(points, parts, _stiffest(len(points), left))
-    return SplitMatrix(K, _assembled(len(points), parts), bulk, modulus, means, left)
+            bulk, shear = _moduli(group.material.C)
+            part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+            part.take_off(K, pattern, number)
+            parts.append(part)
+            left[number] = _softened(group, part.bulk)
+            soft[number] = _softened(left[number], KEPT * shear)
+    taken, shears = (
+        np.concatenate([np.full(part.count, getattr(part, name)) for part in parts])
+        for name in ("bulk", "shear")
+    )
+    means = _means(points, parts, _stiffest(len(points), soft))
+    D = _assembled(len(points), parts)
+    return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
 
 
 def is_split(group: ElementGroup) -> bool:
@@ -115,11 +124,11 @@ def is_split(group: ElementGroup) -> bool:
 
 @record(eq=False)
 class _Part:
-    """A group, the bulk modulus taken off it, λ + 2μ that it keeps, and its dilatations (m, r, 3k)."""
+    """A group, the bulk modulus taken off it, its shear modulus, and its dilatations (m, r, 3k)."""
 
     group: ElementGroup
     bulk: float
-    modulus: float
+    shear: float
     D: Array
 
     @property
@@ -188,18 +197,22 @@ def _softened(group: ElementGroup, taken: float) -> ElementGroup:
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
-    """Return D (p, 3n) of the dilatations of each group."""
-    from scipy.sparse import csr_array, vstack
+def _assembled(n_nodes: int, parts: Sequence[_Part]) -> bsr_array:
+    """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
+    from scipy.sparse import bsr_array
 
-    rows = []
+    sizes = {part.D.shape[1] for part in parts}
+    R = sizes.pop() if len(sizes) == 1 else 1
+    blocks, columns, counts = [], [], []
     for part in parts:
-        (m, r, size), D = part.D.shape, part.D
-        dofs = (3 * part.group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
-        columns = np.repeat(dofs, r, axis=1).ravel()
-        starts = np.arange(0, D.size + 1, size, dtype=np.int32)
-        rows.append(csr_array((D.ravel(), columns, starts), shape=(m * r, 3 * n_nodes)))
-    return rows[0] if len(rows) == 1 else vstack(rows, format="csr")
+        m, r, size = part.D.shape
+        k = size // 3
+        blocks.append(part.D.reshape(m, r // R, R, k, 3).swapaxes(2, 3).reshape(-1, R, 3))
+        columns.append(np.repeat(part.group.nodes[:, None], r // R, axis=1).ravel())
+        counts.append(np.full(m * r // R, k))
+    starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    data = np.concatenate(blocks), np.concatenate(columns).astype(np.int32), starts
+    return bsr_array(data, shape=(R * (len(starts) - 1), 3 * n_nodes))
 
 
 def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:

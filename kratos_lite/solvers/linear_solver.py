@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 from kratos_lite.records import record, replace
-from kratos_lite.solvers import direct, multigrid
-from kratos_lite.solvers.coarse_level import LinearLevel
+from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.dilatation import NEAR_HALF, SplitMatrix
-from kratos_lite.solvers.displacement_pressure import DisplacementPressure
-from kratos_lite.solvers.iteration import PATIENCE, ConvergenceForecast
 from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import choice
+
+if TYPE_CHECKING:
+    from kratos_lite.assembly.matrix_free import MatrixFree
+    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.dilatation import SplitMatrix
+    from kratos_lite.solvers.multigrid import Solver
 
 DENSE_LIMIT = 600
 """Up to this many unknowns a full matrix needs no sparse library at all."""
@@ -38,8 +38,6 @@ SUPERLU_LIMIT = 30_000
 """Up to this many unknowns SuperLU factorizes in less time than a slow iteration takes."""
 ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
-SPLIT = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
-"""Reason for the method ``displacement-pressure``."""
 
 
 @record(frozen=True)
@@ -216,9 +214,10 @@ class LinearSolver:
         T, free = self.reduced.T, self.reduced.free
         if T is None:
             return self.K
-        if isinstance(self.K, SplitMatrix):
-            return replace(self.K, A=constrained(self.K.A, T, free), D=self.K.D @ on_all(T, free))
-        return constrained(self.K, T, free)
+        if isinstance(self.K, BlockMatrix):
+            return constrained(self.K, T, free)
+        D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
+        return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
     @cached_property
     def _free(self) -> Mask:
@@ -227,17 +226,24 @@ class LinearSolver:
         return free
 
     @cached_property
-    def _multigrid(self) -> multigrid.Solver:
+    def _multigrid(self) -> Solver:
         linear, matrix = self.linear_level() if self.linear_level else None, self._blocks
-        if isinstance(matrix, SplitMatrix):
-            return DisplacementPressure(matrix, self._free, self.points, linear)
-        return multigrid.multigrid(matrix, self._free, self.points, linear)
+        if not matrix.is_split:
+            from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
+
+            return multigrid(matrix, self._free, self.points, linear)
+        from kratos_lite.solvers.displacement_pressure import DisplacementPressure  # rarely needed
+
+        return DisplacementPressure(matrix, self._free, self.points, linear)
 
     @property
     def _iteration(self) -> tuple[str, str]:
         """The method that iterates, and the reason for it."""
-        split = isinstance(self.K, SplitMatrix)
-        return ("displacement-pressure", SPLIT) if split else ("amg", self.reason)
+        if not self.K.is_split:
+            return "amg", self.reason
+        from kratos_lite.solvers.dilatation import REASON  # rarely needed
+
+        return "displacement-pressure", REASON
 
     @cached_property
     def norm(self) -> float:
@@ -252,6 +258,8 @@ class LinearSolver:
         self, b: Array, tolerance: float, progress: Progress | None, continued: bool
     ) -> tuple[Solution, str]:
         """Solve by multigrid; return also why it did not converge, or "" where it did."""
+        from kratos_lite.solvers.iteration import PATIENCE, ConvergenceForecast  # as for multigrid
+
         free, rhs = self.reduced.free, np.zeros(len(self._free))
         rhs[free] = b
         # On few unknowns some iterations more, to round-off, make it as exact as a factorization.
@@ -274,6 +282,8 @@ def quick_to_factorize(unknowns: int) -> bool:
     >>> quick_to_factorize(FALLBACK_LIMIT + 1)
     False
     """
+    from importlib.util import find_spec  # a quick start for small models
+
     return unknowns <= (FALLBACK_LIMIT if find_spec("pypardiso") else SUPERLU_LIMIT)
 
 
@@ -295,8 +305,8 @@ def on_all(T: Any, free: Ints) -> Any:
 
 def matrix_norm(A: Any) -> float:
     """Return the largest row sum of |A|."""
-    if isinstance(A, (BlockMatrix, MatrixFree, SplitMatrix)):
-        return A.norm()
+    if hasattr(A, "norm"):  # blocks, split or not, or a product alone
+        return float(A.norm())
     return float(np.asarray(abs(A).sum(axis=1)).max(initial=0.0))
 
 

@@ -55,7 +55,11 @@ class Solver(Protocol):
 
 
 def multigrid(
-    A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: LinearLevel | None = None
+    A: BlockMatrix | MatrixFree,
+    free: Mask,
+    points: Array,
+    linear: LinearLevel | None = None,
+    degree: int = DEGREE,
 ) -> Compiled | Pyamg:
     """Return the solver of A on its free components (3n,).
 
@@ -65,11 +69,12 @@ def multigrid(
     free : (3n,) the components that are unknown; rows and columns of the others do not matter.
     points : (n, 3) m, from which come the rigid modes.
     linear : the linear elements within quadratic ones.
+    degree : of the smoother of the kernels.
     """
     compiled = kernels("multigrid")
     if compiled is None:
         return Pyamg(A.assembled() if isinstance(A, MatrixFree) else A, free, points, linear)
-    return Compiled(compiled, A, free, points, linear)
+    return Compiled(compiled, A, free, points, linear, degree)
 
 
 class Compiled:
@@ -86,14 +91,23 @@ class Compiled:
     complexity : numbers in the matrices of all levels to those of the finest one.
     """
 
-    def __init__(self, module: Any, A: BlockMatrix | MatrixFree, free: Mask, points: Array, linear: LinearLevel | None):
+    def __init__(
+        self,
+        module: Any,
+        A: BlockMatrix | MatrixFree,
+        free: Mask,
+        points: Array,
+        linear: LinearLevel | None,
+        degree: int = DEGREE,
+    ) -> None:
         fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
         axes, places = plate_axes(points, free), points
         if axes is not None:
             normal = axes[:, 0]
             places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
         finest = A.product if isinstance(A, MatrixFree) else _matrix(module, A)
-        self._kernel = module.Multigrid(finest, fixed, places, DEGREE, RATIO, STRENGTH)
+        self._module = module
+        self._kernel = module.Multigrid(finest, fixed, places, degree, RATIO, STRENGTH)
         if linear is not None and self._kernel.has_planes() and not linear.halved:
             linear = None  # tetrahedra: their middle nodes are too far from their corners
         if linear is not None:
@@ -103,7 +117,9 @@ class Compiled:
         else:
             modes = bending_modes(points, axes)
         if linear is None:
-            self._kernel.aggregate(modes, _matrix(module, A.assembled()) if isinstance(A, MatrixFree) else None)
+            self._kernel.aggregate(
+                modes, _matrix(module, A.assembled()) if isinstance(A, MatrixFree) else None
+            )
         else:
             self._kernel.aggregate_linear(
                 _matrix(module, linear.K),
@@ -122,6 +138,10 @@ class Compiled:
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,)."""
         return self._kernel.cycle(r)
+
+    def with_pressures(self, *matrices: Any) -> Any:
+        """Return the kernel that solves for pressures beside the displacements."""
+        return self._module.Pressures(self._kernel, *matrices)
 
     def solve(
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None

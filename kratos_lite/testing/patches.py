@@ -10,8 +10,8 @@ from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.centers import raise_order
 from kratos_lite.mesh.generators import SPLITS, box
-from kratos_lite.mesh.order import raise_order
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.report import Measured
 from kratos_lite.typing import Array, Ints, Mask

@@ -35,7 +35,7 @@ def check_shape(shape: type[Shape]) -> list[Finding]:
 
     Examples
     --------
-    >>> from kratos_lite.shapes import Wedge15
+    >>> from kratos_lite.shapes.wedges import Wedge15
     >>> all(finding.passed for finding in check_shape(Wedge15))
     True
     """

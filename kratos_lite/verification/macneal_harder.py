@@ -10,7 +10,7 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import NodalForces
+from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array, Mask
 from kratos_lite.verification.fields import Field
 from kratos_lite.verification.meshes import face_forces, on_plane, shaped, straight

@@ -10,8 +10,8 @@ from kratos_lite.elements import ELEMENTS, KinematicLinear
 from kratos_lite.elements.surface import area_vectors, face_rule
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.centers import raise_order
 from kratos_lite.mesh.generators import SPLITS, box
-from kratos_lite.mesh.order import raise_order
 from kratos_lite.quadrature import rule_for
 from kratos_lite.typing import Array, Ints, Mask, Rows
 

@@ -15,7 +15,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.generators import annulus, box
-from kratos_lite.model.loads import BodyForce
+from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import (

@@ -13,8 +13,8 @@ from kratos_lite.assembly.gauss_point_fields import at_gauss
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import box
-from kratos_lite.model.loads import BodyForce
-from kratos_lite.shapes import Hexahedron8
+from kratos_lite.model.loads.body import BodyForce
+from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array
 from kratos_lite.verification.fields import Field
 from kratos_lite.verification.meshes import is_quadratic, kind_of, on_boundary, split, straight, warped

@@ -10,7 +10,8 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh.generators import annulus
-from kratos_lite.model.loads import NodalForces, Pressure
+from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.model.loads.surface import Pressure
 from kratos_lite.typing import Array
 from kratos_lite.verification import scenes
 from kratos_lite.verification.meshes import element, face_forces, is_quadratic, nearest, on_plane, shaped

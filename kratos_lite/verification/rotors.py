@@ -11,7 +11,7 @@ from kratos_lite.ale import Rotation
 from kratos_lite.analysis.modal import critical_rate
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import NodalForces
+from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import face_forces, is_quadratic
 from kratos_lite.verification.moving_material import BRICKS, RATE, problem, rotor

@@ -10,7 +10,9 @@ from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.nodal_loads import external_loads
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh.generators import box
-from kratos_lite.model.loads import Gravity, NodalForces, Pressure, Traction
+from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.nodal import NodalForces
+from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.typing import Array
 from kratos_lite.verification import fields
 from kratos_lite.verification.meshes import (

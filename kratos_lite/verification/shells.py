@@ -9,7 +9,8 @@ import numpy as np
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.materials import Isotropic3D
-from kratos_lite.model.loads import BodyForce, NodalForces
+from kratos_lite.model.loads.body import BodyForce
+from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import face_forces, nearest, on_plane, shaped
 from kratos_lite.verification.problem import Problem, StaticProblem

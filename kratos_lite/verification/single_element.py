@@ -11,7 +11,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.bodies import FiniteElementBody
 from kratos_lite.materials import Isotropic3D
 from kratos_lite.mesh.generators import box
-from kratos_lite.model.loads import NodalForces
+from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array
 from kratos_lite.verification import scenes
 from kratos_lite.verification.meshes import (

@@ -10,8 +10,8 @@ from kratos_lite.analysis.solution_checks import judge
 from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.errors import SolveError
 from kratos_lite.model.checks import equilibrium
-from kratos_lite.solvers import Solution
 from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.time_series import slope_of
 
 SOIL = kl.Isotropic3D(E=1e7, nu=0.3, density=2000.0)

@@ -8,7 +8,8 @@ from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements import ELEMENTS, EnhancedStrain3D8N
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.errors import InputError, MaterialError

@@ -11,8 +11,9 @@ from kratos_lite.assembly import element_groups
 from kratos_lite.assembly.gauss_point_fields import body_force
 from kratos_lite.assembly.mass_and_convection import inertia_matrices, lumped_mass
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.elements import KinematicLinear3D10N, KinematicLinear3D27N
 from kratos_lite.elements.exact_rules import AFFINE, CURVED, STRAIGHT, exact_rule, geometries
+from kratos_lite.elements.kinematic_linear_3d10n import KinematicLinear3D10N
+from kratos_lite.elements.kinematic_linear_3d27n import KinematicLinear3D27N
 from kratos_lite.elements.surface import surface_pressure
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import hexahedron, rule_for, tetrahedron

@@ -13,7 +13,10 @@ import kratos_lite as kl
 from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements import ELEMENTS, KinematicLinear3D4N, KinematicLinear3D8N, KinematicLinear3D20N
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
+from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
+from kratos_lite.elements.kinematic_linear_3d20n import KinematicLinear3D20N
 from kratos_lite.errors import MeshError
 from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
 from kratos_lite.mesh import Block, Mesh

@@ -8,7 +8,9 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.elements.formulations import bulk_over_shear, element_of, formulations_of
 from kratos_lite.elements.kinematic_linear import ELEMENTS
-from kratos_lite.shapes import Hexahedron8, Hexahedron20, Tetrahedron4, Wedge15
+from kratos_lite.shapes.hexahedra import Hexahedron8, Hexahedron20
+from kratos_lite.shapes.tetrahedra import Tetrahedron4
+from kratos_lite.shapes.wedges import Wedge15
 
 STEEL, RUBBER = kl.Isotropic3D(E=210e9, nu=0.3), kl.Isotropic3D(E=1e6, nu=0.499)
 

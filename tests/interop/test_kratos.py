@@ -14,7 +14,9 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Data, Document, Properties
 from kratos_lite.quadrature import Rule
-from kratos_lite.shapes import SHAPES, Pyramid13, Shape, Wedge15
+from kratos_lite.shapes import SHAPES, Shape
+from kratos_lite.shapes.pyramids import Pyramid13
+from kratos_lite.shapes.wedges import Wedge15
 
 for wheel in ("Multiphysics", "StructuralMechanicsApplication", "LinearSolversApplication"):
     try:

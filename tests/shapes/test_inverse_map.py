@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
-from kratos_lite.shapes import (
-    SHAPES,
-    Hexahedron8,
-    Hexahedron27,
-    Pyramid5,
-    Tetrahedron4,
-    Tetrahedron10,
-    inverse_map,
-)
-from kratos_lite.shapes.inverse import outside_by
+from kratos_lite.shapes import SHAPES
+from kratos_lite.shapes.hexahedra import Hexahedron8, Hexahedron27
+from kratos_lite.shapes.inverse import inverse_map, outside_by
+from kratos_lite.shapes.pyramids import Pyramid5
+from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 
 SOLIDS = [shape for shape in SHAPES.values() if shape.nodes.shape[1] == 3]
 A = np.array([[1.2, 0.3, -0.1], [-0.2, 0.9, 0.25], [0.15, -0.1, 1.1]])

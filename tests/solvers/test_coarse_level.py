@@ -9,7 +9,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.shapes import Hexahedron8
+from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.solvers.coarse_level import linear_level
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)

@@ -10,7 +10,8 @@ import kratos_lite as kl
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers import LinearSolver, direct
+from kratos_lite.solvers import direct
+from kratos_lite.solvers.linear_solver import LinearSolver
 
 
 def has_pardiso():

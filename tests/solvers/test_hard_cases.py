@@ -222,7 +222,7 @@ def unstructured(aspect):
     nodes = nodes[np.abs(volume) > 1e-5]
     used, nodes = np.unique(nodes, return_inverse=True)
     nodes = nodes.reshape(-1, 4).astype(np.int32)
-    shape, n = kl.elements.KinematicLinear3D4N.shape, len(nodes)
+    shape, n = kl.KinematicLinear3D4N.shape, len(nodes)
     block = Block("KinematicLinear3D4N", nodes, np.arange(1, n + 1), np.ones(n, int), shape)
     model = kl.Model(kl.Mesh(points[used] * [1, 1, 1 / aspect], [block]), kl.Isotropic3D(E=1e9, nu=0.3))
     model.fix(np.flatnonzero(points[used, 2] < 0.1))
@@ -263,7 +263,7 @@ def incompressible():
 
 
 def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
-    monkeypatch.setattr(equations, "PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
     model = incompressible()
     result = model.solve("amg")
     assert result.report.solver == "direct"
@@ -275,7 +275,7 @@ def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
 
 
 def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
-    monkeypatch.setattr(equations, "PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
     monkeypatch.setattr(equations, "quick_to_factorize", lambda unknowns: False)
     model = incompressible()
     result = model.solve("amg")
@@ -287,6 +287,6 @@ def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
 
 @pytest.mark.parametrize(("installed", "limit"), [(True, 150_000), (False, 30_000)])
 def test_superlu_is_quick_on_fewer_unknowns(monkeypatch, installed, limit):
-    monkeypatch.setattr(equations, "find_spec", lambda name: object() if installed else None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if installed else None)
     assert equations.quick_to_factorize(limit)
     assert not equations.quick_to_factorize(limit + 1)

@@ -264,7 +264,8 @@ def test_the_origin_does_not_matter(path):
     mesh = box(cells=(6, 5, 4))
     near = assert_solved(clamped(mesh))
     mesh = mesh.replace(points=mesh.points + 1e6)
-    assert assert_solved(clamped(mesh)).iterations <= near.iterations + 2
+    rounding = 1e6 * np.finfo(float).eps / 0.15  # of coordinates, to the size of a cell
+    assert assert_solved(clamped(mesh), accuracy=rounding).iterations <= near.iterations + 2
 
 
 @pytest.mark.parametrize("n", [10, 16])

@@ -123,7 +123,7 @@ def test_an_error_in_a_function_is_named_with_the_line_of_the_file(checked):
 def test_a_shape_alone_and_an_element_with_another_rule_are_checked(checked):
     text = (
         WEDGE[: WEDGE.index("class MyElement")]
-        + "from kratos_lite.elements import KinematicLinear3D20N\n"
+        + "from kratos_lite import KinematicLinear3D20N\n"
         + "from kratos_lite.quadrature import hexahedron\n"
         + "class Reduced(KinematicLinear3D20N):\n    rule = hexahedron(3)\n"
     )

@@ -6,7 +6,8 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
 from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
 from kratos_lite.quadrature import CELLS, rule_for
-from kratos_lite.shapes import SHAPES, Hexahedron8
+from kratos_lite.shapes import SHAPES
+from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.testing import (
     assert_conforms,
     check,

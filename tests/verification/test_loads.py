@@ -183,7 +183,7 @@ def test_faces_of_mixed_cells_carry_the_whole_load():
 
 def test_one_value_per_element_is_not_taken_for_nodal_values():
     """Eight bricks with eight body forces, and four squares with four tractions."""
-    from kratos_lite.elements import surface_load
+    from kratos_lite.elements.surface import surface_load
 
     mesh = kl.box(cells=(2, 2, 2))
     element = kl.KinematicLinear3D8N(mesh.points[mesh.blocks[0].nodes])
@@ -209,7 +209,7 @@ def test_loads_on_conditions_of_unknown_kind_are_refused():
 
 
 def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
-    from kratos_lite.model.loads import ConditionLoads
+    from kratos_lite.model.loads.conditions import ConditionLoads
 
     mesh = faces_as_conditions(kl.box(), "z+", flip=False)
     own, at_nodes = np.array([[1.0, 0, 0]]), np.zeros((8, 3))
@@ -221,7 +221,7 @@ def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
 
 
 def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
-    from kratos_lite.model.loads import ConditionLoads
+    from kratos_lite.model.loads.conditions import ConditionLoads
     from kratos_lite.shapes import Line2
 
     box = kl.box()

@@ -223,7 +223,7 @@ def folder(tmp_path, monkeypatch):
 
 OWN = """
 from kratos_lite import KinematicLinear, KinematicLinear3D8N
-from kratos_lite.shapes import Hexahedron8
+from kratos_lite.shapes.hexahedra import Hexahedron8
 
 class {name}(KinematicLinear):
     shape, rule = Hexahedron8, KinematicLinear3D8N.rule

@@ -12,7 +12,8 @@ from kratos_lite.bodies.free_body import FreeBody
 from kratos_lite.bodies.linear_algebra import NO_ENTRIES, Entries
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import Gravity, Load, TimeDependentLoad
+from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.loads.body import Gravity
 from kratos_lite.records import record
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array

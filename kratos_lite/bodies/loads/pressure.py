@@ -13,7 +13,7 @@ from kratos_lite.bodies.loads.base import AppliedLoad, BodyLoad
 from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
-from kratos_lite.model.loads import outward
+from kratos_lite.model.loads.surface import outward
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 

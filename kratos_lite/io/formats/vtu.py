@@ -66,7 +66,7 @@ def write_vtu(
     Examples
     --------
     >>> import numpy as np
-    >>> from kratos_lite.shapes import Tetrahedron4
+    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
     >>> mesh = Mesh(Tetrahedron4.nodes, {"KinematicLinear3D4N": [[0, 1, 2, 3]]})
     >>> write_vtu(getfixture("tmp_path") / "one.vtu", mesh, {"TEMPERATURE": np.ones(4)})
     """

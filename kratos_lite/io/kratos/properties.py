@@ -12,7 +12,7 @@ from kratos_lite.errors import InputError, KratosLiteError, MaterialError, Probl
 from kratos_lite.io.formats.document import Properties
 from kratos_lite.io.names import PRESTRESS, nearest_variable
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.model.loads import BodyForce, Gravity
+from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.typing import Array
 
 ELASTIC = {name for law in MATERIALS.values() for name in law.variables.values()} - {"DENSITY"}

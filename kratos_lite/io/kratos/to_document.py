@@ -14,7 +14,8 @@ from kratos_lite.io.formats.document import Constraint, Data, Document, Note, Pr
 from kratos_lite.io.kratos.properties import USER_LAW
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
-from kratos_lite.model.loads import Gravity, TimeDependentLoad
+from kratos_lite.model.loads import TimeDependentLoad
+from kratos_lite.model.loads.body import Gravity
 from kratos_lite.records import names_of, replace
 from kratos_lite.shapes import Point1
 from kratos_lite.solvers.constraint_map import MultiPointConstraint

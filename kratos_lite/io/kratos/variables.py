@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, ids_of, with_rows
-from kratos_lite.model.loads import SURFACES, ConditionLoads, Gravity
+from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.conditions import ConditionLoads
+from kratos_lite.model.loads.surface import SURFACES
 from kratos_lite.typing import Array, Mask
 
 LOADS = {

@@ -11,7 +11,9 @@ from kratos_lite.errors import nearest
 from kratos_lite.io.readers.values import Read, number_or_series, part, points
 from kratos_lite.io.settings import Settings
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import Gravity, PointLoad, Pressure, Traction
+from kratos_lite.model.loads.body import Gravity
+from kratos_lite.model.loads.nodal import PointLoad
+from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.records import record
 
 

@@ -17,7 +17,10 @@ from kratos_lite.io.readers.time import load_of, read_time
 from kratos_lite.io.readers.values import is_by_part, number_or_series, read_material
 from kratos_lite.io.settings import Settings, find_file, inside, shown
 from kratos_lite.io.writers.endings import check_series
-from kratos_lite.model.loads import BodyForce, Gravity, Load, PointLoad, Pressure, TimeDependentLoad, Traction
+from kratos_lite.model.loads import Load, TimeDependentLoad
+from kratos_lite.model.loads.body import BodyForce, Gravity
+from kratos_lite.model.loads.nodal import PointLoad
+from kratos_lite.model.loads.surface import Pressure, Traction
 from kratos_lite.solvers.linear_solver import METHODS
 
 OUTPUTS = ("output", "json", "picture")

@@ -18,7 +18,8 @@ from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.pictures import draw
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.loads import NodalForces, TimeDependentLoad
+from kratos_lite.model.loads import TimeDependentLoad
+from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Progress
 

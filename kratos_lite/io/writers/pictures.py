@@ -127,7 +127,7 @@ def draw_element(
 
     Examples
     --------
-    >>> from kratos_lite.shapes import Wedge15
+    >>> from kratos_lite.shapes.wedges import Wedge15
     >>> draw_element(getfixture("tmp_path") / "wedge.png", Wedge15)
     """
     if isinstance(shape, type) and issubclass(shape, KinematicLinear) and hasattr(shape, "shape"):

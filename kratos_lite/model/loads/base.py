@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Finer, Mesh
+from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, takes
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.finer import Finer
 
 OfPlace: TypeAlias = Callable[[Array], ArrayLike]
 """A function of places (m, 3) in m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,8 +11,11 @@ from numpy.typing import ArrayLike
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Finer, Mesh, WhereElements
+from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import Load, OfPlace, vectors
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.finer import Finer
 from kratos_lite.typing import Array, Mask
 
 

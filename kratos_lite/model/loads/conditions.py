@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.elements import surface_load, surface_pressure
+from kratos_lite.elements.surface import surface_load, surface_pressure
 from kratos_lite.errors import ModelError
-from kratos_lite.mesh import Block, Finer, Mesh, with_rows
+from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.model.loads.base import Load
 from kratos_lite.model.loads.surface import SURFACES
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.finer import Finer
 from kratos_lite.typing import Array
 
 

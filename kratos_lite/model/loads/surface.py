@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
-from kratos_lite.elements import surface_load, surface_pressure
+from kratos_lite.elements.surface import surface_load, surface_pressure
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.mesh import Block, Finer, Mesh, Where, outward_signs
+from kratos_lite.mesh import Block, Mesh, Where, outward_signs
 from kratos_lite.model.loads.base import Load, OfPlace, vectors
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number
+
+if TYPE_CHECKING:
+    from kratos_lite.mesh.finer import Finer
 
 SURFACES = ("triangle", "quadrilateral")
 

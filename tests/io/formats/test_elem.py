@@ -14,7 +14,9 @@ from kratos_lite.io.formats.document import Constraint, Data, Document, Properti
 from kratos_lite.io.formats.elem import read_elem, write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
-from kratos_lite.shapes import Hexahedron27, Quadrilateral4, Tetrahedron4, Triangle3
+from kratos_lite.shapes import Quadrilateral4, Triangle3
+from kratos_lite.shapes.hexahedra import Hexahedron27
+from kratos_lite.shapes.tetrahedra import Tetrahedron4
 
 NODE = "NODES = NodesList([[1, 0, 0, 0], [2, 1, 0, 0], [3, 0, 1, 0], [4, 0, 0, 1], [5, 1, 1, 1]])\n"
 ELEM = "ELEMENTS[1] = KinematicLinear3D4N([1,2,3,4],1);\n"

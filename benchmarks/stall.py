@@ -1,0 +1,224 @@
+"""Scenes on which multigrid may stall: the elements solved on each, the solvers beside, and the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from benchmarks import hard_scenes
+from benchmarks.driver import Run
+from benchmarks.programs import SOLVERS
+from benchmarks.tables import OURS, Row, ratio, seconds, table
+
+UNKNOWNS = 75_000
+"""About so many are solved for if nothing else is asked for."""
+TOLERANCE = 1e-8
+CELLS = {"4N": 28, "8N": 28, "10N": 14, "20N": 18, "27N": 14}
+"""Cells along an edge of a block with so many unknowns."""
+LINEAR, BRICKS = ("4N", "8N", "8N enhanced"), ("8N", "8N enhanced", "20N", "27N")
+MOST = (*LINEAR, "10N", "20N", "27N")
+PROJECTED = ("8N enhanced", "10N B-bar", "20N B-bar", "27N B-bar")
+"""Elements that do not lock as ν is near 0.5."""
+BENIGN = "block"
+ELEMENTS: dict[str, tuple[str, ...]] = {
+    BENIGN: (*MOST, *PROJECTED[1:]),
+    "flat_10": BRICKS,
+    "flat_100": MOST,
+    "flat_1000": BRICKS,
+    "needles_10": BRICKS,
+    "needles_100": MOST,
+    "needles_1000": BRICKS,
+    "needles_one_layer": BRICKS,
+    "plate_100": MOST,
+    "plate_1000": BRICKS,
+    "cantilever_plate_100": MOST,
+    "cantilever_plate_100_layers": BRICKS,
+    "cantilever_plate_1000": MOST,
+    "contrast_layers": ("8N", "10N", "20N"),
+    "contrast_inclusions": ("8N", "10N", "20N"),
+    "links_periodic": ("8N", "20N"),
+    "links_bonded": ("8N", "20N"),
+    "tetrahedra": ("4N", "10N"),
+    **{hard_scenes.name_of(nu): PROJECTED for nu in hard_scenes.RATIOS},
+}
+"""Elements for which a scene matters."""
+SLACK = 3.0
+"""A residual up to so many times the one asked for, or that of rounding, counts as reached."""
+NOTE = """Linear systems alone: set-up and solution, without assembly, to a true relative residual of 1e-8
+(or what rounding allows). Every program gets the matrix of kratos_lite, in its own format before the clock
+starts; kratos_lite's own work on a complete matrix counts as set-up. MB is the memory that both take above
+the matrix. The first table compares with the block with ν = 0.3 of the same elements, by unknown; the second
+has seconds (iterations) and MB of every program, and the ratio kratos_lite / best other. `flat_100` has
+cells 100 times as wide as thick, and `needles_100` as long as wide, held along their length; plates have one
+layer of cells or three; `contrast` is 1e6, in layers or balls; `block_nu_4999` has ν = 0.4999. Goals: at most
+40 iterations, 3 times the time and 1.5 times the memory of the block, 0.25 of the best other."""
+MOST_ITERATIONS, MOST_TIME, MOST_MEMORY, MOST_OF_OTHERS = 40, 3.0, 1.5, 0.25
+Place = tuple[str, str, int]
+
+
+def cells(kind: str, unknowns: float) -> int:
+    """Return the cells along an edge of a block with about so many unknowns.
+
+    >>> cells("27N B-bar", 75_000), cells("8N", 600_000)
+    (14, 56)
+    """
+    return max(2, round(CELLS[kind.split(maxsplit=1)[0]] * (unknowns / UNKNOWNS) ** (1 / 3)))
+
+
+def runs(
+    programs: Sequence[str], unknowns: float = UNKNOWNS, scenes: Sequence[str] | None = None
+) -> list[Run]:
+    """Return the linear systems of the scenes and of the block of each element."""
+    chosen = [program for program in (OURS, *SOLVERS) if program in programs]
+    wanted = [scene for scene in scenes or ELEMENTS if scene in ELEMENTS and scene != BENIGN]
+    kinds = [kind for kind in ELEMENTS[BENIGN] if any(kind in ELEMENTS[scene] for scene in wanted)]
+    elements = {BENIGN: kinds} | {scene: ELEMENTS[scene] for scene in wanted}
+    return [
+        Run("stall", program, scene, kind, cells(kind, unknowns), "linear", (("tolerance", TOLERANCE),))
+        for scene, kinds in elements.items()
+        for kind in kinds
+        for program in chosen
+    ]
+
+
+# ---- tables ------------------------------------------------------------------------------------------
+
+
+def tables(rows: Sequence[Row]) -> str:
+    """Return what kratos_lite takes beside its block, and beside the other solvers."""
+    places = dict.fromkeys((row["scene"], row["kind"], row["n"]) for row in rows)
+    found = {place: {row["program"]: row for row in rows if place == _place(row)} for place in places}
+    mine = {place: here[OURS] for place, here in found.items() if OURS in here}
+    return "\n".join(
+        text
+        for text in (
+            _ours(mine),
+            _peers(found),
+            _missed(mine, found),
+        )
+        if text
+    )
+
+
+def _place(row: Row) -> Place:
+    return row["scene"], row["kind"], row["n"]
+
+
+def _ours(rows: dict[Place, Row]) -> str:
+    """Return the table of kratos_lite alone."""
+    body = []
+    for (scene, kind, _), row in rows.items():
+        if "failed" in row:
+            body.append([scene, kind, "", row["failed"], *[""] * 6])
+            continue
+        base, phases = _base(row, rows), row["phases"]
+        body.append(
+            [
+                scene,
+                kind,
+                str(row["unknowns"]),
+                f"{row['solver']}, {row['iterations']}",
+                seconds(phases["setup"]),
+                seconds(phases["solve"]),
+                ratio(_per_unknown(row, _time), _per_unknown(base, _time)),
+                _megabytes(row),
+                ratio(_per_unknown(row, _memory), _per_unknown(base, _memory)),
+                f"{row['residual']:.0e}",
+            ]
+        )
+    head = ["scene", "element", "unknowns", "solver, iterations", "set-up s", "solve s", "of block"]
+    return table([*head, "MB", "of block", "residual"], body)
+
+
+def _peers(found: dict[Place, dict[str, Row]]) -> str:
+    """Return seconds, iterations and memory of every program, and the ratio to the best of them."""
+    names = [name for name in (OURS, *SOLVERS) if any(name in here for here in found.values())]
+    if names == [OURS]:
+        return ""
+    body = [
+        [f"{place[0]} {place[1]}", *(_cell(here.get(name)) for name in names), *_best(here)]
+        for place, here in found.items()
+    ]
+    return table(["scene", *names, "best other", "ratio"], body)
+
+
+def _best(here: dict[str, Row]) -> tuple[str, str]:
+    """Return the fastest other solver, and the time of kratos_lite over its."""
+    times = {name: _time(here.get(name)) for name in SOLVERS}
+    known = {name: time for name, time in times.items() if time is not None}
+    if not known:
+        return "", ""
+    best = min(known, key=known.__getitem__)
+    return best, ratio(_time(here.get(OURS)), known[best])
+
+
+def _missed(mine: dict[Place, Row], found: dict[Place, dict[str, Row]]) -> str:
+    """Return how many rows miss each goal."""
+    solved = {place: row for place, row in mine.items() if _time(row) is not None}
+    ratios = [float(_best(found[place])[1] or 0.0) for place in solved]
+    counts = {
+        "not solved": len(mine) - len(solved),
+        "more than 40 iterations, or a factorization": sum(map(_stalls, solved.values())),
+        "more than 3 times the time of the block": _over(solved, mine, _time, MOST_TIME),
+        "more than 1.5 times its memory": _over(solved, mine, _memory, MOST_MEMORY),
+        "more than 0.25 of the best other": sum(ratio > MOST_OF_OTHERS for ratio in ratios),
+    }
+    lines = [f"- {what}: {count}" for what, count in counts.items()]
+    return "\n".join([f"Of the {len(mine)} rows of kratos_lite miss a goal:\n", *lines, ""]) if mine else ""
+
+
+def _over(
+    solved: dict[Place, Row], mine: dict[Place, Row], value: Callable[[Row], float | None], limit: float
+) -> int:
+    """Return how many rows are beyond `limit` times the value of their block, by unknown."""
+    count = 0
+    for row in solved.values():
+        base = _base(row, mine)
+        here, there = _per_unknown(row, value), _per_unknown(base, value)
+        count += bool(here and there and here > limit * there)
+    return count
+
+
+def _stalls(row: Row) -> bool:
+    return bool(row["iterations"] > MOST_ITERATIONS or row["solver"] == "direct")
+
+
+def _base(row: Row, rows: dict[Place, Row]) -> Row | None:
+    """Return the block of the same element with the size of a row."""
+    found = rows.get((BENIGN, row["kind"], row["n"]))
+    return None if found is None or "failed" in found else found
+
+
+def _per_unknown(row: Row | None, value: Callable[[Row], float | None]) -> float | None:
+    found = value(row) if row else None
+    return found / row["unknowns"] if row and found else None
+
+
+def _memory(row: Row) -> float | None:
+    return row.get("memory")
+
+
+def _time(row: Row | None) -> float | None:
+    """Return the seconds of set-up and solution; None where they did not end in a solution."""
+    if row is None or "failed" in row or not _reached(row):
+        return None
+    return float(sum(row["phases"].get(name, 0.0) for name in ("setup", "solve")))
+
+
+def _reached(row: Row) -> bool:
+    return bool(row["residual"] <= SLACK * max(TOLERANCE, row["rounding"]))
+
+
+def _cell(row: Row | None) -> str:
+    """Return seconds (iterations) and memory, or what came instead."""
+    if row is None:
+        return ""
+    if "failed" in row:
+        return row["failed"].removeprefix("failed: ")
+    iterations = f" ({row['iterations']})" if row["iterations"] else ""
+    if not _reached(row):
+        return f"residual {row['residual']:.0e}{iterations}"
+    return f"{seconds(_time(row))}{iterations}, {_megabytes(row)} MB"
+
+
+def _megabytes(row: Row) -> str:
+    return f"{row['memory'] / 1e6:.0f}" if row.get("memory") else ""

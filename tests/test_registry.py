@@ -1,0 +1,86 @@
+"""A registry imports the modules that it expects when an item of theirs is asked for, and not before."""
+
+import sys
+
+import pytest
+
+from kratos_lite.errors import InputError
+from kratos_lite.registry import Registry
+
+COLORS = Registry("color")
+MODULE = """
+from test_registry import COLORS
+class {name}: pass
+COLORS.add({name!r}, {name}, aliases={aliases!r})
+"""
+
+
+@pytest.fixture
+def colors(tmp_path, monkeypatch):
+    """Give a registry that expects two modules of one class each."""
+    registry = Registry("color")
+    monkeypatch.setattr(sys.modules[__name__], "COLORS", registry)
+    monkeypatch.setitem(sys.modules, "test_registry", sys.modules[__name__])
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, aliases in (("Red", ["rouge"]), ("Blue", ["azure", "bleu"])):
+        monkeypatch.delitem(sys.modules, f"module_of_{name}", raising=False)
+        (tmp_path / f"module_of_{name}.py").write_text(MODULE.format(name=name, aliases=aliases))
+        registry.expect(name, f"module_of_{name}", aliases[:1])
+    yield registry
+    for name in ("Red", "Blue"):
+        sys.modules.pop(f"module_of_{name}", None)
+
+
+def imported():
+    return {name for name in ("Red", "Blue") if f"module_of_{name}" in sys.modules}
+
+
+def test_names_and_expected_aliases_are_known_before_any_import(colors):
+    assert list(colors) == ["Red", "Blue"]
+    assert "Red" in colors
+    assert "azure" in colors
+    assert colors.aliases("Blue") == ["azure"]
+    assert imported() == set()
+
+
+@pytest.mark.parametrize("name", ["Blue", "azure"])
+def test_only_the_module_of_the_item_asked_for_is_imported(colors, name):
+    assert colors[name].__name__ == "Blue"
+    assert imported() == {"Blue"}
+
+
+def test_an_alias_that_only_a_module_knows_is_found(colors):
+    assert colors["bleu"].__name__ == "Blue"
+
+
+def test_an_unknown_name_is_refused_after_all_modules_have_been_asked(colors):
+    with pytest.raises(InputError, match="unknown color 'green'"):
+        colors["green"]
+    assert imported() == {"Red", "Blue"}
+
+
+def test_values_import_all_or_those_whose_names_end_alike(colors):
+    assert [item.__name__ for item in colors.values("ue")] == ["Blue"]
+    assert imported() == {"Blue"}
+    assert [item.__name__ for item in colors.values()] == ["Red", "Blue"]
+
+
+def test_own_items_stand_among_the_values_whatever_they_are_called(colors):
+    own = type("Own", (), {})
+    colors.add("Own", own)
+    assert colors.values("ue")[-1] is own
+
+
+def test_an_own_item_replaces_an_expected_one_even_if_its_module_comes_later(colors):
+    own = type("Red", (), {})
+    colors.add("Red", own)
+    __import__("module_of_Red")
+    assert colors["Red"] is own
+
+
+def test_what_was_imported_in_between_is_not_forgotten_with_temporary_items(colors):
+    with colors.temporary():
+        colors.add("Own", type("Own", (), {}))
+        assert colors["Red"]
+    assert list(colors) == ["Red", "Blue"]
+    assert colors["Red"].__name__ == "Red"
