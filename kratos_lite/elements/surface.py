@@ -48,7 +48,7 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
 
     Examples
     --------
-    >>> from kratos_lite.shapes import Triangle3
+    >>> from kratos_lite.shapes.faces import Triangle3
     >>> surface_load(Triangle3, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], (0, 0, 6.0))[:, 2]
     array([1., 1., 1.])
     """

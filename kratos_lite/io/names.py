@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable
 
 from kratos_lite.errors import nearest
-from kratos_lite.shapes import FACE_SHAPES, SHAPES, Line2, Line3, Point1, Shape
+from kratos_lite.shapes import SHAPES, Shape
+from kratos_lite.shapes.faces import FACE_SHAPES, Line2, Line3, Point1
 
 SOLIDS = {len(shape.nodes): shape for shape in SHAPES.values() if shape.nodes.shape[1] == 3}
 """Solid shapes by their number of nodes."""
