@@ -17,7 +17,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
-from kratos_lite.elements.formulations import bulk_over_shear
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.materials import LinearMaterial
@@ -27,8 +27,6 @@ from kratos_lite.typing import Array
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array, csr_array
 
-NEAR_HALF = 99.0
-"""Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
 REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
 """Reason for the method ``displacement-pressure``."""
 KEPT = 1.0

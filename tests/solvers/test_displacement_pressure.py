@@ -172,6 +172,26 @@ def test_compressible_bodies_have_no_pressures():
     assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
 
+@pytest.mark.parametrize(
+    ("element", "cells", "method"),
+    [
+        ("EnhancedStrain3D8N", (5, 5, 5), "direct"),
+        ("EnhancedStrain3D8N", (20, 20, 1), "direct"),
+        ("EnhancedStrain3D8N", (9, 9, 9), "displacement-pressure"),
+        ("BBar3D27N", (4, 4, 4), "displacement-pressure"),
+        ("KinematicLinear3D8N", (5, 5, 5), "direct"),
+        ("KinematicLinear3D8N", (10, 10, 10), "direct"),
+    ],
+)
+def test_few_unknowns_are_factorized(element, cells, method):
+    model = body(element, cells=cells, size=(0.1 * cells[0], 0.1 * cells[1], 0.1 * cells[2]))
+    report = model.solve().report
+    assert report.solver == method, report.reason
+    if method == "direct":
+        assert report.reason.startswith("few unknowns with a bulk modulus > 99 shear moduli")
+    assert body(element, rubber(0.3), cells).solve().report.solver == "amg"
+
+
 # ---- the matrix ------------------------------------------------------------------------------------------
 
 
