@@ -279,6 +279,14 @@ def test_prescribed_displacements():
     assert found.report.backward_error < 1e-11
 
 
+def test_tolerances_refer_to_forces_without_the_bulk_modulus():
+    model = body("BBar3D20N", cells=5)
+    model.fix("z+", value=(0.01, 0.0, -0.05))
+    report = model.static("amg", tolerance=1e-5).solve().report
+    assert report.iterations < 50
+    assert report.force_error < 1e-3
+
+
 def test_a_system_is_prepared_once_for_many_right_sides(monkeypatch):
     made = []
     original = multigrid.multigrid
