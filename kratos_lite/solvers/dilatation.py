@@ -142,7 +142,7 @@ class _Part:
         return self.D.shape[0] * self.D.shape[1]
 
     def is_all(self) -> bool:
-        """Return whether there are no other dilatations: the stiffness without κ is that of a softer material."""
+        """Return whether there are no other dilatations: without κ the stiffness is of a softer material."""
         tables = self.group.strain_tables()
         return tables is not None and tables.C is None and tables.share == 1.0
 

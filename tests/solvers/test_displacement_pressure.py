@@ -86,7 +86,7 @@ def to_the_tolerance(monkeypatch):
 # ---- iterations ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("nu", [0.495, 0.499, 0.4999, 0.499999])
+@pytest.mark.parametrize("nu", [0.4902, 0.499, 0.4999, 0.499999])
 @pytest.mark.parametrize("element", CELLS)
 def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
@@ -188,7 +188,7 @@ def test_few_unknowns_are_factorized(element, cells, method):
     report = model.solve().report
     assert report.solver == method, report.reason
     if method == "direct":
-        assert report.reason.startswith("few unknowns with a bulk modulus > 99 shear moduli")
+        assert report.reason.startswith("few unknowns with a bulk modulus > 50 shear moduli")
     assert body(element, rubber(0.3), cells).solve().report.solver == "amg"
 
 
