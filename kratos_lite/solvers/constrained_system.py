@@ -101,17 +101,19 @@ class ConstrainedSystem:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
 
     def _is_soon_factorized(self) -> bool:
-        """Return whether a material is nearly incompressible, and a factorization faster than iterations."""
-        ratios = [bulk_over_shear(group.material.C) for group in self.groups]
-        if max(ratios, default=0.0) <= NEAR_HALF:
+        """Return whether a material is nearly incompressible and a factorization is fastest."""
+        if not self._is_nearly_incompressible():
             return False
         unknowns = len(self.reduced.free)
         if is_quick(unknowns, lambda: self.pattern):
             return True
         from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
 
-        locked = (group for group, ratio in zip(self.groups, ratios, strict=True) if ratio > LOCKED)
+        locked = (group for group in self.groups if bulk_over_shear(group.material.C) > LOCKED)
         return quick_to_factorize(unknowns) and not all(map(is_split, locked))
+
+    def _is_nearly_incompressible(self) -> bool:
+        return any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -127,13 +129,13 @@ class ConstrainedSystem:
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
         skipped: set[str] = set()
-        K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
+        if self.method == "amg" and self._is_nearly_incompressible():
+            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
+        else:
+            assemble = assemble_stiffness
+        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
-        if self.method != "amg":
-            return K
-        from kratos_lite.solvers.dilatation import split  # a quick start for small models
-
-        return split(K, self.points, self.groups, self.pattern)
+        return K
 
     @cached_property
     def norm(self) -> float:
