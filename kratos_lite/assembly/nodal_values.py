@@ -11,6 +11,7 @@ from kratos_lite.assembly.gauss_point_fields import at_gauss, compiled_law, disp
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
+from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array
 
 
@@ -24,10 +25,10 @@ def extrapolation(element: type[KinematicLinear], rule: Rule) -> Array:
     corner = element.shape.linear()
     if corner is None:
         return np.full((len(element.nodes), len(rule)), 1 / len(rule))
-    at_points = np.array([corner.N(xi) for xi in rule.points])
-    at_nodes = np.array([corner.N(xi) for xi in element.nodes])
+    at_gauss_points = at_points(corner.N, rule.points)
+    at_nodes = at_points(corner.N, element.nodes)
     mean = np.full((len(rule), len(rule)), 1 / len(rule))  # apart, so that few points still give constants
-    return at_nodes @ np.linalg.pinv(at_points) @ (np.eye(len(rule)) - mean) + mean[:1]
+    return at_nodes @ np.linalg.pinv(at_gauss_points) @ (np.eye(len(rule)) - mean) + mean[:1]
 
 
 def extrapolated(points: Array, group: ElementGroup, u: Array, *, stress: bool = True) -> Array:

@@ -29,6 +29,7 @@ from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
 from kratos_lite.records import record, replace
 from kratos_lite.registry import remembered
+from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array, Ints, Numbers
 
 
@@ -72,12 +73,12 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     means = shape.degree == 1 and shape.cell in ("hexahedron", "wedge")
     if shape.cell == "hexahedron" and shape.degree > 1 and len(rule) > 8:
         points = hexahedron(degree=3).points
-        at_gauss = np.array([corner.N(xi) for xi in rule.points])
+        at_gauss = at_points(corner.N, rule.points)
         weighted = at_gauss.T * rule.weights
-        T = np.array([corner.N(xi) for xi in points]) @ np.linalg.solve(weighted @ at_gauss, weighted)
-    N = np.array([shape.N(xi) for xi in points])
+        T = at_points(corner.N, points) @ np.linalg.solve(weighted @ at_gauss, weighted)
+    N = at_points(shape.N, points)
     degree = shape.degree + (0 if means or shape.cell == "tetrahedron" else 1)
-    at_nodes, at_samples = (np.array([corner.N(xi) for xi in P]) for P in (shape.nodes, points))
+    at_nodes, at_samples = (at_points(corner.N, P) for P in (shape.nodes, points))
     to_nodes = at_nodes @ np.linalg.pinv(at_samples)
     to_nodes *= 0.0 if shape.degree == 1 else 0.5 if shape.cell == "tetrahedron" else 1.0
     return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)

@@ -105,7 +105,7 @@ def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
     xi = shape.nodes
     base = [0]  # corners that span the cell
     for a in range(1, shape.corners):
-        if np.linalg.matrix_rank(xi[[*base[1:], a]] - xi[0]) == len(base):
+        if len(base) < 4 and np.linalg.matrix_rank(xi[[*base[1:], a]] - xi[0]) == len(base):
             base.append(a)
 
     def affine(points: Array) -> Array:

@@ -103,6 +103,10 @@ def is_nearly_incompressible(C: Array) -> bool:
     return bulk_over_shear(C) > INCOMPRESSIBLE
 
 
+NEAR_HALF = 50.0
+"""Bulk over shear modulus (ν = 0.49) from which plain elements lock, and pressures of others pay."""
+
+
 def bulk_over_shear(C: Array) -> float:
     """Return the bulk modulus 1 / mᵀC⁻¹m of a C (6, 6) over its mean shear modulus; 0 if C is singular."""
     m = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])

@@ -9,6 +9,7 @@ import numpy as np
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
+from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array
 
 NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -35,18 +36,27 @@ class StrainTables(NamedTuple):
 @remembered
 def tabulate(shape: type[Shape], rule: Rule) -> tuple[Array, Array]:
     """Return N (g, n) and dN (g, n, 3) at the points of a rule.  Read-only, made once."""
-    N = np.array([shape.N(xi) for xi in rule.points])
-    dN = np.array([shape.dN(xi) for xi in rule.points])
+    N, dN = at_points(shape.N, rule.points), at_points(shape.dN, rule.points)
     N.setflags(write=False)
     dN.setflags(write=False)
     return N, dN
 
 
 @remembered
+def gradients_at_nodes(shape: type[Shape]) -> Array:
+    """Return dN (n, n, 3) at the nodes.  Read-only, made once."""
+    dN = at_points(shape.dN, shape.nodes)
+    dN.setflags(write=False)
+    return dN
+
+
+@remembered
 def reference_products(shape: type[Shape], rule: Rule) -> Array:
     """Return R = Σ γ dN_a/dxi_k dN_b/dxi_l as (9, n n), rows k l and columns a b.  Read-only, made once."""
-    dN = tabulate(shape, rule)[1]
-    R: Array = np.einsum("g,gak,gbl->klab", rule.weights, dN, dN, optimize=True).reshape(9, -1)
+    dN = np.swapaxes(tabulate(shape, rule)[1], 1, 2)
+    g, d, n = dN.shape
+    A = dN.reshape(g, d * n)
+    R: Array = ((A.T * rule.weights) @ A).reshape(d, n, d, n).swapaxes(1, 2).reshape(d * d, n * n)
     R.setflags(write=False)
     return R
 

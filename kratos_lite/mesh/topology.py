@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
 """Cells (m, k), and columns of them: each tuple of columns makes up one set of nodes of each cell."""
+FEW_SETS = 100
+"""Up to this many no kernel needs to be loaded."""
 
 
 def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
@@ -32,7 +34,8 @@ def equal_sets(groups: Sequence[Sets]) -> tuple[Ints, Ints]:
     >>> one.tolist(), other.tolist()
     ([2], [3])
     """
-    compiled = kernels("mesh")
+    few = sum(len(cells) * len(columns) for cells, columns in groups) <= FEW_SETS
+    compiled = None if few else kernels("mesh")
     if compiled is None:
         return _equal_keys(set_keys(groups))
     nodes = [np.ascontiguousarray(cells, dtype=np.int32) for cells, _ in groups]
@@ -78,7 +81,7 @@ def components(n: int, pairs: Ints) -> Ints:
     >>> components(5, np.array([[3, 1], [4, 3]])).tolist()
     [0, 1, 2, 1, 1]
     """
-    compiled = kernels("mesh")
+    compiled = kernels("mesh") if len(pairs) else None
     if compiled is not None:
         return compiled.components(n, np.ascontiguousarray(pairs, dtype=np.int64))
     labels = np.arange(n)

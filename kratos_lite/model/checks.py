@@ -14,7 +14,7 @@ from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.overridden_steps import MECHANICS
-from kratos_lite.elements.tables import tabulate
+from kratos_lite.elements.tables import gradients_at_nodes, tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh
@@ -92,8 +92,7 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
     count, flat, folded = 0, 0, 0
     for block, kind in zip(mesh.blocks, kinds, strict=True):
         shape, g = kind.shape, len(kind.rule)
-        _, dN = tabulate(shape, kind.rule)
-        dN = np.concatenate([dN, [shape.dN(xi) for xi in shape.nodes]])
+        dN = np.concatenate([tabulate(shape, kind.rule)[1], gradients_at_nodes(shape)])
         limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
         doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, kind, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))

@@ -15,9 +15,9 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.formulations import bulk_over_shear, formulations_of, is_own
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_own
 from kratos_lite.elements.overridden_steps import MECHANICS
-from kratos_lite.mesh import Faces, Mesh, components, with_rows
+from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
 from kratos_lite.records import names_of, record
@@ -29,10 +29,9 @@ SLENDER = 4.0
 """Extent of a mesh, in thicknesses of a wall, from which the wall may bend."""
 TAPER = 2.0
 """Slope of the sides against each other, times length over thickness, that makes cells too stiff."""
-NEAR_HALF = 50.0
-"""Bulk over shear modulus (ν = 0.49) from which plain elements are said to lock."""
 LAYERS = 64
 """Elements through a wall that are counted."""
+NOTHING = np.zeros(0)
 QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexahedron": "3D20N"}
 
 
@@ -180,9 +179,14 @@ def _walls(across: OppositeFaces, groups: Sequence[ElementGroup], fixed: Mask) -
         looked_at[group.rows] = True
     element = across.faces.element
     start = np.flatnonzero((across.mate < 0) & (across.opposite >= 0) & looked_at[element])
-    start = start[~_held(mesh, across.corners(start), fixed)]
-    length, taper = _extents(across, start)
     most = _sizes(across)[element[start]] / SLENDER
+    thin = _steps(across, start) <= most
+    start, most = start[thin], most[thin]
+    if not len(start):
+        return Walls(NO_ROWS, NOTHING, NO_ROWS, NOTHING, NOTHING)
+    free = ~_held(mesh, across.corners(start), fixed)
+    start, most = start[free], most[free]
+    length, taper = _extents(across, start)
     most_shear = max(_shear_over_young(group.material.C) for group in groups)
     limit = np.minimum(most, length.max(axis=1, initial=0.0) * np.sqrt(max(most_shear / STIFF, 1.0)))
     thickness, layers, end = _thickness(across, start, limit)
@@ -211,13 +215,18 @@ def _sizes(across: OppositeFaces) -> Array:
     return size
 
 
+def _steps(across: OppositeFaces, face: Ints) -> Array:
+    """Return the distances (k,) in m from faces to those opposite in the same element."""
+    return np.linalg.norm(across.centers(across.opposite[face]) - across.centers(face), axis=1)
+
+
 def _thickness(across: OppositeFaces, start: Ints, limit: Array) -> tuple[Array, Ints, Ints]:
     """Return thickness, layers and the outer face opposite of outer faces; -1 for those beyond a limit."""
     thickness, layers, end = np.zeros(len(start)), np.zeros(len(start), dtype=int), np.full(len(start), -1)
     open_, face = np.arange(len(start)), start
     for _ in range(LAYERS):
         beyond = across.opposite[face]
-        thickness[open_] += np.linalg.norm(across.centers(beyond) - across.centers(face), axis=1)
+        thickness[open_] += _steps(across, face)
         layers[open_] += 1
         thin = thickness[open_] <= limit[open_]
         following = across.mate[beyond]

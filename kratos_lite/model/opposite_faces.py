@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kratos_lite.mesh import Block, Faces, Mesh, with_rows
+from kratos_lite.mesh import NO_ROWS, Block, Faces, Mesh, with_rows
 from kratos_lite.mesh.topology import corners, faces_of
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
@@ -53,20 +53,25 @@ class OppositeFaces:
     @cached_property
     def opposite(self) -> Ints:
         """The face on the other side of the element, or -1."""
-        found = np.full(len(self.faces.element), -1)
-        for number, block in enumerate(self.mesh.blocks):
-            cells = np.arange(len(block))
-            for face, other in enumerate(opposite_of(block.shape)) if block.shape else ():
-                if other >= 0:
-                    found[self.number(number, face, cells)] = self.number(number, other, cells)
-        return found
+        found, start = [NO_ROWS], 0
+        for block, _ in with_rows(self.mesh.blocks):
+            other = np.array(opposite_of(block.shape) if block.shape else NO_ROWS)[:, None]
+            found.append(np.where(other < 0, -1, start + other * len(block) + np.arange(len(block))).ravel())
+            start += found[-1].size
+        return np.concatenate(found)
 
     def corners(self, chosen: Ints) -> Ints:
         """Return the corners (k, 4) of faces; the last one of a triangle stands there twice."""
-        found = np.empty((len(chosen), 4), dtype=np.int64)
-        for at, block, columns, cells in self._by_kind(chosen):
-            picked = corners(columns)
-            found[at] = block.nodes[cells][:, list(picked + picked[2:3] * (4 - len(picked)))]
+        found, start = np.empty((len(chosen), 4), dtype=np.int64), 0
+        for block, _ in with_rows(self.mesh.blocks):
+            table = [corners(columns) for columns in faces_of(block)]
+            end = start + len(table) * len(block)
+            at = np.flatnonzero((chosen >= start) & (chosen < end))
+            if len(at):
+                face, cells = np.divmod(chosen[at] - start, len(block))
+                columns = np.array([picked + picked[2:3] * (4 - len(picked)) for picked in table])
+                found[at] = block.nodes[cells[:, None], columns[face]]
+            start = end
         return found
 
     def centers(self, chosen: Ints) -> Array:

@@ -1,7 +1,7 @@
 // Algebraic multigrid for matrices of 3x3 blocks, as a preconditioner and as a solver.
 
 #include "arrays.hpp"
-#include "conjugate_gradients.hpp"
+#include "displacement_pressure.hpp"
 
 namespace {
 
@@ -129,9 +129,87 @@ public:
     Matrix A, below;
     Bytes fixed;
     Hierarchy hierarchy;
+    std::mutex busy;  // the levels' vectors serve one solution at a time
+};
+
+// A sparse matrix of blocks, whose arrays were checked, and are kept.
+template <class T>
+struct Blocks {
+    Array<int32_t> indptr, indices;
+    Array<T> data;
+
+    Blocks(Array<int32_t> starts, Array<int32_t> columns, Array<T> blocks, int64_t rows, int64_t width)
+        : indptr(std::move(starts)), indices(std::move(columns)), data(std::move(blocks)) {
+        require(data.ndim() == 3 && data.shape(0) == indices.size(), "data must be (nnz, R, C)");
+        require(indptr.size() == rows + 1, "the matrix must have a row for each row of blocks");
+        check_rows(indptr, indices.size());
+        require(are_rows(indices, width), "indices must be columns of the matrix");
+    }
+    Graph graph() const { return {indptr.size() - 1, indptr.data(), indices.data()}; }
+};
+
+// Displacements by a multigrid, and pressures.
+class Pressures {
+public:
+    Pressures(Multigrid& multigrid, const py::tuple& D, const py::tuple& S, Array<double> scale, Array<double> bulk,
+              Array<double> kept, Array<double> weight, double share, int most)
+        : M(multigrid), R(block_size(D)), D(blocks<double>(D, bulk.size() / R, M.A.rows())),
+          S(blocks<float>(S, bulk.size() / R, bulk.size() / R)), scale(std::move(scale)), bulk(std::move(bulk)),
+          kept(std::move(kept)), solver(made(weight, share, most)) {}
+
+    py::tuple solve(Array<double> b, double tolerance, double norm, int most, int directions, double reduced,
+                    py::object progress) {
+        require(b.size() == 3 * M.A.rows(), "b must have one number for each unknown");
+        Array<double> x(b.size());
+        const double* from = b.data();
+        double* to = x.mutable_data();
+        const auto each = [&](double residual) {
+            py::gil_scoped_acquire acquire;
+            return !progress(residual).is(py::bool_(false));  // it may say stop
+        };
+        Outcome outcome;
+        {
+            py::gil_scoped_release release;
+            std::lock_guard<std::mutex> lock(M.busy);
+            outcome = solver.solve(from, to, tolerance, norm, {most, directions, reduced}, each);
+        }
+        return py::make_tuple(x, outcome.iterations, outcome.converged);
+    }
 
 private:
-    std::mutex busy;  // the levels' vectors serve one solution at a time
+    static int block_size(const py::tuple& D) {
+        const auto size = D[2].cast<Array<double>>().shape(1);
+        require(size == 1 || size == 4, "1 or 4 pressures must share a row of blocks");
+        return static_cast<int>(size);
+    }
+
+    template <class T>
+    static Blocks<T> blocks(const py::tuple& parts, int64_t rows, int64_t columns) {
+        using Rows = Array<int32_t>;
+        return {parts[0].cast<Rows>(), parts[1].cast<Rows>(), parts[2].cast<Array<T>>(), rows, columns};
+    }
+
+    DisplacementPressure made(const Array<double>& weight, double share, int most) {
+        const int64_t pressures = bulk.size();
+        require(D.data.shape(1) == R && D.data.shape(2) == 3, "blocks of D must be R x 3");
+        require(S.data.shape(1) == R && S.data.shape(2) == R, "blocks of S must be R x R");
+        require(pressures % R == 0 && scale.size() == pressures && kept.size() == pressures &&
+                    weight.size() == 3 * M.A.rows() + pressures,
+                "each pressure needs a scale, a bulk modulus, one that is kept, and a weight");
+        const Ints starts(D.indptr.data(), D.indptr.data() + D.indptr.size());
+        const Ints columns(D.indices.data(), D.indices.data() + D.indices.size());
+        return {M.A.blocks(), M.fixed, M.hierarchy,
+                Dilatations{D.graph(), D.data.data(), R, Transposed(M.A.rows(), starts, columns)},
+                PressureOperator{S.graph(), S.data.data(), scale.data(), R, share, most, {}, {}, {}, {}},
+                bulk.data(), kept.data(), Doubles(weight.data(), weight.data() + weight.size())};
+    }
+
+    Multigrid& M;
+    int R;
+    Blocks<double> D;
+    Blocks<float> S;
+    Array<double> scale, bulk, kept;
+    DisplacementPressure solver;
 };
 
 }  // namespace
@@ -141,6 +219,11 @@ PYBIND11_MODULE(_multigrid, m) {
     py::class_<Matrix>(m, "Matrix")
         .def(py::init<Array<int32_t>, Array<int32_t>, Array<double>>(), argument("indptr"), argument("indices"),
              argument("data"));
+    py::class_<Pressures>(m, "Pressures")
+        .def(py::init<Multigrid&, py::tuple, py::tuple, Array<double>, Array<double>, Array<double>, Array<double>,
+                      double, int>(),
+             py::keep_alive<1, 2>())
+        .def("solve", &Pressures::solve);
     py::class_<Multigrid>(m, "Multigrid")
         .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
                          double theta) {

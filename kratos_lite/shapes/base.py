@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -112,6 +113,13 @@ class Shape:
             If the subclass does not define it.
         """
         raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
+
+
+def at_points(function: Callable[[ArrayLike], Array], points: Array) -> Array:
+    """Return N or dN of a shape at points (g, d); those of users, which may not broadcast, one by one."""
+    if function.__module__.startswith("kratos_lite.shapes."):
+        return function(points)
+    return np.array([function(xi) for xi in points])
 
 
 def mid_edges(corners: ArrayLike, edges: tuple[tuple[int, int], ...]) -> Array:

@@ -10,7 +10,7 @@ from kratos_lite.assembly.block_matrix import BlockMatrix, block_rows
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
-    from scipy.sparse import bsr_array, csr_array
+    from scipy.sparse import bsr_array
 
 STRONG = 0.45
 """Nodes are strongly coupled where |A_ij| exceeds this share of sqrt(|A_ii| |A_jj|)."""
@@ -18,14 +18,15 @@ LONGEST = 40
 """Nodes of the largest group; larger ones are taken as single nodes."""
 
 
-def block_inverse(A: BlockMatrix, free: Mask, D: csr_array) -> bsr_array:
-    """Return the inverse (3n, 3n) of A - Dᵀ D within each group on its free components, 0 on the others.
+def block_inverse(A: BlockMatrix, free: Mask, D: bsr_array, factor: Array) -> bsr_array:
+    """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
 
     Parameters
     ----------
-    A : symmetric, positive definite on the free components less Dᵀ D, too.
+    A : symmetric, positive definite on the free components, less Dᵀ factor D, too.
     free : (3n,).
-    D : (p, 3n) sparse; nodes that share a row share a block of A.
+    D : (p, 3n) sparse, of R x 3 blocks; nodes that share a row share a block of A.
+    factor : (p,).
     """
     from scipy.sparse import bsr_array
 
@@ -33,7 +34,7 @@ def block_inverse(A: BlockMatrix, free: Mask, D: csr_array) -> bsr_array:
     group, place = _groups(A, rows)
     within = np.flatnonzero(group[rows] == group[columns])
     own = rows[within], columns[within], A.data[within]
-    square = _square(D, group)
+    square = _square(D, factor, group)
     less = block_rows(square.indptr), square.indices, square.data
     size = np.bincount(group)
     members, mask, found = np.argsort(group, kind="stable"), free.reshape(-1, 3), []
@@ -56,20 +57,19 @@ def block_inverse(A: BlockMatrix, free: Mask, D: csr_array) -> bsr_array:
     return bsr_array((inverses[order], j[order], starts), shape=A.shape)
 
 
-def _square(D: csr_array, group: Ints) -> bsr_array:
-    """Return Dᵀ D (3n, 3n) within each group of nodes."""
+def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:
+    """Return Dᵀ factor D (3n, 3n) within each group of nodes."""
     from scipy.sparse import bsr_array
 
-    blocks = D.tobsr((1, 3))
-    row = block_rows(blocks.indptr)
-    if len(row) and group.max() < len(group) - 1:  # what a row has within a group is a row of its own
-        row = np.unique(row * len(group) + group[blocks.indices], return_inverse=True)[1]
+    row, R = block_rows(D.indptr), D.blocksize[0]
+    data = D.data * np.sqrt(factor).reshape(-1, R, 1)[row]
+    if group.max(initial=0) < len(group) - 1:  # what a row has within a group is a row of its own
+        row = np.unique(row * len(group) + group[D.indices], return_inverse=True)[1]
     else:
         row = np.arange(len(row))
     order = np.argsort(row, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(row))])
-    parts = (blocks.data[order], blocks.indices[order], starts)
-    B = bsr_array(parts, shape=(len(starts) - 1, D.shape[1]))
+    B = bsr_array((data[order], D.indices[order], starts), shape=(R * (len(starts) - 1), D.shape[1]))
     return B.T @ B
 
 

@@ -13,15 +13,22 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import InputError
 from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose
+from kratos_lite.solvers.direct import is_quick
+from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
 
 if TYPE_CHECKING:
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.typing import Array, Ints, Progress
+
+NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
+"""Reason for the method ``direct``."""
+LOCKED = 3000.0
+"""Bulk over shear modulus (ν = 0.4998) from which plain elements take too many iterations."""
 
 
 class ConstrainedSystem:
@@ -87,8 +94,25 @@ class ConstrainedSystem:
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
         self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
+        if solver == "auto" and self.method == "amg" and self._is_soon_factorized():
+            self.method, self.reason = "direct", NEARLY
         if self.method == "dense" and dofs > DENSE_MAX:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+
+    def _is_soon_factorized(self) -> bool:
+        """Return whether a material is nearly incompressible and a factorization is fastest."""
+        if not self._is_nearly_incompressible():
+            return False
+        unknowns = len(self.reduced.free)
+        if is_quick(unknowns, lambda: self.pattern):
+            return True
+        from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
+
+        locked = (group for group in self.groups if bulk_over_shear(group.material.C) > LOCKED)
+        return quick_to_factorize(unknowns) and not all(map(is_split, locked))
+
+    def _is_nearly_incompressible(self) -> bool:
+        return any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -104,13 +128,13 @@ class ConstrainedSystem:
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
         skipped: set[str] = set()
-        K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
+        if self.method == "amg" and self._is_nearly_incompressible():
+            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
+        else:
+            assemble = assemble_stiffness
+        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
-        if self.method != "amg":
-            return K
-        from kratos_lite.solvers.dilatation import split  # a quick start for small models
-
-        return split(K, self.points, self.groups, self.pattern)
+        return K
 
     @cached_property
     def norm(self) -> float:

@@ -16,19 +16,17 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.assembly.stiffness import add_in_parts
-from kratos_lite.elements.formulations import bulk_over_shear
+from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.records import record, replace
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Progress
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import bsr_array, csr_array
 
-NEAR_HALF = 99.0
-"""Bulk over shear modulus (ν = 0.495) from which the split pays: fewer iterations, but dearer ones."""
 REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
 """Reason for the method ``displacement-pressure``."""
 KEPT = 1.0
@@ -42,7 +40,7 @@ class SplitMatrix:
     Attributes
     ----------
     A : the stiffness without most of the bulk modulus.
-    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m.
+    D : (p, 3n) sparse, orthonormal dilatations of the elements in √m³ / m, R x 3 blocks with R = 1 or 4.
     bulk : (p,) Pa, κ.
     kept : (p,) Pa, λ in A.
     modulus : (p,) Pa, λ + 2μ in A.
@@ -52,7 +50,7 @@ class SplitMatrix:
     """
 
     A: BlockMatrix
-    D: csr_array
+    D: bsr_array
     bulk: Array
     kept: Array
     modulus: Array
@@ -70,45 +68,53 @@ class SplitMatrix:
 
     def norm(self) -> float:
         """Return the largest row sum of |A| and |D|ᵀ κ |D|: no less than that of |K|."""
-        size = abs(self.D)
+        size = abs(self.D.tocsr())
         return self.A.norm() + float((size.T @ (self.bulk * size.sum(axis=1))).max(initial=0.0))
 
     def scipy(self) -> csr_array:
         """Return K as a scipy.sparse.csr_array."""
         from scipy.sparse import diags_array
 
-        return (self.A.scipy().tocsr() + self.D.T @ diags_array(self.bulk) @ self.D).tocsr()
+        D = self.D.tocsr()
+        return (self.A.scipy().tocsr() + D.T @ diags_array(self.bulk) @ D).tocsr()
 
 
-def split(
-    K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern: Pattern
+def assemble(
+    points: Array,
+    groups: Sequence[ElementGroup],
+    pattern: Pattern,
+    progress: Progress | None = None,
+    skipped: set[str] | None = None,
 ) -> BlockMatrix | SplitMatrix:
-    """Return K as a SplitMatrix, which takes its memory, or K itself where no group is to be split.
+    """Return the stiffness matrix, split where elements are nearly incompressible.
 
     Parameters
     ----------
-    K : the stiffness matrix of the groups; where it is split, A takes its place.
-    points : (n, 3) m.
-    groups : the elements, in the order of the pattern.
-    pattern : of K.
+    points, groups, pattern, progress, skipped : see `assemble_stiffness`.
     """
-    if not any(map(is_split, groups)):
-        return K
-    left, soft, parts = list(groups), list(groups), []
+    left, soft, at_once, parts = list(groups), list(groups), list(groups), {}
     for number, group in enumerate(groups):
-        if is_split(group):
-            bulk, shear = _moduli(group.material.C)
-            part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+        if not is_split(group):
+            continue
+        bulk, shear = _moduli(group.material.C)
+        part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+        parts[number] = part
+        left[number] = _softened(group, part.bulk)
+        soft[number] = _softened(left[number], KEPT * shear)
+        at_once[number] = left[number] if part.is_all() else group
+    K = assemble_stiffness(points, at_once, pattern, progress, skipped)
+    if not parts:
+        return K
+    for number, part in parts.items():
+        if not part.is_all():
             part.take_off(K, pattern, number)
-            parts.append(part)
-            left[number] = _softened(group, part.bulk)
-            soft[number] = _softened(left[number], KEPT * shear)
+    found = list(parts.values())
     taken, shears = (
-        np.concatenate([np.full(part.count, getattr(part, name)) for part in parts])
+        np.concatenate([np.full(part.count, getattr(part, name)) for part in found])
         for name in ("bulk", "shear")
     )
-    means = _means(points, parts, _stiffest(len(points), soft))
-    D = _assembled(len(points), parts)
+    means = _means(points, found, _stiffest(len(points), soft))
+    D = _assembled(len(points), found)
     return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
 
 
@@ -134,6 +140,11 @@ class _Part:
     @property
     def count(self) -> int:
         return self.D.shape[0] * self.D.shape[1]
+
+    def is_all(self) -> bool:
+        """Return whether there are no other dilatations: without κ the stiffness is of a softer material."""
+        tables = self.group.strain_tables()
+        return tables is not None and tables.C is None and tables.share == 1.0
 
     def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
         """Subtract Dᵀ κ D from the matrix."""
@@ -197,18 +208,22 @@ def _softened(group: ElementGroup, taken: float) -> ElementGroup:
     return replace(group, material=cast("LinearMaterial", SimpleNamespace(C=C)))
 
 
-def _assembled(n_nodes: int, parts: Sequence[_Part]) -> csr_array:
-    """Return D (p, 3n) of the dilatations of each group."""
-    from scipy.sparse import csr_array, vstack
+def _assembled(n_nodes: int, parts: Sequence[_Part]) -> bsr_array:
+    """Return D (p, 3n) of the dilatations of each group, a row of blocks for each element if they allow."""
+    from scipy.sparse import bsr_array
 
-    rows = []
+    sizes = {part.D.shape[1] for part in parts}
+    R = sizes.pop() if len(sizes) == 1 else 1
+    blocks, columns, counts = [], [], []
     for part in parts:
-        (m, r, size), D = part.D.shape, part.D
-        dofs = (3 * part.group.nodes[:, :, None] + np.arange(3, dtype=np.int32)).reshape(m, 1, size)
-        columns = np.repeat(dofs, r, axis=1).ravel()
-        starts = np.arange(0, D.size + 1, size, dtype=np.int32)
-        rows.append(csr_array((D.ravel(), columns, starts), shape=(m * r, 3 * n_nodes)))
-    return rows[0] if len(rows) == 1 else vstack(rows, format="csr")
+        m, r, size = part.D.shape
+        k = size // 3
+        blocks.append(part.D.reshape(m, r // R, R, k, 3).swapaxes(2, 3).reshape(-1, R, 3))
+        columns.append(np.repeat(part.group.nodes[:, None], r // R, axis=1).ravel())
+        counts.append(np.full(m * r // R, k))
+    starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    data = np.concatenate(blocks), np.concatenate(columns).astype(np.int32), starts
+    return bsr_array(data, shape=(R * (len(starts) - 1), 3 * n_nodes))
 
 
 def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:

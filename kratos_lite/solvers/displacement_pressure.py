@@ -20,7 +20,7 @@ Olshanskii, SIAM J. Sci. Comput. 28 (2006) 2095-2113 (augmented Lagrangian).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from kratos_lite.solvers.block_inverse import block_inverse
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.dilatation import SplitMatrix
 from kratos_lite.solvers.iteration import Share
-from kratos_lite.typing import Array, Mask, Progress
+from kratos_lite.typing import Array, Mask, Progress, Rows
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array
@@ -57,16 +57,19 @@ class DisplacementPressure:
     """
 
     def __init__(self, K: SplitMatrix, free: Mask, points: Array, linear: LinearLevel | None = None) -> None:
-        from scipy.sparse import diags_array
-
         self._K, self._fixed = K, ~free
         self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
-        inverse = block_inverse(K.A, free, diags_array(np.sqrt(K.kept)) @ K.D)
+        inverse = block_inverse(K.A, free, K.D, K.kept)
         size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
         self._schur = _Schur(K, inverse, np.asarray(free.reshape(-1, 3).any(axis=1)))
+        self._kernel = None
+        if isinstance(self._cycle, multigrid.Compiled):
+            D, S = K.D, self._schur.S
+            vectors = self._schur.scale, K.bulk, K.kept, size, INNER, INNER_MAX
+            self._kernel = self._cycle.with_pressures(_arrays(D), _arrays(S), *vectors)
 
     def solve(
         self,
@@ -77,11 +80,25 @@ class DisplacementPressure:
         go_on: multigrid.GoOn | None = None,
     ) -> tuple[Array, int, bool]:
         """Return u, iterations and success."""
-        with one_thread():
-            return self._solve(b, tolerance, norm, Share(tolerance, progress) if progress else None, go_on)
+        share = Share(tolerance, progress) if progress else None
+
+        def each(residual: float) -> bool:
+            if share:
+                share(residual)
+            return go_on is None or go_on(residual)
+
+        if self._kernel is None:
+            with one_thread():
+                u, iterations, converged = self._solve(b, tolerance, norm, each)
+        else:
+            limits = MAX_ITERATIONS, DIRECTIONS, REDUCED
+            u, iterations, converged = self._kernel.solve(b, tolerance, norm, *limits, each)
+        if share and converged:
+            share.finish()
+        return u, iterations, converged
 
     def _solve(
-        self, b: Array, tolerance: float, norm: float, share: Share | None, go_on: multigrid.GoOn | None
+        self, b: Array, tolerance: float, norm: float, each: multigrid.GoOn
     ) -> tuple[Array, int, bool]:
         n, norm_b = len(b), float(np.linalg.norm(b))
         x = np.zeros(len(self._weight))
@@ -93,9 +110,7 @@ class DisplacementPressure:
         for iteration in range(1, MAX_ITERATIONS + 1):
             z = self._precondition(space.last * self._inverse_weight).astype(np.float32)
             estimate = space.extend(z, self._weight * self._product(z.astype(float)))
-            stop = bool(go_on and not go_on(estimate / first))
-            if share:
-                share(estimate / first)
+            stop = not each(estimate / first)
             exhausted = space.full or estimate <= REDUCED * space.start or iteration == MAX_ITERATIONS
             if not (stop or exhausted or estimate <= aim):
                 continue
@@ -109,8 +124,6 @@ class DisplacementPressure:
             aim = estimate * min(limit / left, 0.5)
             if exhausted:
                 x, before, space = found, left, _Directions(r)
-        if share and left <= limit:
-            share.finish()
         return found[:n], iteration, left <= limit
 
     def _product(self, x: Array) -> Array:
@@ -193,6 +206,11 @@ class _Directions:
         return found
 
 
+def _arrays(A: bsr_array) -> tuple[Rows, Rows, Array]:
+    """Return what a kernel takes of a matrix of blocks."""
+    return A.indptr.astype(np.int32), A.indices.astype(np.int32), np.ascontiguousarray(A.data)
+
+
 class _Schur:
     """S in single precision, scaled to a diagonal of 1."""
 
@@ -200,14 +218,14 @@ class _Schur:
         from scipy.sparse import diags_array
 
         means = K.means @ diags_array(loose * 1.0)  # around held nodes checkerboards have means, too
-        S = (K.D @ inverse.tocsr()) @ K.D.T + means @ means.T + diags_array(1 / K.bulk)
-        self._scale = 1 / np.sqrt(S.diagonal())
-        scale = diags_array(self._scale)
-        self._S: Any = (scale @ S @ scale).astype(np.float32).tocsr()
+        S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
+        self.scale = 1 / np.sqrt(S.diagonal())
+        scale = diags_array(self.scale)
+        self.S = (scale @ S @ scale).astype(np.float32).tocsr().tobsr(2 * K.D.blocksize[:1])
 
     def solve(self, r: Array) -> Array:
         """Return S⁻¹ r, roughly, by conjugate gradients."""
-        r = self._scale * r
+        r = self.scale * r
         size = float(np.abs(r).max(initial=0.0))
         if size == 0:
             return r
@@ -215,7 +233,7 @@ class _Schur:
         p, rr = r.copy(), float(r @ r)
         end = INNER * rr
         for _ in range(INNER_MAX):
-            Sp = self._S @ p
+            Sp = self.S @ p
             alpha = np.float32(rr / float(p @ Sp))
             x += alpha * p
             r -= alpha * Sp
@@ -224,4 +242,4 @@ class _Schur:
                 break
             p *= np.float32(rr / old)
             p += r
-        return self._scale * (size * x.astype(float))
+        return self.scale * (size * x.astype(float))

@@ -131,6 +131,7 @@ class LinearSolver:
         """
         c = self.reduced.c if prescribed is None else prescribed
         b = self.reduced.reduce(f - self.K @ c)
+        tolerance *= self._share(f, c, b)
         if start is not None and self.method == "amg":
             near = self.reduced.expand((start - c)[self.reduced.free], c)
             left = self.reduced.reduce(f - self.K @ near)
@@ -141,6 +142,18 @@ class LinearSolver:
         if not solution.reason:
             solution = replace(solution, reason=self.reason)
         return replace(solution, x=self.reduced.expand(solution.x, c))
+
+    def _share(self, f: Array, c: Array, b: Array) -> float:
+        """Return the share of |b| that tolerances refer to.
+
+        Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
+        measure of what has to be in equilibrium: the bulk modulus is left out.
+        """
+        soft = getattr(self.K, "A", None)
+        if soft is None or not c.any():
+            return 1.0
+        size = float(np.linalg.norm(self.reduced.reduce(f - soft @ c)))
+        return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
 
     def _continue(
         self, f: Array, near: Array, left: Array, size: float, tolerance: float, progress: Progress | None
@@ -215,7 +228,8 @@ class LinearSolver:
             return self.K
         if isinstance(self.K, BlockMatrix):
             return constrained(self.K, T, free)
-        return replace(self.K, A=constrained(self.K.A, T, free), D=self.K.D @ on_all(T, free))
+        D = (self.K.D.tocsr() @ on_all(T, free)).tobsr(self.K.D.blocksize)
+        return replace(self.K, A=constrained(self.K.A, T, free), D=D)
 
     @cached_property
     def _free(self) -> Mask:

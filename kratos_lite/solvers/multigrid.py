@@ -98,6 +98,7 @@ class Compiled:
             normal = axes[:, 0]
             places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
         matrix = module.Matrix(A.indptr, A.indices, A.data)
+        self._module = module
         self._kernel = module.Multigrid(matrix, fixed, places, degree, RATIO, STRENGTH)
         if linear is not None and self._kernel.has_planes() and not linear.halved:
             linear = None  # tetrahedra: their middle nodes are too far from their corners
@@ -128,6 +129,10 @@ class Compiled:
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,)."""
         return self._kernel.cycle(r)
+
+    def with_pressures(self, *matrices: Any) -> Any:
+        """Return the kernel that solves for pressures beside the displacements."""
+        return self._module.Pressures(self._kernel, *matrices)
 
     def solve(
         self, b: Array, tolerance: float, norm: float, progress: Progress | None, go_on: GoOn | None = None
