@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
@@ -21,6 +20,8 @@ from kratos_lite.solvers.direct import is_quick
 from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.typing import Array, Ints, Progress
