@@ -85,9 +85,9 @@ from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.io.writers.trajectory import draw_trajectory as draw_trajectory
 from kratos_lite.materials import MATERIALS as MATERIALS
-from kratos_lite.materials import Isotropic3D as Isotropic3D
 from kratos_lite.materials import LinearMaterial as LinearMaterial
-from kratos_lite.materials import Orthotropic3D as Orthotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D as Isotropic3D
+from kratos_lite.materials.orthotropic3d import Orthotropic3D as Orthotropic3D
 from kratos_lite.mesh import Block as Block
 from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
 from kratos_lite.validation import finite, number, short, takes
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class TimeSeries:

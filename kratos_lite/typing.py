@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+Array: TypeAlias = "NDArray[np.float64]"
 """Numbers."""
-Complexes: TypeAlias = NDArray[np.complex128]
+Complexes: TypeAlias = "NDArray[np.complex128]"
 """Complex numbers."""
-Ints: TypeAlias = NDArray[np.int64]
+Ints: TypeAlias = "NDArray[np.int64]"
 """Rows, ids and counts."""
-Rows: TypeAlias = NDArray[np.int32]
+Rows: TypeAlias = "NDArray[np.int32]"
 """Rows of nodes in cells and in sparsity patterns: half the memory of `Ints`."""
-Numbers: TypeAlias = NDArray[Any]
+Numbers: TypeAlias = "NDArray[Any]"
 """Numbers of any kind: real, complex or whole."""
-Mask: TypeAlias = NDArray[np.bool_]
+Mask: TypeAlias = "NDArray[np.bool_]"
 """Which of many."""
 Progress: TypeAlias = Callable[[str, float], None]
 """Called with the phase and the share done, 0 … 1."""

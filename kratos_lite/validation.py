@@ -28,7 +28,6 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.typing import Array, Numbers
@@ -36,8 +35,10 @@ from kratos_lite.typing import Array, Numbers
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
 T = TypeVar("T")
-AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
+AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
 LARGEST = 1e50
 """Size of the largest number that is taken, so that products of some of them are finite."""
 SMALL = 1e7

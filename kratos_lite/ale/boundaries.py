@@ -95,7 +95,7 @@ def impedance(material: LinearMaterial, direction: Array) -> Array:
 
     Examples
     --------
-    >>> from kratos_lite.materials import Isotropic3D
+    >>> from kratos_lite.materials.isotropic3d import Isotropic3D
     >>> impedance(Isotropic3D(E=4.0, nu=0.0, density=1.0), np.array([1.0, 0, 0])).round(9).diagonal().tolist()
     [2.0, 1.414213562, 1.414213562]
     """

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.ale import Motion
 from kratos_lite.ale.checks import critical_rate_estimate
@@ -18,6 +17,9 @@ from kratos_lite.mesh import Where
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class Reacting(Protocol):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.rotational_symmetry import check_materials
@@ -21,6 +20,9 @@ from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Solve: TypeAlias = Callable[[Array, Array], Array]
 """Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""

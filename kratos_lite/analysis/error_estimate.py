@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.elements.formulations import bulk_over_shear
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.model.loads import Load
-from kratos_lite.model.locking import NEAR_HALF, better_element
+from kratos_lite.model.locking import better_element
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import field, record
 from kratos_lite.typing import Array

@@ -17,10 +17,9 @@ Source: GetFEM user documentation, ALE support for objects having a large rigid 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.ale import Motion
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
@@ -29,6 +28,9 @@ from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite, instance
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 PLACES = ("node", "gauss")
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import ArrayLike
-
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
@@ -15,6 +13,8 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.analysis.transient import TransientAnalysis

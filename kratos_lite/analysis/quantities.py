@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
@@ -20,6 +19,9 @@ from kratos_lite.model.loads.surface import Traction
 from kratos_lite.model.supports import AXES
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 COMPONENTS = tuple(name.lower() for name in voigt.NAMES)
 

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
 from kratos_lite.analysis.report import Report, element_counts, vector
@@ -19,6 +18,8 @@ from kratos_lite.typing import Array
 from kratos_lite.validation import choice, instance
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.assembly.recovery import Recovery

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.derived_quantities import result_of
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
@@ -21,6 +20,9 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.blas import one_thread
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite, flag, function_or_none
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 DIVERGED = 1e9
 """Displacements by the size of the model beyond which a motion has lost its stability."""

@@ -21,7 +21,7 @@ from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import rule_for
-from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array
 
 RAISED = 3

@@ -30,7 +30,7 @@ from kratos_lite.errors import ModelError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.topology import corners, equal_sets, faces_of
 from kratos_lite.records import record
-from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 BALANCED = 1e-6

@@ -21,7 +21,7 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array
@@ -100,15 +100,15 @@ class MatrixFree:
 def _tables(group: ElementGroup) -> tuple[Any, ...]:
     """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    found = factors(group.element.shape, group.rule)
-    if found is not None:
-        order, *found = found
-        dN, weights = floats(dN[order]), floats(weights[order])
-    return nodes, dN, weights, group.law()[0], found
+    C, found = group.law()[0], factors(group.element.shape, group.rule)
+    if found is None:
+        return nodes, dN, weights, C, None
+    order, *rest = found
+    return nodes, floats(dN[order]), floats(weights[order]), C, tuple(rest)
 
 
 @remembered
-def factors(shape: type[Shape], rule: Rule) -> tuple[Array, Array, Array, Array] | None:
+def factors(shape: type[Shape], rule: Rule) -> tuple[Ints, Array, Array, Array] | None:
     """Return how the gradients of a shape at the points of a rule fall apart into factors, if they do.
 
     They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
@@ -122,7 +122,7 @@ def factors(shape: type[Shape], rule: Rule) -> tuple[Array, Array, Array, Array]
     places : (g, k) shape functions at the grid of places.
     """
     n = round(len(rule.weights) ** (1 / 3))
-    order = np.lexsort(np.round(rule.points, 12).T)
+    order: Ints = np.lexsort(np.round(rule.points, 12).T).astype(np.int64)
     axis = rule.points[order[:n], 0]
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
     if n not in (2, 3) or len(grid) != len(order) or np.abs(grid - rule.points[order]).max() > 1e-12:

@@ -16,7 +16,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.bodies.linear_algebra import Entries, Solve
 from kratos_lite.bodies.validation import Material, elements_of, mass_properties_of
 from kratos_lite.errors import ModelError
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.records import record, replace

@@ -17,7 +17,7 @@ from kratos_lite.bodies.linear_algebra import Solve, apply, transposed
 from kratos_lite.bodies.rotations import axial, check_rotation, hat, polar, rotation_of
 from kratos_lite.bodies.validation import Material, mass_properties_of, points_of
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.typing import Array, Ints

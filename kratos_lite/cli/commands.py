@@ -189,7 +189,7 @@ def _needs_of(case: Case) -> tuple[str, list[str], list[str]]:
 
 def _needs(model: Model) -> tuple[list[str], list[str]]:
     """Return what a model lacks for a solution, and its warnings; the model gets all it lacks on the way."""
-    from kratos_lite.materials import Isotropic3D
+    from kratos_lite.materials.isotropic3d import Isotropic3D
 
     needs: list[str] = []
     warnings = model.check_geometry()

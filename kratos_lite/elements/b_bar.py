@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
@@ -13,6 +12,9 @@ from kratos_lite.elements.stiffness import strain_rows
 from kratos_lite.elements.tables import StrainTables, cofactors, determinant
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class BBar(KinematicLinear):

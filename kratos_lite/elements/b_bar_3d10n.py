@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.b_bar import BBar
@@ -12,6 +13,9 @@ from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, tetrahedron
 from kratos_lite.shapes.tetrahedra import Tetrahedron10
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class BBar3D10N(BBar):

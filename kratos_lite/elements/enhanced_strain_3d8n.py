@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.kinematic_linear import KinematicLinear
@@ -17,6 +16,9 @@ from kratos_lite.registry import remembered
 from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array
 from kratos_lite.voigt import PAIRS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 MONOMIALS = ((0,), (1,), (2,), (0, 1), (1, 2), (2, 0))
 """The factors of ξ, η, ζ, ξη, ηζ, ζξ; their integrals over the cube are 0."""

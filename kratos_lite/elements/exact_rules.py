@@ -9,19 +9,21 @@ are total ones, it has 3(p - 1) or 0.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.quadrature import CELLS, Rule, rule_for
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 AFFINE, STRAIGHT, CURVED = range(3)
 """Geometry of a cell: constant J; that of its corners alone; any."""
-Geometries: TypeAlias = NDArray[np.int8]
+Geometries: TypeAlias = "NDArray[np.int8]"
 """The geometry of each of many cells."""
 ROUNDING = 8 * np.finfo(float).eps
 """How far, relative to the largest coordinate, rounding may move a node from where its geometry has it."""

@@ -103,8 +103,8 @@ def is_nearly_incompressible(C: Array) -> bool:
     return bulk_over_shear(C) > INCOMPRESSIBLE
 
 
-NEAR_HALF = 99.0
-"""Bulk over shear modulus (ν = 0.495) from which pressures beside displacements, or a factorization, pay."""
+NEAR_HALF = 50.0
+"""Bulk over shear modulus (ν = 0.49) from which plain elements lock, and pressures of others pay."""
 
 
 def bulk_over_shear(C: Array) -> float:

@@ -7,10 +7,9 @@ leading axes of X first, then those of the points, then its own.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.overridden_steps import run_step
@@ -21,6 +20,9 @@ from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 GEOMETRY = ("__init__", "N", "dN", "J", "detJ", "dNdX", "dV", "_jacobian", "_gauss")
 """What an element class may redefine so that its geometry is not that of the tables of shape and rule."""

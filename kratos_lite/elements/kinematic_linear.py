@@ -10,10 +10,9 @@ Source: KratosWiki, *Kinematic Linear Element*; Zienkiewicz & Taylor, vol. 1, ch
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite import voigt
 from kratos_lite.elements import arguments, stiffness
@@ -35,6 +34,9 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.exact_rules import (
@@ -23,6 +22,9 @@ from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array, Mask
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 MASS = (*GEOMETRY, "_N", "_volumes", "mass_rules", "_integrate", "scalar_mass")
 """What an element class may redefine so that its mass is not that of its shape and geometry."""

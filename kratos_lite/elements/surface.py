@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule, rule_for
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 def face_rule(shape: type[Shape]) -> Rule:
@@ -48,7 +52,7 @@ def surface_load(shape: type[Shape], X: ArrayLike, traction: ArrayLike) -> Array
 
     Examples
     --------
-    >>> from kratos_lite.shapes import Triangle3
+    >>> from kratos_lite.shapes.faces import Triangle3
     >>> surface_load(Triangle3, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], (0, 0, 6.0))[:, 2]
     array([1., 1., 1.])
     """

@@ -1,7 +1,14 @@
-"""Materials: constitutive laws, one file each; they register themselves."""
+"""Materials: constitutive laws, one file each; they register themselves when they are asked for.
+
+The file ``isotropic3d.py`` holds the class ``Isotropic3D``.
+"""
+
+import os
 
 from kratos_lite.materials.base import MATERIALS, LinearMaterial
-from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.materials.orthotropic3d import Orthotropic3D
 
-__all__ = ["MATERIALS", "Isotropic3D", "LinearMaterial", "Orthotropic3D"]
+__all__ = ["MATERIALS", "LinearMaterial"]
+
+for _file in sorted(os.listdir(__path__[0])):
+    if _file.endswith("3d.py"):
+        MATERIALS.expect(f"{_file[:-5].title()}3D", f"{__name__}.{_file[:-3]}")

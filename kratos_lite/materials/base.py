@@ -5,16 +5,18 @@ from __future__ import annotations
 from functools import cached_property
 from itertools import product
 from sys import float_info
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.records import names_of
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 MAX_FLOAT = float_info.max
 

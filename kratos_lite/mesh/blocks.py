@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
@@ -14,6 +13,9 @@ from kratos_lite.records import field, names_of, record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 

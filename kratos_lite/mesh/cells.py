@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, blocks_of, ids_of, rows_of_ids
@@ -15,6 +14,8 @@ from kratos_lite.mesh.topology import Faces
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.validation import finite, read_only, whole_numbers
 

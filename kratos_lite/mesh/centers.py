@@ -7,16 +7,19 @@ agree on a node if they agree on the corners of what they share.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints, Rows
 
-Keys = NDArray[np.uint64]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Keys: TypeAlias = "NDArray[np.uint64]"
 _MIX = (np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
 
 

@@ -11,7 +11,8 @@ from kratos_lite.mesh.centers import Keys, corners_around, keys_of
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
 from kratos_lite.records import record, replace
-from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
 

@@ -14,7 +14,8 @@ from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of
 from kratos_lite.records import record, replace
-from kratos_lite.shapes import FACE_SHAPES, Line3, Shape
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import FACE_SHAPES, Line3
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 NO_WEIGHTS: Array = np.zeros(0)

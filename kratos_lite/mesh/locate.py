@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, with_rows
@@ -21,6 +20,7 @@ from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from scipy.sparse import csr_array
 
 POINTS_AT_ONCE = 2**14

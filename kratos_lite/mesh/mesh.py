@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, Part, blocks_of, select
@@ -26,6 +25,8 @@ from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.mesh.locate import Located
 

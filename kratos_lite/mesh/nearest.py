@@ -6,7 +6,8 @@ import numpy as np
 
 from kratos_lite.mesh.boxes import cell_boxes, is_solid
 from kratos_lite.mesh.cells import Cells
-from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array
 
 CANDIDATES = 32

@@ -14,7 +14,8 @@ from kratos_lite.mesh.growth import Cut, Growth, name_of
 from kratos_lite.mesh.hanging import known_centers
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import unchanged
-from kratos_lite.shapes import Line3, Quadrilateral8, Quadrilateral9, Shape, Triangle6
+from kratos_lite.shapes import Shape
+from kratos_lite.shapes.faces import Line3, Quadrilateral8, Quadrilateral9, Triangle6
 from kratos_lite.shapes.hexahedra import Hexahedron20
 from kratos_lite.shapes.pyramids import Pyramid13
 from kratos_lite.shapes.tetrahedra import Tetrahedron10

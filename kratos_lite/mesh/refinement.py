@@ -6,8 +6,9 @@ points and nodal values follow the isoparametric map of the cell that they are m
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, with_rows
@@ -28,6 +29,9 @@ from kratos_lite.shapes import Shape
 from kratos_lite.shapes.tetrahedra import Tetrahedron4, Tetrahedron10
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite, whole_numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None = None) -> Finer:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Part, distinct, without_repeats
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import whole_numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
 """Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""

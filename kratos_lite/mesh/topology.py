@@ -7,15 +7,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import keys_of
 from kratos_lite.native import kernels
-from kratos_lite.shapes import FACE_SHAPES, Shape
+from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from kratos_lite.mesh.hanging import HangingNodes
 
 Sets: TypeAlias = "tuple[Numbers, Sequence[Sequence[int]]]"
@@ -147,6 +148,8 @@ class Faces:
         """
         alone = np.ones(sum(len(block) * len(faces_of(block)) for block in self.blocks), dtype=bool)
         alone[self.one] = alone[self.other] = False
+        from kratos_lite.shapes.faces import FACE_SHAPES  # a quick start without
+
         by_size: dict[int, list[tuple[Rows, Ints]]] = {}
         start = 0
         for block, at in with_rows(self.blocks):

@@ -6,9 +6,9 @@ Each check either raises one clear error or returns warnings for the report.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
@@ -25,6 +25,9 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Mask
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SLOWEST, QUICKEST = 1.0, 2e4
 """Speeds of waves in m/s: jelly is above the one, diamond below the other."""

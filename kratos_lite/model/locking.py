@@ -15,7 +15,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.formulations import bulk_over_shear, formulations_of, is_own
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_own
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
@@ -29,8 +29,6 @@ SLENDER = 4.0
 """Extent of a mesh, in thicknesses of a wall, from which the wall may bend."""
 TAPER = 2.0
 """Slope of the sides against each other, times length over thickness, that makes cells too stiff."""
-NEAR_HALF = 50.0
-"""Bulk over shear modulus (ν = 0.49) from which plain elements are said to lock."""
 LAYERS = 64
 """Elements through a wall that are counted."""
 NOTHING = np.zeros(0)

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
 
 SYMMETRIC = 1e-10
 """How far, relative to its largest entry, a tensor may be from symmetric, or two values from each other."""

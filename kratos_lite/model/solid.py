@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
 from kratos_lite.elements import ELEMENTS
@@ -23,6 +22,9 @@ from kratos_lite.model import checks
 from kratos_lite.quadrature import Rule
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class Solid:

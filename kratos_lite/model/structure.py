@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import PatternCache
@@ -19,12 +18,14 @@ from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.solid import Solid
-from kratos_lite.model.spurious_modes import check_spurious_modes
 from kratos_lite.model.supports import AXES, Fixing, Supports
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, function_or_none
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
 
 
 class Attachment(ABC):
@@ -259,7 +260,10 @@ class Structure(Solid):
         warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
         warnings += check_locking(mesh, groups, self.supports, faces)
-        check_spurious_modes(mesh, groups, self.supports, faces)
+        if any(group.element.spurious_modes for group in groups):
+            from kratos_lite.model.spurious_modes import check_spurious_modes  # rarely needed
+
+            check_spurious_modes(mesh, groups, self.supports, faces)
         if not used.all():
             lost = mesh.node_ids[~used]
             shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")

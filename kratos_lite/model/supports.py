@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
@@ -20,6 +20,9 @@ from kratos_lite.solvers.constraint_map import (
 from kratos_lite.time_series import function_of
 from kratos_lite.typing import Array, Ints, Mask
 from kratos_lite.validation import finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 AXES = "xyz"
 UNUSED = "a constraint uses {}, which belongs to no element; remove it"

@@ -14,6 +14,8 @@
 
 namespace kl {
 
+using Floats = std::vector<float>;
+
 constexpr double NEAR = 9, FAR = 16;     // squares of distances, to that of the nearest node
 constexpr double COARSE_FAR = 12.5;      // the same where close nodes alone have aggregated
 constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
@@ -97,8 +99,9 @@ public:
         return sum;
     }
 
-    // Factorize the part of each cluster of A, of b x b blocks, where fixed components stand alone.
-    void factorize(const Graph& g, const double* A, int b, const Bytes& fixed) {
+    // Factorize the part of each cluster of A, of b x b blocks, where fixed components stand alone; `links`
+    // gives the block of each entry of the graph if it is not that of A.
+    void factorize(const Graph& g, const double* A, int b, const Bytes& fixed, const int32_t* links = nullptr) {
         Ints position(g.rows);
         for (int64_t p = 0; p < g.rows; ++p) position[members[p]] = static_cast<int32_t>(p);
         exact.at.assign(g.rows * b + 1, 0);
@@ -110,7 +113,7 @@ public:
         exact.pivots.assign(g.rows * b, 0.0);
         over(256, [&](int64_t first, int64_t last) {
             for (int64_t c = first; c < last; ++c) {
-                for (int32_t p = starts[c]; p < starts[c + 1]; ++p) fill(g, A, b, fixed, position, p);
+                for (int32_t p = starts[c]; p < starts[c + 1]; ++p) fill(g, A, b, fixed, links, position, p);
                 const int64_t from = int64_t{starts[c]} * b, to = int64_t{starts[c + 1]} * b;
                 dispatch<double>([&](auto V) KL_INLINE_LAMBDA { factorize_rows<V>(exact, from, to); });
             }
@@ -181,7 +184,7 @@ private:
         return found;
     }
 
-    void fill(const Graph& g, const double* A, int b, const Bytes& fixed, const Ints& position,
+    void fill(const Graph& g, const double* A, int b, const Bytes& fixed, const int32_t* links, const Ints& position,
               int64_t p) {
         const int64_t i = members[p];
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
@@ -189,7 +192,7 @@ private:
             if (of[j] != of[i] || q > p) continue;
             for (int r = 0; r < b; ++r)
                 for (int c = 0; c < b && q * b + c <= p * b + r; ++c) {
-                    const double value = A[(k * int64_t{b} + r) * b + c];
+                    const double value = A[((links ? links[k] : k) * int64_t{b} + r) * b + c];
                     const int64_t row = p * b + r, column = q * b + c;
                     if (row == column)
                         exact.pivots[row] = value;

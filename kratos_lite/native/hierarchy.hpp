@@ -11,6 +11,7 @@ struct Settings {
     int degree = 2;         // of the Chebyshev smoother
     float ratio = 12;       // largest to smallest eigenvalue that it smooths
     double theta = 0;       // links weaker than theta sqrt(|A_ii| |A_jj|) do not aggregate
+    bool thin = false;      // a thin flat body: see Level
     int64_t full = 300;     // unknowns of the coarsest level
 };
 
@@ -22,7 +23,7 @@ public:
     // linear level below it.
     void add_nodal(const Graph& g, const double* data, const Bytes& fixed,
                    Doubles points) {
-        levels.emplace_back();
+        add_level();
         X = std::move(points);
         inverse = levels.back().set_matrix(g, data, fixed, 3);
         levels.back().cluster(data, fixed, X.data(), settings.theta, FAR);
@@ -49,6 +50,23 @@ public:
         transfer.columns = Transposed(g.rows, transfer.P.indptr, transfer.P.indices);
         transfers.push_back(std::move(transfer));
         add_nodal(g, data, fixed, std::move(points));
+    }
+
+    // A level of nodes of six unknowns below the finest one, P from it, and aggregates below that,
+    // where overlapping parts smooth.
+    void coarsen_plate(const double* data, Prolongator P, int32_t nodes, Doubles B) {
+        Level& fine = levels.back();
+        fine.clusters.exact = {};
+        transfers.emplace_back();
+        Transfer& t = transfers.back();
+        t.P = std::move(P);
+        t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
+        const CoarseMatrix plate = galerkin<3>(fine.graph, data, t.P, t.columns, nodes);
+        const Bytes fixed(int64_t{nodes} * MODES, 0);
+        add_coarse(plate, fixed);
+        levels.back().largest = largest_eigenvalue(levels.back());
+        patched = true;
+        coarsen(levels.back().graph, plate.data.data(), fixed, std::move(B));
     }
 
     // Coarsen the last level, of blocks `data`, by smoothed aggregation until little is left.
@@ -82,16 +100,16 @@ public:
             fine.clusters.exact = {};
             fine.clusters.near = {};
             if (count == 0) break;
+            if (patched) {
+                fine.patches = Patches(graph, data, MODES, fixed, aggregates, static_cast<int32_t>(count / sets));
+                if (!fine.patches.empty()) fine.largest = largest_eigenvalue(fine);
+            }
             matrix = std::move(next);
             data = matrix.data.data();
             B.swap(R);
-            levels.emplace_back();
-            Level& coarse = levels.back();
-            coarse.own_indptr = matrix.indptr;
-            coarse.own_indices = matrix.indices;
-            graph = {count, coarse.own_indptr.data(), coarse.own_indices.data()};
             fixed.assign(count * MODES, 0);
-            inverse = coarse.set_matrix(graph, data, fixed, MODES);
+            Level& coarse = add_coarse(matrix, fixed);
+            graph = coarse.graph;
             if (sets > 1)
                 coarse.cluster_equally(data, fixed, sets);
             else
@@ -136,6 +154,22 @@ public:
     std::deque<Transfer> transfers;
 
 private:
+    Level& add_level() {
+        levels.emplace_back();
+        levels.back().thin = settings.thin;
+        return levels.back();
+    }
+
+    Level& add_coarse(const CoarseMatrix& matrix, const Bytes& fixed) {
+        Level& coarse = add_level();
+        coarse.own_indptr = matrix.indptr;
+        coarse.own_indices = matrix.indices;
+        const int64_t rows = static_cast<int64_t>(matrix.indptr.size()) - 1;
+        inverse = coarse.set_matrix({rows, coarse.own_indptr.data(), coarse.own_indices.data()}, matrix.data.data(),
+                                    fixed, MODES);
+        return coarse;
+    }
+
     void descend(size_t l) {
         Level& level = levels[l];
         if (l + 1 == levels.size()) {
@@ -212,7 +246,7 @@ private:
             for (int c = 0; c < b; ++c) excluded[i] &= fixed[i * b + c];
         }
         Bytes strong = strong_links(g, data, b * b, settings.theta);
-        Ints of;
+        Ints& of = aggregates;
         Clusters& clusters = levels.back().clusters;
         if (strong.empty()) strong = clusters.near;
         for (size_t k = 0; k < clusters.near.size(); ++k) strong[k] &= clusters.near[k];
@@ -235,7 +269,9 @@ private:
     static constexpr int64_t FULL_LIMIT = 1500;
     static constexpr double LARGEST_PLANES = 2.5, LARGEST_SETS = 1.25;  // memory of a level to that above it
     Settings settings;
-    int sets = 1;      // coarse nodes of each aggregate
+    int sets = 1;          // coarse nodes of each aggregate
+    bool patched = false;  // whether overlapping parts smooth
+    Ints aggregates;       // of the nodes of the last level
     Cholesky coarsest;
     Doubles inverse;  // D^-1 of the last level, while setting up
     Doubles X;        // nodes of the last level

@@ -1,30 +1,31 @@
 // One level of a multigrid hierarchy in float32: products and Chebyshev smoothing.
 
 #pragma once
-#include "clusters.hpp"
 #include "matrix_free.hpp"
+#include "patches.hpp"
 
 namespace kl {
 
-using Floats = std::vector<float>;
-
-// Some rows of s = c - A x, then d = alpha d + beta D^-1 s and next = x + d; or, without D, next = s alone.
+// Some rows of s = c - A x, summed in the precision of Sum, then d = alpha d + beta D^-1 s and next = x + d; or, without D, next = s alone.
 // Blocks are column-major.
-template <int b>
+template <int b, class Sum>
 KL_INLINE void step_rows(const Graph& g, const float* A, const float* Dinv, const float* c, const float* from,
                          float* d, float* next, float alpha, float beta, int64_t first, int64_t last) {
     constexpr int W = b == 3 ? 4 : 8;  // numbers of a vector; those beyond b hold what is not used
     typedef vec<float, W> Vec;
+    typedef vec<Sum, W> Sums;
     for (int64_t i = first; i < last; ++i) {
-        Vec even = {}, odd = {};
+        Sums even = {}, odd = {};
         for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
             const float* a = A + static_cast<int64_t>(k) * b * b;
             const float* x = from + static_cast<int64_t>(g.indices[k]) * b;
-            for (int j = 0; j < b; ++j) (j % 2 ? odd : even) += *reinterpret_cast<const Vec*>(a + j * b) * x[j];
+            for (int j = 0; j < b; ++j)
+                (j % 2 ? odd : even) +=
+                    __builtin_convertvector(*reinterpret_cast<const Vec*>(a + j * b), Sums) * static_cast<Sum>(x[j]);
         }
-        const Vec sum = even + odd;
+        const Sums sum = even + odd;
         float r[b];
-        for (int j = 0; j < b; ++j) r[j] = c[i * b + j] - sum[j];
+        for (int j = 0; j < b; ++j) r[j] = static_cast<float>(c[i * b + j] - sum[j]);
         if (!Dinv) {
             for (int j = 0; j < b; ++j) next[i * b + j] = r[j];
             continue;
@@ -51,10 +52,15 @@ public:
     float largest = 0;  // eigenvalue of D^-1 A, from above
     Floats x, y, d, c;
     Clusters clusters;  // where D is more than the diagonal blocks
+    Patches patches;    // what smooths in place of D, if any
+    bool thin = false;  // energies so unlike that sums take double precision
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
-    int64_t bytes() const { return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes() + (elements ? elements->bytes() : 0); }
+    int64_t bytes() const {
+        return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes() + patches.bytes() +
+               (elements ? elements->bytes() : 0);
+    }
 
     // Solve exactly within clusters of the nodes at X, if it has any.
     void cluster(const double* data, const Bytes& fixed, const double* X, double theta, double far) {
@@ -110,16 +116,21 @@ public:
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
         if (elements) return step_elements(from, to, alpha, beta, smooth);
-        const float* inverse = smooth && clusters.empty() ? Dinv.data() : nullptr;
+        const float* inverse = smooth && clusters.empty() && patches.empty() ? Dinv.data() : nullptr;
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             b == 3 ? step<3>(inverse, from, to, alpha, beta, first, last)
                    : step<6>(inverse, from, to, alpha, beta, first, last);
         });
-        if (smooth && !clusters.empty()) clusters.step(b, to, from, d.data(), to, alpha, beta);
+        if (!smooth) return;
+        if (!patches.empty())
+            patches.step(b, to, from, d.data(), to, alpha, beta);
+        else if (!clusters.empty())
+            clusters.step(b, to, from, d.data(), to, alpha, beta);
     }
 
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
     void first_step(float beta) {
+        if (!patches.empty()) return patches.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
@@ -171,8 +182,15 @@ private:
     template <int B>
     void step(const float* inverse, const float* from, float* to, float alpha, float beta, int64_t first,
               int64_t last) {
+        if (thin) return step<B, double>(inverse, from, to, alpha, beta, first, last);
+        step<B, float>(inverse, from, to, alpha, beta, first, last);
+    }
+
+    template <int B, class Sum>
+    void step(const float* inverse, const float* from, float* to, float alpha, float beta, int64_t first,
+              int64_t last) {
         dispatch<float>([&](auto) KL_INLINE_LAMBDA {
-            step_rows<B>(graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last);
+            step_rows<B, Sum>(graph, A.data(), inverse, c.data(), from, d.data(), to, alpha, beta, first, last);
         });
     }
 

@@ -165,6 +165,25 @@ public:
         hierarchy.coarsen(below.graph(), below.data.data(), coarse_fixed, std::move(B));
     }
 
+    // A level of m nodes of a thin flat body below the finest one: blocks (k, 3, 6) of P, modes (6m, 12).
+    void aggregate_plate(Array<int32_t> indptr, Array<int32_t> indices, Array<float> blocks, Array<double> modes) {
+        require(hierarchy.levels.size() == 1, "aggregated already");
+        require(indptr.size() == A.indptr.size(), "blocks must have one row for each node");
+        require(blocks.size() == 18 * indices.size(), "blocks must be (k, 3, 6)");
+        check_rows(indptr, indices.size());
+        const int64_t nodes = modes.size() / (MODES * 2 * MODES);
+        require(modes.size() == nodes * MODES * 2 * MODES, "modes must be (6m, 12)");
+        require(are_rows(indices, nodes), "indices must be nodes of the plate");
+        Prolongator P;
+        P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
+        P.indices.assign(indices.data(), indices.data() + indices.size());
+        P.data.assign(blocks.data(), blocks.data() + blocks.size());
+        P.data.resize(P.data.size() + 8);
+        Doubles B(modes.data(), modes.data() + modes.size());
+        py::gil_scoped_release release;
+        hierarchy.coarsen_plate(A.data.data(), std::move(P), static_cast<int32_t>(nodes), std::move(B));
+    }
+
     Array<double> cycle(Array<double> r) {
         require(r.size() == static_cast<int64_t>(fixed.size()), "r must have one number for each unknown");
         Array<double> z(r.size());
@@ -199,6 +218,12 @@ public:
             outcome = conjugate_gradients(times_A, fixed, hierarchy, from, to, tolerance, norm, most, each);
         }
         return py::make_tuple(x, outcome.iterations, outcome.converged);
+    }
+
+    // The number of each node's cluster; empty without clusters.
+    Array<int32_t> labels() const {
+        const Ints& of = hierarchy.levels.front().clusters.of;
+        return Array<int32_t>(static_cast<int64_t>(of.size()), of.data());
     }
 
     py::list sizes() const {
@@ -324,14 +349,16 @@ PYBIND11_MODULE(_multigrid, m) {
         .def("solve", &Pressures::solve);
     py::class_<Multigrid>(m, "Multigrid")
         .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
-                         double theta) {
-            return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta});
+                         double theta, bool thin) {
+            return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta, thin});
         }))
         .def(py::init([](std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, int degree,
                          float ratio, double theta) {
-            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta});
+            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta, false});
         }))
         .def("aggregate", &Multigrid::aggregate, py::arg("modes"), py::arg("matrix") = py::none())
+        .def("aggregate_plate", &Multigrid::aggregate_plate)
+        .def("labels", &Multigrid::labels)
         .def("aggregate_linear", &Multigrid::aggregate_linear)
         .def("cycle", &Multigrid::cycle)
         .def("solve", &Multigrid::solve)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.registry import Registry
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SHAPES: Registry[type[Shape]] = Registry("shape")
 """Every shape by its class name."""

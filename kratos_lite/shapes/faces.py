@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import LINEAR, Shape, mid_edges
 from kratos_lite.shapes.simplex import Linear, Quadratic
 from kratos_lite.shapes.tensor import Lagrange, Multilinear, Serendipity
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 _TRIANGLE = np.array([[0, 0], [1, 0], [0, 1]], dtype=float)
 _TRIANGLE_EDGES = ((0, 1), (1, 2), (2, 0))

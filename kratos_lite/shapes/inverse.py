@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import Shape
 from kratos_lite.typing import Array, Mask
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 INSIDE = 1e-9
 """How far outside the reference cell a point still counts as inside, in reference coordinates."""

@@ -8,11 +8,15 @@ Source: Bedrosian, Int. J. Numer. Meth. Eng. 35 (1992) 95-108.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import LINEAR, Shape, mid_edges, quadratic_faces
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 _CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 1]], dtype=float)
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))

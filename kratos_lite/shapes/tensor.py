@@ -7,11 +7,15 @@ Source: Zienkiewicz & Taylor, The Finite Element Method, vol. 1, ch. 4.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import Shape
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 def _product(f: Array) -> Array:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.shapes.base import LINEAR, Shape, mid_edges, quadratic_faces
 from kratos_lite.shapes.simplex import barycentric
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 _CORNERS = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0, 1], [0, 1, 1]], dtype=float)
 _EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))

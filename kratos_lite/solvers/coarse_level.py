@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,18 +36,23 @@ class LinearLevel:
 
     Attributes
     ----------
-    K : (3m, 3m) stiffness matrix of the linear elements on the corner nodes.
+    assemble : makes K.
     nodes : (m,) int, row among all n nodes of each corner node that does not hang.
     indptr, indices, weights : interpolation (n, m) from these nodes to all nodes in rows (CSR).
     halved : whether long cells are two linear ones each.
     """
 
-    K: BlockMatrix
+    assemble: Callable[[], BlockMatrix]
     nodes: Ints
     indptr: Rows
     indices: Rows
     weights: Array
     halved: bool = False
+
+    @cached_property
+    def K(self) -> BlockMatrix:
+        """The stiffness matrix (3m, 3m) of the linear elements on the corner nodes."""
+        return self.assemble()
 
 
 STRETCHED = 3.0
@@ -99,9 +105,12 @@ def linear_level(
     nodes = np.flatnonzero(number == 0)
     number[nodes] = np.arange(len(nodes))
     linear = [_linear(part, cell, number) for part in parts for cell in part.cells]
-    pattern = Pattern(len(nodes), [group.nodes for group in linear])
-    K = assemble_stiffness(points[nodes], linear, pattern)
-    level = LinearLevel(K, nodes, *_interpolation(parts, number), any(len(part.cells) > 1 for part in parts))
+
+    def assemble() -> BlockMatrix:
+        return assemble_stiffness(points[nodes], linear, Pattern(len(nodes), [g.nodes for g in linear]))
+
+    halves = any(len(part.cells) > 1 for part in parts)
+    level = LinearLevel(assemble, nodes, *_interpolation(parts, number), halves)
     return level if hanging is None else _continuous(level, groups, number, hanging)
 
 
@@ -114,7 +123,7 @@ def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
         corners = points[group.nodes[some, : linear.corners]]
         sides = _sides(linear, corners)
         seen += len(sides)
-        stretched += np.count_nonzero(sides.max(axis=1) > STRETCHED * sides.min(axis=1))
+        stretched += int(np.count_nonzero(sides.max(axis=1) > STRETCHED * sides.min(axis=1)))
     return 20 * stretched > seen
 
 
@@ -265,11 +274,16 @@ def _continuous(
     S.data[np.abs(S.data) <= 1e-13] = 0.0
     S.eliminate_zeros()
     P = csr_array((S.data, column[S.indices], S.indptr), shape=(n, len(nodes)))
-    inner: Any = kron(P[level.nodes], np.eye(3)).tocsr()
-    A = (inner.T @ level.K.scipy().tocsr() @ inner).tobsr((3, 3))
-    A.sort_indices()
-    K = BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
-    return LinearLevel(K, nodes, P.indptr.astype(np.int32), P.indices.astype(np.int32), P.data)
+
+    def assemble() -> BlockMatrix:
+        inner: Any = kron(P[level.nodes], np.eye(3)).tocsr()
+        A = (inner.T @ level.K.scipy().tocsr() @ inner).tobsr((3, 3))
+        A.sort_indices()
+        return BlockMatrix(
+            np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32)
+        )
+
+    return LinearLevel(assemble, nodes, P.indptr.astype(np.int32), P.indices.astype(np.int32), P.data)
 
 
 def _followers(

@@ -7,9 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
@@ -23,12 +21,14 @@ from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution,
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from kratos_lite.assembly.matrix_free import MatrixFree
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.coarse_level import LinearLevel
 
 LARGEST_CONTRAST = 1e3
-"""Stiffest to softest material up to which products without a matrix leave soft parts as exact as with one."""
+"""Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
 
 NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
 """Reason for the method ``direct``."""
@@ -105,17 +105,19 @@ class ConstrainedSystem:
             raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
 
     def _is_soon_factorized(self) -> bool:
-        """Return whether a material is nearly incompressible, and a factorization faster than iterations."""
-        ratios = [bulk_over_shear(group.material.C) for group in self.groups]
-        if max(ratios, default=0.0) <= NEAR_HALF:
+        """Return whether a material is nearly incompressible and a factorization is fastest."""
+        if not self._is_nearly_incompressible():
             return False
         unknowns = len(self.reduced.free)
         if is_quick(unknowns, lambda: self.pattern):
             return True
         from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
 
-        locked = (group for group, ratio in zip(self.groups, ratios, strict=True) if ratio > LOCKED)
+        locked = (group for group in self.groups if bulk_over_shear(group.material.C) > LOCKED)
         return quick_to_factorize(unknowns) and not all(map(is_split, locked))
+
+    def _is_nearly_incompressible(self) -> bool:
+        return any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -126,24 +128,21 @@ class ConstrainedSystem:
     def K(self) -> Any:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
 
-        For the method ``amg`` it is a MatrixFree where elements are quadratic, and a SplitMatrix where they
-        are nearly incompressible.
+        For the method ``amg`` it is a MatrixFree where that is enough, and a SplitMatrix where elements are
+        nearly incompressible.
         """
         if self.method == "dense":
             return assemble_dense(self.points, self.groups)
         product = self._matrix_free()
-        if product is not None:
-            return product
-        K = self._assembled()
-        if self.method != "amg":
-            return K
-        from kratos_lite.solvers.dilatation import split  # a quick start for small models
+        return self._assembled(self._is_nearly_incompressible()) if product is None else product
 
-        return split(K, self.points, self.groups, self.pattern)
-
-    def _assembled(self) -> BlockMatrix:
+    def _assembled(self, split: bool = False) -> Any:
         skipped: set[str] = set()
-        K = assemble_stiffness(self.points, self.groups, self.pattern, self.progress, skipped)
+        if self.method == "amg" and split:
+            from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
+        else:
+            assemble = assemble_stiffness
+        K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
         return K
 
@@ -156,7 +155,7 @@ class ConstrainedSystem:
             return None
         from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
         from kratos_lite.solvers.coarse_level import is_stretched
-        from kratos_lite.solvers.multigrid import plate_axes
+        from kratos_lite.solvers.plate_level import plate_axes
 
         free = np.zeros(3 * len(self.points), dtype=bool)
         free[self.reduced.free] = True

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from kratos_lite.errors import ModelError
 from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
     from scipy.sparse import csr_array
 
 Slaves: TypeAlias = "dict[int, tuple[dict[int, float], float]]"

@@ -16,13 +16,13 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.assembly.stiffness import add_in_parts
+from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.records import record, replace
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Progress
 
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array, csr_array
@@ -80,35 +80,42 @@ class SplitMatrix:
         return (self.A.scipy().tocsr() + D.T @ diags_array(self.bulk) @ D).tocsr()
 
 
-def split(
-    K: BlockMatrix, points: Array, groups: Sequence[ElementGroup], pattern: Pattern
+def assemble(
+    points: Array,
+    groups: Sequence[ElementGroup],
+    pattern: Pattern,
+    progress: Progress | None = None,
+    skipped: set[str] | None = None,
 ) -> BlockMatrix | SplitMatrix:
-    """Return K as a SplitMatrix, which takes its memory, or K itself where no group is to be split.
+    """Return the stiffness matrix, split where elements are nearly incompressible.
 
     Parameters
     ----------
-    K : the stiffness matrix of the groups; where it is split, A takes its place.
-    points : (n, 3) m.
-    groups : the elements, in the order of the pattern.
-    pattern : of K.
+    points, groups, pattern, progress, skipped : see `assemble_stiffness`.
     """
-    if not any(map(is_split, groups)):
-        return K
-    left, soft, parts = list(groups), list(groups), []
+    left, soft, at_once, parts = list(groups), list(groups), list(groups), {}
     for number, group in enumerate(groups):
-        if is_split(group):
-            bulk, shear = _moduli(group.material.C)
-            part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+        if not is_split(group):
+            continue
+        bulk, shear = _moduli(group.material.C)
+        part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+        parts[number] = part
+        left[number] = _softened(group, part.bulk)
+        soft[number] = _softened(left[number], KEPT * shear)
+        at_once[number] = left[number] if part.is_all() else group
+    K = assemble_stiffness(points, at_once, pattern, progress, skipped)
+    if not parts:
+        return K
+    for number, part in parts.items():
+        if not part.is_all():
             part.take_off(K, pattern, number)
-            parts.append(part)
-            left[number] = _softened(group, part.bulk)
-            soft[number] = _softened(left[number], KEPT * shear)
+    found = list(parts.values())
     taken, shears = (
-        np.concatenate([np.full(part.count, getattr(part, name)) for part in parts])
+        np.concatenate([np.full(part.count, getattr(part, name)) for part in found])
         for name in ("bulk", "shear")
     )
-    means = _means(points, parts, _stiffest(len(points), soft))
-    D = _assembled(len(points), parts)
+    means = _means(points, found, _stiffest(len(points), soft))
+    D = _assembled(len(points), found)
     return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
 
 
@@ -134,6 +141,11 @@ class _Part:
     @property
     def count(self) -> int:
         return self.D.shape[0] * self.D.shape[1]
+
+    def is_all(self) -> bool:
+        """Return whether there are no other dilatations: without κ the stiffness is of a softer material."""
+        tables = self.group.strain_tables()
+        return tables is not None and tables.C is None and tables.share == 1.0
 
     def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
         """Subtract Dᵀ κ D from the matrix."""

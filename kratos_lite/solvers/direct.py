@@ -14,7 +14,6 @@ from weakref import finalize
 import numpy as np
 
 from kratos_lite.errors import SolveError
-from kratos_lite.solvers.blas import reserve_buffers
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
@@ -162,6 +161,8 @@ def pardiso(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
 def superlu(A: csr_array, symmetric: bool) -> Callable[[Array], Array]:
     """Factorize with SuperLU: pivots on the diagonal and minimum degree where A is symmetric."""
     from scipy.sparse.linalg import splu
+
+    from kratos_lite.solvers.blas import reserve_buffers
 
     reserve_buffers(of_scipy=True)
 

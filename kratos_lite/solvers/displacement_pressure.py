@@ -23,7 +23,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.solvers import multigrid
 from kratos_lite.solvers.blas import one_thread
@@ -34,6 +33,7 @@ from kratos_lite.solvers.iteration import Share
 from kratos_lite.typing import Array, Mask, Progress, Rows
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from scipy.sparse import bsr_array
 
 DIRECTIONS = 80

@@ -18,9 +18,7 @@ from kratos_lite.typing import Array, Ints, Mask, Progress
 from kratos_lite.validation import choice
 
 if TYPE_CHECKING:
-    from kratos_lite.assembly.matrix_free import MatrixFree
     from kratos_lite.solvers.coarse_level import LinearLevel
-    from kratos_lite.solvers.dilatation import SplitMatrix
     from kratos_lite.solvers.multigrid import Solver
 
 DENSE_LIMIT = 600
@@ -132,6 +130,7 @@ class LinearSolver:
         """
         c = self.reduced.c if prescribed is None else prescribed
         b = self.reduced.reduce(f - self.K @ c)
+        tolerance *= self._share(f, c, b)
         if start is not None and self.method == "amg":
             near = self.reduced.expand((start - c)[self.reduced.free], c)
             left = self.reduced.reduce(f - self.K @ near)
@@ -142,6 +141,18 @@ class LinearSolver:
         if not solution.reason:
             solution = replace(solution, reason=self.reason)
         return replace(solution, x=self.reduced.expand(solution.x, c))
+
+    def _share(self, f: Array, c: Array, b: Array) -> float:
+        """Return the share of |b| that tolerances refer to.
+
+        Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
+        measure of what has to be in equilibrium: the bulk modulus is left out.
+        """
+        soft = getattr(self.K, "A", None)
+        if soft is None or not c.any():
+            return 1.0
+        size = float(np.linalg.norm(self.reduced.reduce(f - soft @ c)))
+        return min(1.0, size / (float(np.linalg.norm(b)) or 1.0))
 
     def _continue(
         self, f: Array, near: Array, left: Array, size: float, tolerance: float, progress: Progress | None
@@ -209,8 +220,11 @@ class LinearSolver:
         )
 
     @cached_property
-    def _blocks(self) -> BlockMatrix | MatrixFree | SplitMatrix:
-        """The matrix on all components, constraints worked in, of which only the free ones count."""
+    def _blocks(self) -> Any:
+        """The matrix on all components, constraints worked in, of which only the free ones count.
+
+        It is a BlockMatrix, a MatrixFree or a SplitMatrix, as K is.
+        """
         T, free = self.reduced.T, self.reduced.free
         if T is None:
             return self.K

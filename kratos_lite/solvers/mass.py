@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kratos_lite.assembly import mass_and_convection
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -18,6 +17,7 @@ from kratos_lite.solvers import direct
 from kratos_lite.typing import Array
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
 

@@ -1,7 +1,8 @@
 """Conjugate gradients with algebraic multigrid: smoothed aggregation from the six rigid modes.
 
 In thin flat bodies the modes of constant curvature join them, without which plates bend slowly.
-Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid).
+Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid), or, in thin
+flat bodies, one of the lines across the thickness there.
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
 On stretched meshes the kernels smooth lines or small planes of close nodes exactly and aggregate them
 whole; in large planes, and where nodes have few close ones, they aggregate close nodes alone.
@@ -23,6 +24,7 @@ from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
+from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 from kratos_lite.typing import Array, Mask, Progress
 
 GoOn = Callable[[float], bool]
@@ -34,8 +36,6 @@ RATIO = 12.0
 STRENGTH = 0.005
 """|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
 
-FLAT = 0.1
-"""Thickness of a body to its width, up to which it bends like a plate."""
 CLOSER = 0.2
 """Factor on distances across a plate: there, nodes above each other are close in cubes of cells, too."""
 
@@ -80,8 +80,8 @@ def multigrid(
 class Compiled:
     """The hierarchy of the kernels.  It keeps the memory of A, which must not change.
 
-    Where A is a product alone, its matrix is made for aggregation and forgotten, and not made at all with linear
-    elements below.
+    Where A is a product alone, its matrix is made for aggregation and forgotten; with linear elements below
+    it is not made at all.
 
     Attributes
     ----------
@@ -100,40 +100,54 @@ class Compiled:
         linear: LinearLevel | None,
         degree: int = DEGREE,
     ) -> None:
-        fixed, points = (~free).astype(np.uint8), np.ascontiguousarray(points, dtype=float)
-        axes, places = plate_axes(points, free), points
-        if axes is not None:
-            normal = axes[:, 0]
-            places = points - (1 - CLOSER) * np.outer(points @ normal, normal)
-        finest = A.product if isinstance(A, MatrixFree) else _matrix(module, A)
-        self._module = module
-        self._kernel = module.Multigrid(finest, fixed, places, degree, RATIO, STRENGTH)
-        if linear is not None and self._kernel.has_planes() and not linear.halved:
-            linear = None  # tetrahedra: their middle nodes are too far from their corners
-        if linear is not None:
-            points, places = points[linear.nodes], places[linear.nodes]
-        if axes is None or self._kernel.has_planes():
-            modes = rigid_modes(points)
+        axes = plate_axes(points, free)
+        places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
+        self._module, fixed = module, (~free).astype(np.uint8)
+        settings = fixed, places, degree, RATIO, STRENGTH
+        if isinstance(A, MatrixFree):
+            self._kernel = module.Multigrid(A.product, *settings)
         else:
-            modes = bending_modes(points, axes)
-        if linear is None:
-            self._kernel.aggregate(
-                modes, _matrix(module, A.assembled()) if isinstance(A, MatrixFree) else None
-            )
+            self._kernel = module.Multigrid(self._matrix(A), *settings, axes is not None)
+        lines = self._kernel.labels()
+        if axes is not None and linear is not None and len(lines):
+            plate = plate_level(points, free, axes, lines, linear)
+            self._kernel.aggregate_plate(plate.indptr, plate.indices, plate.blocks, plate.modes)
         else:
-            self._kernel.aggregate_linear(
-                _matrix(module, linear.K),
-                np.ascontiguousarray(fixed.reshape(-1, 3)[linear.nodes]).ravel(),
-                linear.indptr,
-                linear.indices,
-                linear.weights,
-                places,
-                modes,
-            )
+            self._aggregate(A, fixed, points, places, linear, axes)
         self.levels: list[int] = self._kernel.sizes()
         self.clusters: list[int] = self._kernel.clusters()
         self.memory: int = self._kernel.bytes()
         self.complexity: float = self._kernel.complexity()
+
+    def _matrix(self, A: BlockMatrix) -> Any:
+        return self._module.Matrix(A.indptr, A.indices, A.data)
+
+    def _aggregate(
+        self,
+        A: BlockMatrix | MatrixFree,
+        fixed: Any,
+        points: Array,
+        places: Array,
+        linear: LinearLevel | None,
+        axes: Array | None,
+    ) -> None:
+        """Aggregate nodes, or those of the linear level."""
+        if linear is not None and self._kernel.has_planes() and not linear.halved:
+            linear = None  # tetrahedra: their middle nodes are too far from their corners
+        X = points if linear is None else points[linear.nodes]
+        modes = rigid_modes(X) if axes is None or self._kernel.has_planes() else bending_modes(X, axes)
+        if linear is None:
+            self._kernel.aggregate(modes, self._matrix(A.assembled()) if isinstance(A, MatrixFree) else None)
+            return
+        self._kernel.aggregate_linear(
+            self._matrix(linear.K),
+            np.ascontiguousarray(fixed.reshape(-1, 3)[linear.nodes]).ravel(),
+            linear.indptr,
+            linear.indices,
+            linear.weights,
+            places[linear.nodes],
+            modes,
+        )
 
     def precondition(self, r: Array) -> Array:
         """Return one V-cycle on r (3n,)."""
@@ -160,34 +174,9 @@ class Compiled:
         return x, iterations, converged
 
 
-def _matrix(module: Any, A: BlockMatrix) -> Any:
-    return module.Matrix(A.indptr, A.indices, A.data)
-
-
-def plate_axes(points: Array, free: Mask) -> Array | None:
-    """Return the axes (3, 3) of a thin flat body in columns, its normal first; None for other bodies.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    free : (3n,) the components that are unknown; a body whose normal displacements are held does not bend.
-    """
-    X = points - points.mean(axis=0)
-    moments, axes = np.linalg.eigh(X.T @ X)
-    held = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
-    return None if moments[0] > FLAT**2 * moments[1] or held > 0.5 else axes
-
-
-def bending_modes(points: Array, axes: Array) -> Array:
-    """Return the rigid modes of a thin flat body, those of constant curvature, and zeros: (3n, 12)."""
-    z, x, y = ((points - points.mean(axis=0)) @ axes).T / np.ptp(points, axis=0).max()
-    modes = np.zeros((len(points), 3, 12))
-    modes[:, :, :6] = rigid_modes(points).reshape(-1, 3, 6)
-    for mode, (w, slope_x, slope_y) in enumerate(
-        ((x * x, 2 * x, 0 * x), (y * y, 0 * y, 2 * y), (x * y, y, x)), 6
-    ):
-        modes[:, :, mode] = np.column_stack([w, -z * slope_x, -z * slope_y]) @ axes.T
-    return modes.reshape(-1, 12)
+def _closer(points: Array, normal: Array) -> Array:
+    """Return points with shorter distances along a normal."""
+    return points - (1 - CLOSER) * np.outer(points @ normal, normal)
 
 
 class Pyamg:

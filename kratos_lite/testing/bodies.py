@@ -12,7 +12,7 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.errors import InputError
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.testing.report import Finding, Measured, difference, run
 from kratos_lite.typing import Array

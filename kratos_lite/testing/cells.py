@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.shapes import Shape
 from kratos_lite.testing.rules import VOLUME
 from kratos_lite.typing import Array

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.materials import Isotropic3D, LinearMaterial
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, difference, run, worst
 from kratos_lite.typing import Array
 

@@ -8,7 +8,7 @@ from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.surface import area_vectors
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.centers import raise_order
 from kratos_lite.mesh.generators import SPLITS, box

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.shapes import FACE_SHAPES, LINEAR, Shape
+from kratos_lite.shapes import LINEAR, Shape
+from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.testing.report import ConformanceError, Finding, Measured, at, run, run_after, worst
 from kratos_lite.testing.rules import exponents, monomial
 from kratos_lite.typing import Array

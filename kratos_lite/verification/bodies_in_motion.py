@@ -18,7 +18,7 @@ from kratos_lite.bodies import (
 )
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.errors import KratosLiteError
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.mass_properties import MassProperties

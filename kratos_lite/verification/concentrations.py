@@ -6,7 +6,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.typing import Array
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.meshes import is_quadratic, nearest, plane, shaped

@@ -12,7 +12,7 @@ from kratos_lite.analysis.modal import critical_rate
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.generators import annulus, box
 from kratos_lite.model.loads.body import BodyForce

@@ -10,7 +10,7 @@ from kratos_lite import voigt
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import at_gauss
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.body import BodyForce

@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.nodal_loads import external_loads
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import NodalForces

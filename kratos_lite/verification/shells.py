@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.result import Result
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array

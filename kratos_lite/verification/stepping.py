@@ -11,7 +11,7 @@ from kratos_lite.analysis.integrators.base import ModelIntegrator
 from kratos_lite.analysis.model import Model
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.analysis.transient import TransientAnalysis
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.typing import Array
 from kratos_lite.verification.problem import Problem, bounded

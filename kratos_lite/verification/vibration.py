@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.materials import Isotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh.generators import box
 from kratos_lite.typing import Array
 from kratos_lite.verification import scenes

@@ -13,7 +13,8 @@ from kratos_lite.elements.enhanced_strain_3d8n import EnhancedStrain3D8N
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.errors import InputError, MaterialError
-from kratos_lite.materials import Isotropic3D, LinearMaterial
+from kratos_lite.materials import LinearMaterial
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron
 

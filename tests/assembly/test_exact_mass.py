@@ -17,7 +17,7 @@ from kratos_lite.elements.kinematic_linear_3d27n import KinematicLinear3D27N
 from kratos_lite.elements.surface import surface_pressure
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import hexahedron, rule_for, tetrahedron
-from kratos_lite.shapes import Quadrilateral4, Quadrilateral8, Quadrilateral9, Triangle3, Triangle6
+from kratos_lite.shapes.faces import Quadrilateral4, Quadrilateral8, Quadrilateral9, Triangle3, Triangle6
 from kratos_lite.solvers.mass import Mass
 
 KINDS = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]

@@ -14,7 +14,8 @@ from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MaterialError
-from kratos_lite.materials import Isotropic3D, Orthotropic3D
+from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import kernels
 from kratos_lite.testing.patches import patch

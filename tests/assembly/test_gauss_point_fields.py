@@ -18,7 +18,9 @@ from kratos_lite.elements.kinematic_linear_3d4n import KinematicLinear3D4N
 from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.elements.kinematic_linear_3d20n import KinematicLinear3D20N
 from kratos_lite.errors import MeshError
-from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
+from kratos_lite.materials import MATERIALS
+from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model import checks
 from kratos_lite.native import kernels, threads

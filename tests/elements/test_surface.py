@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.elements.surface import surface_pressure, surface_pressure_tangent
-from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.shapes.faces import FACE_SHAPES
 
 FACES = [shape for shape in FACE_SHAPES.values() if shape.nodes.shape[1] == 2]
 

@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes
 from kratos_lite.mesh.nearest import distance_to_cell
-from kratos_lite.shapes import Quadrilateral4
+from kratos_lite.shapes.faces import Quadrilateral4
 from kratos_lite.shapes.inverse import inverse_map
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]

@@ -13,7 +13,7 @@ from kratos_lite.elements.exact_rules import exact_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 from kratos_lite.quadrature import rule_for
-from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.shapes.faces import FACE_SHAPES
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 TURN = exp([0.3, -0.8, 0.5])

@@ -448,7 +448,7 @@ def test_wrong_shapes_are_refused():
     K, free = matrix_of(system), system._equations._free
     modes = np.zeros((K.shape[0], 6))
     points = np.zeros((K.shape[0] // 3, 3))
-    options = (points, 2, 12.0, 0.0)
+    options = (points, 2, 12.0, 0.0, False)
 
     def kernel(fixed):
         return MODULE.Multigrid(MODULE.Matrix(K.indptr, K.indices, K.data), fixed, *options)
@@ -493,9 +493,29 @@ def test_a_linear_level_of_the_wrong_shape_is_refused():
     for place, (value, message) in wrong.items():
         arguments = [*right[:place], value, *right[place + 1 :]]
         matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
-        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, False)
         with pytest.raises(ValueError, match=message):
             kernel.aggregate_linear(below, *arguments)
+
+
+@compiled
+def test_a_level_of_lines_of_the_wrong_shape_is_refused():
+    system, _ = equations(clamped(box()))
+    K = matrix_of(system)
+    fixed, points = np.zeros(K.shape[0], np.uint8), np.zeros((K.shape[0] // 3, 3))
+    rows = np.arange(len(points) + 1, dtype=np.int32)
+    right = (rows, rows[:-1] * 0, np.zeros((len(points), 3, 6), np.float32), np.zeros((6, 12)))
+    wrong = {
+        0: (rows[:-1], "one row for each node"),
+        1: (rows[:-1] * 0 + 1, "nodes of the plate"),
+        2: (np.zeros((3, 3, 6), np.float32), r"blocks must be \(k, 3, 6\)"),
+        3: (np.zeros((5, 12)), r"modes must be \(6m, 12\)"),
+    }
+    for place, (value, message) in wrong.items():
+        matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, True)
+        with pytest.raises(ValueError, match=message):
+            kernel.aggregate_plate(*right[:place], value, *right[place + 1 :])
 
 
 @compiled

@@ -15,7 +15,8 @@ from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.elements.kinematic_linear_3d10n import KinematicLinear3D10N
 from kratos_lite.elements.kinematic_linear_3d13n import KinematicLinear3D13N
 from kratos_lite.elements.kinematic_linear_3d20n import KinematicLinear3D20N
-from kratos_lite.materials import MATERIALS, Isotropic3D, LinearMaterial
+from kratos_lite.materials import MATERIALS, LinearMaterial
+from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.quadrature import Rule, hexahedron, pyramid, tetrahedron
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.shapes.hexahedra import Hexahedron8, Hexahedron20
@@ -254,7 +255,7 @@ def test_a_value_that_is_not_finite_fails(value):
         ({"degree": 0}, "reproduction", "span degree 1 completely; write degree = 1"),
         ({"degree": 10**6}, "definition", "says degree = 1000000; an integer from 0 to 9"),
         ({"corners": 3}, "definition", "says corners = 3; a tetrahedron has 4"),
-        ({"cell": "tet"}, "definition", "has the cell 'tet'; cells are hexahedron, pyramid"),
+        ({"cell": "tet"}, "definition", "has the cell 'tet'; cells are point, line"),
         ({"vtk": 0}, "definition", "says vtk = 0: results cannot be saved with it; write vtk = 10"),
         ({"nodes": 2 * Tetrahedron4.nodes}, "definition", "first nodes that are not the corners"),
         ({"nodes": np.zeros((4, 2))}, "definition", "has nodes (4, 2); a tetrahedron has (4 to 200, 3)"),

@@ -4,7 +4,9 @@ import pytest
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import InputError
-from kratos_lite.materials import MATERIALS, Isotropic3D, Orthotropic3D
+from kratos_lite.materials import MATERIALS
+from kratos_lite.materials.isotropic3d import Isotropic3D
+from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.quadrature import CELLS, rule_for
 from kratos_lite.shapes import SHAPES
 from kratos_lite.shapes.hexahedra import Hexahedron8

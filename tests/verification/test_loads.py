@@ -113,7 +113,7 @@ def test_pressure_on_a_face_inside_the_body_is_refused():
 
 
 def test_line_load_is_a_force_per_length():
-    from kratos_lite.shapes import Line3
+    from kratos_lite.shapes.faces import Line3
 
     mesh = kl.box((1, 1, 2), element=kind(20))
     ends = [int(np.argmin(np.linalg.norm(mesh.points - (1, 1, z), axis=1))) for z in (0, 2, 1)]
@@ -222,7 +222,7 @@ def test_loads_of_conditions_are_their_own_plus_the_nodal_ones():
 
 def test_a_pressure_of_its_own_on_a_line_condition_is_refused():
     from kratos_lite.model.loads.conditions import ConditionLoads
-    from kratos_lite.shapes import Line2
+    from kratos_lite.shapes.faces import Line2
 
     box = kl.box()
     line = kl.Block("Line", np.array([[1, 3]], dtype=np.int32), np.array([1]), np.array([0]), Line2)

@@ -7,7 +7,8 @@ import pytest
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.io.writers.pictures import draw, draw_element
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.shapes import SHAPES, Point1
+from kratos_lite.shapes import SHAPES
+from kratos_lite.shapes.faces import Point1
 from kratos_lite.shapes.hexahedra import Hexahedron20
 from kratos_lite.shapes.tetrahedra import Tetrahedron4
 from kratos_lite.view import ISOMETRIC, OBLIQUE

@@ -17,7 +17,7 @@ from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.records import names_of, replace
-from kratos_lite.shapes import Point1
+from kratos_lite.shapes.faces import Point1
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Ints
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.assembly import gauss_point_fields
 from kratos_lite.assembly.element_groups import ElementGroup
@@ -15,6 +14,8 @@ from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import Load, OfPlace, vectors
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.mesh.finer import Finer
 from kratos_lite.typing import Array, Mask
 

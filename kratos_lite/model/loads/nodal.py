@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, ModelError
@@ -14,6 +13,8 @@ from kratos_lite.mesh import Mesh, Where
 from kratos_lite.model.loads.base import Load, vectors
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.mesh.finer import Finer
 from kratos_lite.typing import Array
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup, add_nodal
 from kratos_lite.elements.surface import surface_load, surface_pressure
@@ -18,6 +17,8 @@ from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from kratos_lite.mesh.finer import Finer
 
 SURFACES = ("triangle", "quadrilateral")

@@ -14,7 +14,7 @@ from kratos_lite.io.formats.document import Constraint, Data, Document, Properti
 from kratos_lite.io.formats.elem import read_elem, write_elem
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
-from kratos_lite.shapes import Quadrilateral4, Triangle3
+from kratos_lite.shapes.faces import Quadrilateral4, Triangle3
 from kratos_lite.shapes.hexahedra import Hexahedron27
 from kratos_lite.shapes.tetrahedra import Tetrahedron4
 

@@ -18,7 +18,7 @@ from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.mdpa.values import Table
 from kratos_lite.io.formats.mdpa.writer import write_mdpa
 from kratos_lite.mesh import Block, Mesh, Part
-from kratos_lite.shapes import Quadrilateral4
+from kratos_lite.shapes.faces import Quadrilateral4
 from kratos_lite.shapes.hexahedra import Hexahedron8
 
 CASES = present(

@@ -13,7 +13,7 @@ from kratos_lite.io.formats.mdpa.rows import Layout, read_rows, width_of_first_l
 from kratos_lite.io.formats.mdpa.scan import Frame, Source
 from kratos_lite.io.names import LINES, SOLIDS, condition_shape, count, element_shape
 from kratos_lite.mesh import Block, Mesh, distinct, ids_of
-from kratos_lite.shapes import FACE_SHAPES
+from kratos_lite.shapes.faces import FACE_SHAPES
 
 NODES = Layout("node", "irrr", "coordinates", needs="expected id x y z", alone=True)
 WORDS = {"Elements": "element", "Conditions": "condition", "Geometries": "geometry"}
@@ -87,8 +87,7 @@ def _width(kind: str, name: str) -> int | None:
         match = re.search(r"\dD(\d{1,3})N?$", name)
         return int(match.group(1)) if match else None
     width = count(name)
-    known = SOLIDS if kind == "Elements" else {**FACE_SHAPES, **LINES}
-    return width if width in known else None
+    return width if width in (SOLIDS if kind == "Elements" else (*FACE_SHAPES, *LINES)) else None
 
 
 def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
