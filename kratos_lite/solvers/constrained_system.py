@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 LARGEST_CONTRAST = 1e3
 """Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
-
+NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
+"""What is skipped with linear elements inside the quadratic ones."""
 NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
 """Reason for the method ``direct``."""
 LOCKED = 3000.0
@@ -166,6 +167,8 @@ class ConstrainedSystem:
             or plate_axes(self.points, free) is not None
         ):
             return None
+        if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
+            self.skipped.append(NO_MATRIX)
         return MatrixFree(self.points, self.groups, self._assembled)
 
     @cached_property

@@ -1,0 +1,191 @@
+"""The stiffness as a product, element by element: the same as with the matrix."""
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.matrix_free import MatrixFree, factors
+from kratos_lite.elements import ELEMENTS
+from kratos_lite.elements.tables import tabulate
+from kratos_lite.native import kernels
+from kratos_lite.quadrature import Rule
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.multigrid import multigrid
+
+pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
+WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9, 450.0)
+KINDS = ("8N", "10N", "13N", "15N", "20N", "27N")
+
+
+def model_of(kind, material=STEEL, curved=False, cells=(3, 2, 2), size=(1.1, 0.8, 0.7)):
+    mesh = kl.box(size, cells, f"KinematicLinear3D{kind}")
+    if curved:
+        X = mesh.points
+        mesh = mesh.replace(points=X + 0.04 * np.sin(3.0 * X[:, [1, 2, 0]] + [0.1, 0.5, 0.9]))
+    model = kl.Model(mesh, material)
+    model.fix(np.flatnonzero(model.mesh.points[:, 0] < 0.05))
+    model.add(kl.Gravity((1.0, 2.0, -9.81)))
+    return model
+
+
+def system_of(model, solver="amg"):
+    constraints = model.supports.constraint_map
+    return ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver=solver)
+
+
+def both(model):
+    """Return the product, the matrix, and a vector with a random number for each unknown."""
+    product = MatrixFree(model.mesh.points, model.element_groups())
+    return product, product.assembled(), np.random.default_rng(3).standard_normal(3 * model.mesh.n_nodes)
+
+
+@pytest.mark.parametrize("curved", [False, True], ids=["affine", "curved"])
+@pytest.mark.parametrize("material", [STEEL, WOOD], ids=["isotropic", "orthotropic"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_products_are_those_of_the_matrix(kind, material, curved):
+    product, K, x = both(model_of(kind, material, curved))
+    expected = K @ x
+    assert np.abs(product @ x - expected).max() < 2e-14 * np.abs(expected).max()
+    assert abs(product.norm() / K.norm() - 1) < (0.3 if curved else 1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_smoothing_is_that_of_the_matrix(kind):
+    model = model_of(kind, WOOD, curved=True)
+    system = system_of(model)
+    product, K, r = both(model)
+    free = np.zeros(len(r), dtype=bool)
+    free[system.reduced.free] = True
+    linear = system._equations.linear_level()
+    r[~free] = 0.0
+    z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
+    assert np.abs(z[0] - z[1]).max() < 2e-5 * np.abs(z[1]).max()
+
+
+def test_groups_of_several_kinds_and_a_last_group_that_is_not_full():
+    quadratic, linear = model_of("20N", cells=(5, 3, 2)).mesh, model_of("8N", cells=(1, 1, 1)).mesh
+    points = np.vstack([quadratic.points, linear.points + [2.0, 0, 0]])
+    nodes = quadratic.blocks[0].nodes
+    blocks = {
+        "KinematicLinear3D20N": nodes[:17],
+        "KinematicLinear3D27N": np.zeros((0, 27), np.int32),
+        "KinematicLinear3D8N": np.vstack([nodes[17:, :8], linear.blocks[0].nodes + len(quadratic.points)]),
+    }
+    mesh = kl.Mesh(points, {name: cells for name, cells in blocks.items() if len(cells)})
+    model = kl.Model(mesh, STEEL)
+    model.assign(WOOD, np.arange(5))
+    product, K, x = both(model)
+    assert np.abs(product @ x - K @ x).max() < 2e-14 * np.abs(K @ x).max()
+
+
+def test_rigid_motions_take_no_force():
+    model = model_of("27N", curved=True)
+    product, X = MatrixFree(model.mesh.points, model.element_groups()), model.mesh.points
+    motion = np.array([0.3, -0.2, 0.9]) + np.cross([0.2, 0.5, -0.4], X)
+    assert np.abs(product @ motion.ravel()).max() < 1e-14 * product.norm() * np.abs(motion).max()
+
+
+# ---- factors of gradients --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["8N", "20N", "27N"])
+def test_factors_give_the_gradients(kind):
+    element = ELEMENTS[f"KinematicLinear3D{kind}"]
+    order, values, slopes, places = factors(element.shape, element.rule)
+    n, dN = len(values), tabulate(element.shape, element.rule)[1][order]
+    for field in np.random.default_rng(1).standard_normal((3, len(element.shape.nodes))):
+        at = (places @ field).reshape(n, n, n)
+        at = np.einsum("zc,yb,xa,cba->zyx", values, values, values, at)
+        along = [
+            np.einsum(f"{axis}i,{term}->zyx", slopes, at) for axis, term in zip("xyz", ("zyi", "zix", "iyx"))
+        ]
+        np.testing.assert_allclose(np.stack(along, -1).reshape(-1, 3), field @ dN, rtol=0, atol=1e-12)
+
+
+def test_shapes_and_rules_without_factors():
+    hexahedron, wedge = ELEMENTS["KinematicLinear3D8N"], ELEMENTS["KinematicLinear3D15N"]
+    assert factors(wedge.shape, wedge.rule) is None
+    flat = Rule(hexahedron.rule.points * [1.0, 1.0, 0.9], hexahedron.rule.weights, 1, "flat")
+    assert factors(hexahedron.shape, flat) is None
+    quadratic = ELEMENTS["KinematicLinear3D27N"]
+    assert factors(quadratic.shape, hexahedron.rule) is None  # slopes of degree 2 from two points
+
+
+# ---- where the matrix is needed --------------------------------------------------------------------
+
+
+class OwnStiffness(kl.KinematicLinear3D27N):
+    """An element whose stiffness the kernels do not know."""
+
+    register = False
+
+    def stiffness(self, C):
+        return 2.0 * super().stiffness(C)
+
+
+def test_a_scene_without_a_matrix_says_so_and_never_makes_one(monkeypatch):
+    model = model_of("27N")
+    monkeypatch.setattr(MatrixFree, "_assembled", None)
+    monkeypatch.setattr(ConstrainedSystem, "_assembled", None)
+    analysis = model.static("amg")
+    result = analysis.solve()
+    assert isinstance(analysis.system.K, MatrixFree)
+    assert result.report.backward_error < 1e-14
+    assert any("the stiffness matrix" in words for words in result.report.skipped)
+
+
+def links():
+    model = model_of("27N")
+    ends = np.flatnonzero(model.mesh.points[:, 0] > 1.09)
+    model.constrain((int(ends[0]), "x"), {(int(ends[1]), "x"): 1.0})
+    return model
+
+
+NEEDED = {
+    "linear tetrahedra": lambda: model_of("4N"),
+    "flat cells": lambda: model_of("27N", size=(1.0, 1.0, 0.1)),
+    "a plate": lambda: model_of("20N", cells=(15, 15, 1), size=(1.5, 1.5, 0.1)),
+    "a constraint": links,
+}
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_others_have_a_matrix(name):
+    system = system_of(NEEDED[name]())
+    assert isinstance(system.K, BlockMatrix)
+
+
+def test_a_large_contrast_and_an_own_stiffness_have_a_matrix():
+    model = model_of("27N")
+    group = model.element_groups()[0]
+    assert MatrixFree.takes(group)
+    own = ElementGroup(OwnStiffness, group.rule, group.material, group.nodes, group.rows)
+    assert not MatrixFree.takes(own)
+    model.assign(kl.Isotropic3D(E=2e15, nu=0.3), [0])
+    assert isinstance(system_of(model).K, BlockMatrix)
+
+
+def test_a_factorization_makes_the_matrix_of_the_product():
+    model = model_of("20N")
+    product, K, _ = both(model)
+    np.testing.assert_array_equal(product.scipy().toarray(), K.scipy().toarray())
+
+
+def test_wrong_tables_are_refused():
+    module, model = kernels("multigrid"), model_of("8N")
+    group = model.element_groups()[0]
+    nodes, _, dN, weights = group.tables()
+    C = group.law()[0]
+    points = np.ascontiguousarray(model.mesh.points)
+    with pytest.raises(ValueError, match="nodes must be rows of points"):
+        module.Product(points[:-1].copy(), [(nodes, dN, weights, C, None)])
+    with pytest.raises(ValueError, match="factors must be"):
+        module.Product(points, [(nodes, dN, weights, C, (np.eye(3), np.eye(3), np.eye(8)))])
+    with pytest.raises(ValueError, match="each node must have a place"):
+        module.Product(points, [(nodes, dN, weights, C, (np.eye(2), np.eye(2), np.ones((8, 8))))])
+    with pytest.raises(ValueError, match="three numbers for each point"):
+        module.Product(points, [(nodes, dN, weights, C, None)]).times(np.zeros(5))
