@@ -9,10 +9,10 @@ from benchmarks.driver import Run
 from benchmarks.programs import SOLVERS
 from benchmarks.tables import OURS, Row, ratio, seconds, table
 
-UNKNOWNS = 75_000
+UNKNOWNS = 60_000
 """About so many are solved for if nothing else is asked for."""
 TOLERANCE = 1e-8
-CELLS = {"4N": 28, "8N": 28, "10N": 14, "20N": 18, "27N": 14}
+CELLS = {"4N": 26.5, "8N": 26.5, "10N": 13.3, "20N": 16.6, "27N": 13.3}
 """Cells along an edge of a block with so many unknowns."""
 LINEAR, BRICKS = ("4N", "8N", "8N enhanced"), ("8N", "8N enhanced", "20N", "27N")
 MOST = (*LINEAR, "10N", "20N", "27N")
@@ -58,8 +58,8 @@ Place = tuple[str, str, int]
 def cells(kind: str, unknowns: float) -> int:
     """Return the cells along an edge of a block with about so many unknowns.
 
-    >>> cells("27N B-bar", 75_000), cells("8N", 600_000)
-    (14, 56)
+    >>> cells("27N B-bar", 60_000), cells("8N", 480_000)
+    (13, 53)
     """
     return max(2, round(CELLS[kind.split(maxsplit=1)[0]] * (unknowns / UNKNOWNS) ** (1 / 3)))
 

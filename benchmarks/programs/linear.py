@@ -5,6 +5,7 @@ kratos_lite solves the model, whose matrix the others read from a file.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,10 @@ class Memory:
     """What this process takes at most from now on, above what it takes now; None where nothing says it."""
 
     def __init__(self) -> None:
+        try:
+            ctypes.CDLL(None).malloc_trim(0)  # what was set free would be taken again unseen
+        except (AttributeError, OSError):
+            pass
         self._before = _status("VmRSS")
         try:
             Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
@@ -78,12 +83,13 @@ class Clock:
     def __init__(self) -> None:
         self.at: dict[tuple[str, float], float] = {}
         self.memory: Memory | None = None
+        self.peak: int | None = None
 
     def __call__(self, phase: str, share: float) -> None:
         """Note the first time of each phase and share."""
-        self.at.setdefault((phase, share), perf_counter())
         if self.memory is None and (phase, share) == ("assemble", 1.0):
             self.memory = Memory()
+        self.at.setdefault((phase, share), perf_counter())
         if (phase, share) == ("verify", 0.0) and self.memory:
             self.peak = self.memory.peak()
 

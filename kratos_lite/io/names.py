@@ -9,8 +9,11 @@ from kratos_lite.errors import nearest
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.shapes.faces import FACE_SHAPES, Line2, Line3, Point1
 
-SOLIDS = {len(shape.nodes): shape for shape in SHAPES.values() if shape.nodes.shape[1] == 3}
-"""Solid shapes by their number of nodes."""
+SOLIDS = {
+    4: "Tetrahedron4", 10: "Tetrahedron10", 5: "Pyramid5", 13: "Pyramid13", 6: "Wedge6", 15: "Wedge15",
+    8: "Hexahedron8", 20: "Hexahedron20", 27: "Hexahedron27",
+}  # fmt: skip
+"""Names of solid shapes by their number of nodes."""
 LINES: dict[int, type[Shape]] = {2: Line2, 3: Line3}
 CARRIERS = ("Load", "Face3D", "FacePressure", "SurfaceCondition", "PointCondition", "LineCondition")
 """Words in the names of conditions that carry loads."""
@@ -62,7 +65,8 @@ def element_shape(name: str) -> type[Shape] | None:
     >>> element_shape("SmallDisplacementElement3D8N").__name__
     'Hexahedron8'
     """
-    return None if any(word in name for word in THIN) else SOLIDS.get(count(name) or 0)
+    nodes = count(name)
+    return SHAPES[SOLIDS[nodes]] if nodes in SOLIDS and not any(word in name for word in THIN) else None
 
 
 def condition_shape(name: str) -> type[Shape] | None:

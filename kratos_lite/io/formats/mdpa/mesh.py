@@ -87,8 +87,7 @@ def _width(kind: str, name: str) -> int | None:
         match = re.search(r"\dD(\d{1,3})N?$", name)
         return int(match.group(1)) if match else None
     width = count(name)
-    known = SOLIDS if kind == "Elements" else {**FACE_SHAPES, **LINES}
-    return width if width in known else None
+    return width if width in (SOLIDS if kind == "Elements" else (*FACE_SHAPES, *LINES)) else None
 
 
 def _refuse_repeated(source: Source, blocks: list[Block], word: str) -> None:
