@@ -19,6 +19,7 @@ from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.records import record, replace
 from kratos_lite.solvers.pressure_means import PressureMeans, pressure_means
@@ -161,25 +162,25 @@ class _Part:
 
 def _dilatations(points: Array, group: ElementGroup) -> tuple[Array, Array]:
     """Return integrals of dilatations with r orthonormal polynomials (m, r, 3k), and these (m, r, r)."""
-    tables = group.strain_tables()
+    tables, (_, dN) = group.strain_tables(), tabulate(group.element.shape, group.rule)
     assert tables is not None
     linear = tables.C is None and tables.functions.shape[1] > 0
+    derivatives, weights = np.swapaxes(dN, 1, 2).reshape(-1, dN.shape[1]), group.rule.weights
     found, polynomials = [], []
     for chunk in group.chunks():
         elements = group.at(points, chunk)
-        dV, gradients = elements._gauss
-        rows, weighted = np.swapaxes(gradients, -1, -2).reshape(*dV.shape, -1), dV[..., None]
-        volume = weighted.sum(axis=-2)[..., None]
+        J = elements._jacobian(dN)
+        normals = cofactors(J)
+        dV = (J[..., 0] * normals[..., 0, :]).sum(axis=-1) * weights
+        P = np.ones((*dV.shape, 1))
         if linear:
-            P = np.concatenate(
-                [np.ones_like(weighted), tables.functions @ elements.X / np.cbrt(volume)], axis=-1
-            )
-            moments = np.swapaxes(P * weighted, -1, -2)
-            polynomials.append(np.linalg.inv(np.linalg.cholesky(moments @ P)))
-            found.append(polynomials[-1] @ (moments @ rows))
-        else:
-            polynomials.append(1 / np.sqrt(volume))
-            found.append(np.swapaxes(weighted, -1, -2) @ rows / np.sqrt(volume))
+            length = np.cbrt(dV.sum(axis=1))[:, None, None]
+            P = np.concatenate([P, tables.functions @ elements.X / length], axis=-1)
+        polynomials.append(np.linalg.inv(np.linalg.cholesky(np.swapaxes(P * dV[..., None], 1, 2) @ P)))
+        m, r = polynomials[-1].shape[:2]
+        rows = np.einsum("mgr,mgji->mrigj", P, normals * weights[:, None, None]).reshape(m, 3 * r, -1)
+        integrals = np.swapaxes((rows @ derivatives).reshape(m, r, 3, -1), 2, 3).reshape(m, r, -1)
+        found.append(polynomials[-1] @ integrals)
     return np.concatenate(found), np.concatenate(polynomials)
 
 
