@@ -44,7 +44,7 @@ MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
 DEGREE = 3
 """Degree of the smoother: an iteration more takes longer than a better cycle."""
-INNER, INNER_MAX = 0.06, 120
+INNER, INNER_MAX = 0.1, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
 
