@@ -32,7 +32,7 @@ def natural_modes(
     with phase("assemble"):
         K, M = (reduced(equations, A) for A in (equations.K, equations.matrix(0.0, 1.0, 0.0, 0.0)))
     with phase("modes"):
-        omega, shapes = modes(K, M, count)
+        omega, shapes = modes(K, M, count, progress)
     return omega, expanded(equations, shapes)
 
 

@@ -8,7 +8,7 @@ With p = κ D u the equations (A + Dᵀ κ D) u = b are
 which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
 p = -(S⁻¹ + λ) r_p, with λ in A, and one multigrid cycle for A u = r_u - Dᵀ p.  With A₀ = A - Dᵀ λ D,
 
-    S = D blocks(A₀)⁻¹ Dᵀ + (means at corner nodes)² / 2μ + 1/κ  ≈  D A₀⁻¹ Dᵀ + 1/κ:
+    S = D blocks(A₀)⁻¹ Dᵀ + (means around corners)² / 2μ + 1/κ  ≈  D A₀⁻¹ Dᵀ + 1/κ:
 
 the second term holds for smooth pressures, the first one for those that change sign from element to element.
 Some of these hardly act on the nodes (checkerboards): no element needs to be stable.  For the others
@@ -217,7 +217,8 @@ class _Schur:
     def __init__(self, K: SplitMatrix, inverse: bsr_array, loose: Mask) -> None:
         from scipy.sparse import diags_array
 
-        means = K.means @ diags_array(loose * 1.0)  # around held nodes checkerboards have means, too
+        free = loose[K.means.ends].any(axis=1)  # around held nodes checkerboards have means, too
+        means = K.means.matrix @ diags_array(np.where(free, 1.0, 0.0))
         S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
         self.scale = 1 / np.sqrt(S.diagonal())
         scale = diags_array(self.scale)

@@ -11,7 +11,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
@@ -29,13 +29,16 @@ ROUNDING = 1e-13
 """Share of the norms of its matrices that may be."""
 
 
-def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[Array, Array]:
+def modes(
+    K: csr_array[Any, Any], M: csr_array[Any, Any], count: int, progress: Progress | None = None
+) -> tuple[Array, Array]:
     """Return the lowest natural frequencies and their shapes.
 
     Parameters
     ----------
     K, M : sparse (n, n), symmetric; K positive semidefinite, M positive definite.
     count : how many, 1 … n.
+    progress : called with ``"factorize"`` or ``"modes"`` and the share done, 0 … 1, of an iteration.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def modes(K: csr_array[Any, Any], M: csr_array[Any, Any], count: int) -> tuple[A
     if n <= DENSE_MODES or count > n // 4:
         squares, shapes = _dense(K.toarray(), M.toarray(), count)
     else:
-        squares, shapes = _by_iteration(K, M, count)
+        squares, shapes = _by_iteration(K, M, count, progress)
     check_residuals([(np.ones(count), K), (-squares, M)], shapes)
     return np.sqrt(np.maximum(squares, 0.0)), shapes
 
@@ -83,19 +86,31 @@ def _dense(K: Array, M: Array, count: int) -> tuple[Array, Array]:
     return squares, shapes
 
 
-def _by_iteration(K: Any, M: Any, count: int) -> tuple[Array, Array]:
+def _by_iteration(K: Any, M: Any, count: int, progress: Progress | None) -> tuple[Array, Array]:
     """Return the lowest modes by Lanczos on (K + s M)^-1 M, with a shift s that makes K definite.
 
     Frequencies far below the shift are hard to tell apart: then it comes down.
     """
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-    n = K.shape[0]
+    n, done, cycle = K.shape[0], 0, max(2 * count + 1, 20)
+
+    def solve(b: Array) -> Array:
+        nonlocal done
+        done += 1
+        if progress:
+            progress("modes", done / (done + cycle))  # nobody knows how many cycles it takes
+        return factors.solve(b)
+
     start = np.random.default_rng(0).standard_normal(n)  # the same vector gives the same modes each time
+    inverse = LinearOperator((n, n), matvec=solve, dtype=np.float64)
     for share in SHIFTS:
         shift = share * first_shift(K, M)
+        if progress:
+            progress("factorize", 0.0)
         factors = direct.factorize((K + shift * M).tocsr())
-        inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
+        if progress:
+            progress("factorize", 1.0)
         try:
             squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=inverse, v0=start, maxiter=RESTARTS)
         except ArpackNoConvergence:

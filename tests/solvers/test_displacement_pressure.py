@@ -134,6 +134,40 @@ def test_flat_cells(element, aspect):
     check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), 60)
 
 
+@pytest.mark.parametrize(("element", "axis"), [("BBar3D8N", 0), ("BBar3D20N", 2), ("BBar3D27N", 1)])
+def test_long_cells(element, axis):
+    check(body(element, cells=5, size=tuple(10.0 if a == axis else 1.0 for a in range(3))), 45)
+
+
+@pytest.mark.parametrize(("element", "axis"), [("BBar3D27N", 0), ("BBar3D27N", 2), ("BBar3D15N", 2)])
+def test_means_of_pressures_around_halves_of_long_edges(element, axis):
+    size = tuple(8.0 if a == axis else 1.0 for a in range(3))
+    K = system_of(body(element, cells=2, size=size)).K
+    points = kl.box(size, (2, 2, 2), element).points
+    z, u, linear = points[:, axis], np.zeros_like(points), np.zeros_like(points)
+    u[:, axis], linear[:, axis] = z, z**2 / 2  # dilatations 1 and z
+    one, mean = (K.means.matrix.T @ (K.D @ field.ravel()) for field in (u, linear))
+    at = np.flatnonzero(one)
+    low, high = z[K.means.ends[at]].T
+    assert ((high - low) == 4.0).all()
+    assert len(at) == 2 * 18  # nine edges in each layer, by halves
+    place = mean[at] / one[at]
+    first = np.abs(place - (3 * low + high) / 4) < 1e-12
+    second = np.abs(place - (low + 3 * high) / 4) < 1e-12
+    assert (first ^ second).all()
+    assert first.sum() == second.sum()
+    volumes = one[at] ** 2 * 2 * (3e6 / (2 * 1.4999))
+    np.testing.assert_allclose(volumes.sum(), 8.0, rtol=1e-12)
+
+
+def test_means_of_pressures_around_nodes():
+    K = system_of(body("BBar3D27N", cells=2, size=(1.0, 1.0, 1.0))).K
+    one = K.means.matrix.T @ (K.D @ kl.box((1.0, 1.0, 1.0), (2, 2, 2), "BBar3D27N").points.ravel() / 3)
+    assert np.count_nonzero(one) == 27
+    assert (K.means.ends[:, 0] == K.means.ends[:, 1]).all()
+    np.testing.assert_allclose((one**2).sum() * 2 * (3e6 / (2 * 1.4999)), 1.0, rtol=1e-12)
+
+
 # ---- materials -------------------------------------------------------------------------------------------
 
 
