@@ -251,7 +251,7 @@ PYBIND11_MODULE(_multigrid, m) {
         .def("solve", &Pressures::solve);
     py::class_<Multigrid>(m, "Multigrid")
         .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
-                         double theta, bool thin) {
+                         double theta, int thin) {
             return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta, thin});
         }))
         .def("aggregate", &Multigrid::aggregate)

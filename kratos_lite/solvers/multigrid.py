@@ -23,7 +23,7 @@ from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
-from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
+from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
 from kratos_lite.typing import Array, Mask, Progress
 
 GoOn = Callable[[float], bool]
@@ -93,10 +93,11 @@ class Compiled:
         degree: int = DEGREE,
     ) -> None:
         axes = plate_axes(points, free)
+        thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
         matrix, fixed = module.Matrix(A.indptr, A.indices, A.data), (~free).astype(np.uint8)
         self._module = module
-        self._kernel = module.Multigrid(matrix, fixed, places, degree, RATIO, STRENGTH, axes is not None)
+        self._kernel = module.Multigrid(matrix, fixed, places, degree, RATIO, STRENGTH, thin)
         lines = self._kernel.labels()
         if axes is not None and linear is not None and len(lines):
             plate = plate_level(points, free, axes, lines, linear)

@@ -12,6 +12,9 @@ from kratos_lite.typing import Array, Mask, Rows
 FLAT = 0.1
 """Thickness of a body to its width, up to which it bends like a plate."""
 
+VERY_THIN = 0.004
+"""The same from which single precision no longer holds energies of bending beside those of shear."""
+
 
 @record(eq=False)
 class PlateLevel:
@@ -94,6 +97,12 @@ def plate_axes(points: Array, free: Mask) -> Array | None:
     moments, axes = np.linalg.eigh(X.T @ X)
     held = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
     return None if moments[0] > FLAT**2 * moments[1] or held > 0.5 else axes
+
+
+def is_very_thin(points: Array, axes: Array) -> bool:
+    """Return whether bending takes so little energy that multigrid has to work with the matrix as it is."""
+    thickness, width, length = np.ptp(points @ axes, axis=0)
+    return bool(thickness < VERY_THIN * min(width, length))
 
 
 def bending_modes(points: Array, axes: Array) -> Array:
