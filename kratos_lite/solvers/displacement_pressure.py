@@ -60,7 +60,7 @@ class DisplacementPressure:
         self._K, self._fixed = K, ~free
         self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
-        inverse = block_inverse(K.A, free, K.D, K.kept)
+        inverse = block_inverse(K.A, free, points, K.D, K.kept)
         size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
