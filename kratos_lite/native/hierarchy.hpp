@@ -11,7 +11,7 @@ struct Settings {
     int degree = 2;         // of the Chebyshev smoother
     float ratio = 12;       // largest to smallest eigenvalue that it smooths
     double theta = 0;       // links weaker than theta sqrt(|A_ii| |A_jj|) do not aggregate
-    int thin = 0;           // 1 for a thin flat body, 2 for a very thin one: see Level
+    int thin = 0;           // 1 for a thin body, 2 for a very thin flat one: see Level
     int64_t full = 300;     // unknowns of the coarsest level
 };
 
@@ -44,11 +44,13 @@ public:
         add_nodal(g, data, fixed, std::move(points));
     }
 
-    // A level of nodes of six unknowns below the finest one, P from it, and aggregates below that,
+    // A level of nodes of six unknowns below the finest one of a thin body, P from it, and aggregates below that,
     // where overlapping parts smooth.
     void coarsen_plate(const double* data, Prolongator P, int32_t nodes, Doubles B) {
         Level& fine = levels.back();
         fine.clusters.exact = {};
+        fine.thin = true;
+        settings.thin = std::max(settings.thin, 1);
         transfers.emplace_back();
         Transfer& t = transfers.back();
         t.P = std::move(P);

@@ -2,7 +2,7 @@
 
 In thin flat bodies the modes of constant curvature join them, without which plates bend slowly.
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid), or, in thin
-flat bodies, one of the lines across the thickness there.
+bodies, one of the lines across the thickness there.
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
 On stretched meshes the kernels smooth lines or small planes of close nodes exactly and aggregate them
 whole; in large planes, and where nodes have few close ones, they aggregate close nodes alone.
@@ -99,8 +99,8 @@ class Compiled:
         self._module = module
         self._kernel = module.Multigrid(matrix, fixed, places, degree, RATIO, STRENGTH, thin)
         lines = self._kernel.labels()
-        if axes is not None and linear is not None and len(lines):
-            plate = plate_level(points, free, axes, lines, linear)
+        plate = plate_level(points, free, axes, lines, linear) if linear is not None and len(lines) else None
+        if plate is not None:
             self._kernel.aggregate_plate(plate.indptr, plate.indices, plate.blocks, plate.modes)
         else:
             self._aggregate(fixed, points, places, linear, axes)
