@@ -213,7 +213,7 @@ def _cell(row: Row | None) -> str:
     if row is None:
         return ""
     if "failed" in row:
-        return row["failed"].removeprefix("failed: ")
+        return str(row["failed"]).removeprefix("failed: ").strip()
     iterations = f" ({row['iterations']})" if row["iterations"] else ""
     if not _reached(row):
         return f"residual {row['residual']:.0e}{iterations}"

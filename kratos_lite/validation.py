@@ -126,11 +126,13 @@ def whole_numbers(
         array = np.asarray(value)
     except (TypeError, ValueError):
         array = np.asarray(None)
-    axes = "" if shape is None else f" of shape ({_axes(shape)})"
-    if array.dtype.kind not in "iu" and (array.size or array.dtype.kind != "f"):
-        raise error(f"{what} must be whole numbers{axes}; got {short(value)}")
-    if shape is not None and not _has(array.shape, shape):
-        raise error(f"{what} must be whole numbers{axes}; got shape {array.shape}")
+    unlike = array.dtype.kind not in "iu" and (array.size or array.dtype.kind != "f")
+    if unlike or (shape is not None and not _has(array.shape, shape)):
+        axes = "" if shape is None else f" of shape ({_axes(shape)})"
+        found = short(value) if unlike else f"shape {array.shape}"
+        raise error(f"{what} must be whole numbers{axes}; got {found}")
+    if size is None and array.dtype == dtype:
+        return array
     low, high = (int(array.min()), int(array.max())) if array.size else (0, -1)
     if size is not None and not 0 <= low <= high + 1 <= size:
         raise error(f"{what} must lie in 0 … {size - 1}; got {low} … {high}")

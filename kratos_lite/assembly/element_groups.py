@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from kratos_lite.elements.exact_rules import (
     interpolations,
 )
 from kratos_lite.elements.formulations import NON_LOCKING, element_of
-from kratos_lite.elements.tables import StrainTables, tabulate
+from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
@@ -27,6 +27,9 @@ from kratos_lite.quadrature import Rule, by_order
 from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
+
+if TYPE_CHECKING:
+    from kratos_lite.elements.strain_tables import StrainTables
 
 CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""

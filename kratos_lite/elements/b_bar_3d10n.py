@@ -8,7 +8,7 @@ import numpy as np
 
 from kratos_lite.elements import arguments
 from kratos_lite.elements.b_bar import BBar
-from kratos_lite.elements.tables import StrainTables
+from kratos_lite.elements.strain_tables import StrainTables
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.quadrature import Rule, tetrahedron
 from kratos_lite.shapes.tetrahedra import Tetrahedron10

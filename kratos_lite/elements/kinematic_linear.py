@@ -28,7 +28,7 @@ from kratos_lite.elements.overridden_steps import (
     strain_of,
     stress_of,
 )
-from kratos_lite.elements.tables import StrainTables, lame_constants, reference_products, tabulate
+from kratos_lite.elements.tables import lame_constants, reference_products, tabulate
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import Registry
@@ -37,6 +37,8 @@ from kratos_lite.validation import short
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from kratos_lite.elements.strain_tables import StrainTables
 
 ELEMENTS: Registry[type[KinematicLinear]] = Registry("element")
 """Every element by its class name and by the names that mean the same in files."""

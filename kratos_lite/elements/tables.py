@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from kratos_lite.quadrature import Rule
@@ -13,24 +11,6 @@ from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array
 
 NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
-
-
-class StrainTables(NamedTuple):
-    """What kernels need to add to the strain of the displacements; see `KinematicLinear.strain_tables`.
-
-    Attributes
-    ----------
-    center : (n, 3), dN at the center.
-    functions : (g, 6), the monomials of enhanced modes at the Gauss points; or of a projected dilatation that
-        is linear in x, y, z, N less N at the center, (g, n), and (g, 0) of a mean one.
-    C : (6, 6) in Pa, which the enhanced modes depend on; None of a dilatation.
-    share : of the dilatation that is projected.
-    """
-
-    center: Array
-    functions: Array
-    C: Array | None
-    share: float
 
 
 @remembered

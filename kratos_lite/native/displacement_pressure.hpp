@@ -100,14 +100,12 @@ private:
     }
 
     void row(int64_t e) {
-        float even = 0, odd = 0;
+        float sum[4] = {};
         int32_t k = indptr[e];
-        for (; k + 1 < indptr[e + 1]; k += 2) {
-            even += data[k] * p[indices[k]];
-            odd += data[k + 1] * p[indices[k + 1]];
-        }
-        if (k < indptr[e + 1]) even += data[k] * p[indices[k]];
-        Sp[e] = even + odd;
+        for (; k + 3 < indptr[e + 1]; k += 4)
+            for (int i = 0; i < 4; ++i) sum[i] += data[k + i] * p[indices[k + i]];
+        for (; k < indptr[e + 1]; ++k) sum[0] += data[k] * p[indices[k]];
+        Sp[e] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
     }
 
     void row_of_blocks(int64_t e) {

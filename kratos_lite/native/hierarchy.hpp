@@ -11,7 +11,7 @@ struct Settings {
     int degree = 2;         // of the Chebyshev smoother
     float ratio = 12;       // largest to smallest eigenvalue that it smooths
     double theta = 0;       // links weaker than theta sqrt(|A_ii| |A_jj|) do not aggregate
-    bool thin = false;      // a thin flat body: see Level
+    int thin = 0;           // 1 for a thin body, 2 for a very thin flat one: see Level
     int64_t full = 300;     // unknowns of the coarsest level
 };
 
@@ -25,7 +25,7 @@ public:
                    Doubles points) {
         add_level();
         X = std::move(points);
-        inverse = levels.back().set_matrix(g, data, fixed, 3);
+        inverse = levels.back().set_matrix(g, data, fixed, 3, settings.thin > 1);
         levels.back().cluster(data, fixed, X.data(), settings.theta, FAR);
         levels.back().largest = largest_eigenvalue(levels.back());
     }
@@ -52,11 +52,13 @@ public:
         add_nodal(g, data, fixed, std::move(points));
     }
 
-    // A level of nodes of six unknowns below the finest one, P from it, and aggregates below that,
+    // A level of nodes of six unknowns below the finest one of a thin body, P from it, and aggregates below that,
     // where overlapping parts smooth.
     void coarsen_plate(const double* data, Prolongator P, int32_t nodes, Doubles B) {
         Level& fine = levels.back();
         fine.clusters.exact = {};
+        fine.thin = true;
+        settings.thin = std::max(settings.thin, 1);
         transfers.emplace_back();
         Transfer& t = transfers.back();
         t.P = std::move(P);
@@ -82,7 +84,7 @@ public:
             CoarseMatrix next;
             bool planes = !fine.clusters.near.empty();
             const Doubles kept = planes || sets > 1 ? B : Doubles();
-            const auto is_large = [&](double share) { return next.data.size() > share * fine.A.size(); };
+            const auto is_large = [&](double share) { return next.data.size() > share * fine.numbers(); };
             int64_t count = add_transfer(graph, data, fixed, B, R, next);
             if (count && planes && is_large(LARGEST_PLANES)) {
                 transfers.pop_back();
@@ -100,8 +102,9 @@ public:
             fine.clusters.exact = {};
             fine.clusters.near = {};
             if (count == 0) break;
+            patched = patched || shears(graph, data, fixed, static_cast<int32_t>(count / sets));
             if (patched) {
-                fine.patches = Patches(graph, data, MODES, fixed, aggregates, static_cast<int32_t>(count / sets));
+                fine.patches = Patches(graph, data, fine.b, fixed, aggregates, static_cast<int32_t>(count / sets));
                 if (!fine.patches.empty()) fine.largest = largest_eigenvalue(fine);
             }
             matrix = std::move(next);
@@ -139,8 +142,9 @@ public:
 
     double complexity() const {
         double all = 0;
-        for (const Level& level : levels) all += static_cast<double>(level.A.size());
-        return all / static_cast<double>(levels.front().A.size());
+        for (const Level& level : levels) all += static_cast<double>(level.numbers());
+        const Level& finest = levels[levels.front().elements && levels.size() > 1];  // that has a matrix
+        return finest.numbers() ? all / static_cast<double>(finest.numbers()) : 0.0;
     }
 
     int64_t bytes() const {
@@ -154,9 +158,16 @@ public:
     std::deque<Transfer> transfers;
 
 private:
+    // Does the smoothing of lines leave fields without shear in parts of this level, of a plate's nodes?
+    bool shears(const Graph& g, const double* data, const Bytes& fixed, int32_t count) const {
+        const Level& fine = levels.back();
+        if (sets == 1 || fine.b != 3 || fine.clusters.empty()) return false;
+        return least_of_lines(g, data, 3, fixed, fine.clusters, aggregates, count) < LEAST_OF_LINES;
+    }
+
     Level& add_level() {
         levels.emplace_back();
-        levels.back().thin = settings.thin;
+        levels.back().thin = settings.thin > 0;
         return levels.back();
     }
 
@@ -177,12 +188,17 @@ private:
             return;
         }
         Level& coarse = levels[l + 1];
-        level.smooth(settings.degree, settings.ratio, true);
+        smooth(level, true);
         level.residual(level.y);
         transfers[l].restrict_to(level, level.y, coarse, coarse.c);
         descend(l + 1);
         transfers[l].prolong(coarse.x, level, level.x);
-        level.smooth(settings.degree, settings.ratio, false);
+        smooth(level, false);
+    }
+
+    void smooth(Level& level, bool from_zero) const {
+        const bool more = settings.thin > 1 && level.b == MODES;  // 3 times as long waves have 81 times less energy
+        level.smooth(more ? 2 * settings.degree : settings.degree, more ? 40 : settings.ratio, from_zero);
     }
 
     void solve_coarsest(Level& level) {

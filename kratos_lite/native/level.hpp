@@ -6,8 +6,8 @@
 
 namespace kl {
 
-// Some rows of s = c - A x, summed in the precision of Sum, then d = alpha d + beta D^-1 s and next = x + d; or, without D, next = s alone.
-// Blocks are column-major.
+// Some rows of s = c - A x, summed in the precision of Sum, then d = alpha d + beta D^-1 s and next = x + d;
+// or, without D, next = s alone.  Blocks are column-major.
 template <int b, class Sum>
 KL_INLINE void step_rows(const Graph& g, const float* A, const float* Dinv, const float* c, const float* from,
                          float* d, float* next, float alpha, float beta, int64_t first, int64_t last) {
@@ -40,6 +40,28 @@ KL_INLINE void step_rows(const Graph& g, const float* A, const float* Dinv, cons
     }
 }
 
+// out = c - A x of some rows with the row-major blocks of the matrix itself; x is zero at held components,
+// where out becomes zero.
+KL_INLINE void residual_rows(const Graph& g, const double* A, const uint8_t* held, const float* c, const float* x,
+                             float* out, int64_t first, int64_t last) {
+    typedef vec<double, 4> Vec;
+    for (int64_t i = first; i < last; ++i) {
+        Vec sums[3] = {};
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+            const double* a = A + int64_t{k} * 9;
+            const float* v = x + int64_t{g.indices[k]} * 3;
+            const Vec low = {v[0], v[1], v[2], 0}, high = {0, v[0], v[1], v[2]};
+            sums[0] += *reinterpret_cast<const Vec*>(a) * low;
+            sums[1] += *reinterpret_cast<const Vec*>(a + 3) * low;
+            sums[2] += *reinterpret_cast<const Vec*>(a + 5) * high;
+        }
+        for (int r = 0; r < 3; ++r) {
+            const double sum = (sums[r][0] + sums[r][1]) + (sums[r][2] + sums[r][3]);
+            out[3 * i + r] = held[3 * i + r] ? 0.0f : static_cast<float>(c[3 * i + r] - sum);
+        }
+    }
+}
+
 class Level {
 public:
     int b = 3;
@@ -47,16 +69,18 @@ public:
     Graph graph{};
     Ints own_indptr, own_indices;  // where the pattern is not borrowed
     Floats A, Dinv;
-    const MatrixFree* elements = nullptr;  // in place of A, with the components that are fixed
-    Bytes held;
+    const MatrixFree* elements = nullptr;  // in place of A
     float largest = 0;  // eigenvalue of D^-1 A, from above
     Floats x, y, d, c;
     Clusters clusters;  // where D is more than the diagonal blocks
     Patches patches;    // what smooths in place of D, if any
     bool thin = false;  // energies so unlike that sums take double precision
+    const double* exact = nullptr;  // in place of A, where energies are still more unlike
+    Bytes held;                     // fixed components, which neither of them leaves out
 
     int64_t size() const { return n * b; }
     int64_t grain() const { return b == 3 ? 1024 : 128; }
+    int64_t numbers() const { return elements ? 0 : int64_t{graph.indptr[n]} * b * b; }
     int64_t bytes() const {
         return 4 * static_cast<int64_t>(A.size() + Dinv.size() + 4 * x.size()) + clusters.bytes() + patches.bytes() +
                (elements ? elements->bytes() : 0);
@@ -79,11 +103,17 @@ public:
 
     // Make a float copy of the blocks with rows and columns of fixed components uncoupled, and the
     // inverse of the diagonal blocks, which is also returned in double.
-    Doubles set_matrix(const Graph& g, const double* data, const Bytes& fixed, int block) {
+    Doubles set_matrix(const Graph& g, const double* data, const Bytes& fixed, int block,
+                       bool in_double = false) {
         b = block;
         n = g.rows;
         graph = g;
-        A.resize(static_cast<size_t>(g.indptr[n]) * b * b + 8);
+        if (in_double) {
+            exact = data;
+            held = fixed;
+        } else {
+            A.resize(numbers() + 8);
+        }
         Dinv.assign(static_cast<size_t>(n) * b * b + 8, 0.0f);
         Doubles inverse(static_cast<size_t>(n) * b * b);
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
@@ -116,8 +146,13 @@ public:
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
         if (elements) return step_elements(from, to, alpha, beta, smooth);
-        const float* inverse = smooth && clusters.empty() && patches.empty() ? Dinv.data() : nullptr;
+        const bool single = clusters.empty() && patches.empty();
+        const float* inverse = smooth && single ? Dinv.data() : nullptr;
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
+            if (exact)
+                return dispatch<double>([&](auto) KL_INLINE_LAMBDA {
+                    residual_rows(graph, exact, held.data(), c.data(), from, to, first, last);
+                });
             b == 3 ? step<3>(inverse, from, to, alpha, beta, first, last)
                    : step<6>(inverse, from, to, alpha, beta, first, last);
         });
@@ -126,6 +161,8 @@ public:
             patches.step(b, to, from, d.data(), to, alpha, beta);
         else if (!clusters.empty())
             clusters.step(b, to, from, d.data(), to, alpha, beta);
+        else if (exact)
+            add_step(from, to, alpha, beta);
     }
 
     // d = beta D^-1 c and x = d: a first step from zero needs no product.
@@ -194,6 +231,21 @@ private:
         });
     }
 
+    // The rest of a step with the diagonal blocks: `to` is the residual and becomes from + d.
+    void add_step(const float* from, float* to, float alpha, float beta) {
+        parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
+            for (int64_t i = first; i < last; ++i) {
+                float z[MODES] = {};
+                for (int j = 0; j < b; ++j)
+                    for (int r = 0; r < b; ++r) z[r] += Dinv[(i * b + j) * b + r] * to[i * b + j];
+                for (int r = 0; r < b; ++r) {
+                    d[i * b + r] = alpha * d[i * b + r] + beta * z[r];
+                    to[i * b + r] = from[i * b + r] + d[i * b + r];
+                }
+            }
+        });
+    }
+
     void advance(float alpha, float beta) {
         step(x.data(), y.data(), alpha, beta, true);
         x.swap(y);
@@ -212,7 +264,8 @@ private:
                         block[r * B + c] = decoupled && !(i == j && r == c) ? 0.0 : data[(k * int64_t{B} + r) * B + c];
                     }
                 for (int r = 0; r < B; ++r)
-                    for (int c = 0; c < B; ++c) A[(k * int64_t{B} + c) * B + r] = static_cast<float>(block[r * B + c]);
+                    for (int c = 0; c < B && !exact; ++c)
+                        A[(k * int64_t{B} + c) * B + r] = static_cast<float>(block[r * B + c]);
                 if (i != j) continue;
                 invert<B>(block, &inverse[i * B * B]);
                 for (int r = 0; r < B; ++r)

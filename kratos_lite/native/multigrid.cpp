@@ -349,12 +349,12 @@ PYBIND11_MODULE(_multigrid, m) {
         .def("solve", &Pressures::solve);
     py::class_<Multigrid>(m, "Multigrid")
         .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
-                         double theta, bool thin) {
+                         double theta, int thin) {
             return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta, thin});
         }))
         .def(py::init([](std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, int degree,
                          float ratio, double theta) {
-            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta, false});
+            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta});
         }))
         .def("aggregate", &Multigrid::aggregate, py::arg("modes"), py::arg("matrix") = py::none())
         .def("aggregate_plate", &Multigrid::aggregate_plate)

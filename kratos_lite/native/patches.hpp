@@ -11,7 +11,9 @@
 
 namespace kl {
 
-constexpr double LARGEST_PATCHES = 6;  // blocks of all factors to those of the matrix
+constexpr double LARGEST_PATCHES = 6;     // blocks of all factors to those of the matrix
+constexpr int32_t SAMPLES = 8;            // parts that show whether lines smooth well
+constexpr double LEAST_OF_LINES = 0.005;  // eigenvalue there from which on they do
 
 class Patches {
 public:
@@ -79,6 +81,8 @@ public:
         });
     }
 
+    bool holds(int64_t i) const { return starts[i + 1] > starts[i]; }
+
 private:
     // The nodes of each aggregate and their neighbors.
     static void with_neighbors(const Graph& g, const Ints& of, int32_t count, Ints& rows, Ints& nodes) {
@@ -98,5 +102,51 @@ private:
     Ints starts, places;  // copies of each node
     mutable Floats z;
 };
+
+// y = D x in some parts, where D are the blocks of A within lines, without fixed components.
+inline void multiply_lines(const Graph& g, const double* A, int b, const Bytes& fixed, const Clusters& lines,
+                           const Patches& parts, const Floats& x, Floats& y) {
+    parallel_ranges(g.rows, 512, [&](int64_t first, int64_t last) {
+        for (int64_t i = first; i < last; ++i) {
+            std::fill_n(&y[i * b], b, 0.0f);
+            for (int32_t k = g.indptr[i]; parts.holds(i) && k < g.indptr[i + 1]; ++k) {
+                const int64_t j = g.indices[k];
+                if (lines.of[j] != lines.of[i]) continue;
+                for (int e = 0; e < b * b; ++e) {
+                    const int64_t row = i * b + e / b, column = j * b + e % b;
+                    if (!fixed[row] && !fixed[column])
+                        y[row] += static_cast<float>(A[int64_t{k} * b * b + e] * x[column]);
+                }
+            }
+        }
+    });
+}
+
+// About the smallest eigenvalue of D^-1 A on a few aggregates with their neighbors, where D are the blocks of
+// lines: what smoothing of lines leaves there.  By inverse iteration.
+inline double least_of_lines(const Graph& g, const double* A, int b, const Bytes& fixed, const Clusters& lines,
+                             const Ints& of, int32_t count) {
+    Ints some(of.size(), -1);
+    const int32_t each = std::max(1, count / SAMPLES), samples = std::min(SAMPLES, count / each);
+    for (size_t i = 0; i < of.size(); ++i)
+        if (of[i] >= 0 && of[i] % each == each / 2 && of[i] / each < samples) some[i] = of[i] / each;
+    const Patches parts(g, A, b, fixed, some, samples);
+    if (parts.empty()) return 1;
+    const int64_t size = g.rows * b;
+    Floats u(size + 8), v(size + 8), d(size + 8);
+    for (int64_t i = 0; i < size; ++i) v[i] = static_cast<float>(i * 7919 % 101) / 50 - 1;
+    double least = 1;
+    for (int pass = 0; pass < 8; ++pass) {
+        const double before = dot(u.data(), v.data(), size);  // of v = A^-1 u: its energy
+        multiply_lines(g, A, b, fixed, lines, parts, v, u);
+        const double norm = dot(u.data(), v.data(), size);
+        if (!(norm > 0)) break;
+        if (pass) least = before / norm;
+        const float scale = static_cast<float>(1 / std::sqrt(norm));
+        for_each(size, [&](int64_t i) { u[i] *= scale; });
+        parts.step(b, u.data(), nullptr, d.data(), v.data(), 0, 1);
+    }
+    return least;
+}
 
 }  // namespace kl

@@ -12,26 +12,29 @@ from kratos_lite.typing import Array, Ints, Mask
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array
 
-STRONG = 0.45
+STRONG = 0.4
 """Nodes are strongly coupled where |A_ij| exceeds this share of sqrt(|A_ii| |A_jj|)."""
+NEAR = 3.0
+"""Distance of such nodes to that of the nearest ones at most: quadratic cells couple others as strongly."""
 LONGEST = 40
 """Nodes of the largest group; larger ones are taken as single nodes."""
 
 
-def block_inverse(A: BlockMatrix, free: Mask, D: bsr_array, factor: Array) -> bsr_array:
+def block_inverse(A: BlockMatrix, free: Mask, points: Array, D: bsr_array, factor: Array) -> bsr_array:
     """Return the inverse (3n, 3n) of A - Dᵀ factor D within each group on its free components, else 0.
 
     Parameters
     ----------
     A : symmetric, positive definite on the free components, less Dᵀ factor D, too.
     free : (3n,).
+    points : (n, 3) m.
     D : (p, 3n) sparse, of R x 3 blocks; nodes that share a row share a block of A.
     factor : (p,).
     """
     from scipy.sparse import bsr_array
 
     rows, columns, n = A.rows(), A.indices, len(A.indptr) - 1
-    group, place = _groups(A, rows)
+    group, place = _groups(A, rows, points)
     within = np.flatnonzero(group[rows] == group[columns])
     own = rows[within], columns[within], A.data[within]
     square = _square(D, factor, group)
@@ -73,7 +76,16 @@ def _square(D: bsr_array, factor: Array, group: Ints) -> bsr_array:
     return B.T @ B
 
 
-def _groups(A: BlockMatrix, rows: Ints) -> tuple[Ints, Ints]:
+def _near(A: BlockMatrix, rows: Ints, points: Array) -> Mask:
+    """Return which entries couple nodes no farther than `NEAR` times the nearest of both, (nnz,)."""
+    apart = np.linalg.norm(points[rows] - points[A.indices], axis=1)
+    apart[rows == A.indices] = np.inf
+    starts = np.minimum(A.indptr[:-1], len(apart) - 1)
+    nearest: Array = np.minimum.reduceat(apart, starts)
+    return np.asarray(apart <= NEAR * np.minimum(nearest[rows], nearest[A.indices]))
+
+
+def _groups(A: BlockMatrix, rows: Ints, points: Array) -> tuple[Ints, Ints]:
     """Return the group of each node, and its place in the group."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -84,6 +96,7 @@ def _groups(A: BlockMatrix, rows: Ints) -> tuple[Ints, Ints]:
     on = A.diagonal_blocks()
     root[A.indices[on]] = np.sqrt(size[on])
     strong = size > STRONG * root[rows] * root[A.indices]
+    strong &= _near(A, rows, points)
     graph = csr_array((np.ones(strong.sum()), (rows[strong], A.indices[strong])), shape=(n, n))
     group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
     large = np.bincount(group)[group] > LONGEST

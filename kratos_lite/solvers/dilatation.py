@@ -14,14 +14,15 @@ import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.records import record, replace
+from kratos_lite.solvers.pressure_means import PressureMeans, pressure_means
 from kratos_lite.typing import Array, Progress
 
 if TYPE_CHECKING:
@@ -44,8 +45,7 @@ class SplitMatrix:
     bulk : (p,) Pa, κ.
     kept : (p,) Pa, λ in A.
     modulus : (p,) Pa, λ + 2μ in A.
-    means : (p, n) sparse, the means at corner nodes of pressures, divided by the root of λ + 2μ of the
-        stiffest element there, λ = 0 in those that are split.
+    means : of the pressures, with λ + 2μ of the stiffest element at a node, λ = 0 in those that are split.
     groups : the elements, with materials as in A.
     """
 
@@ -54,7 +54,7 @@ class SplitMatrix:
     bulk: Array
     kept: Array
     modulus: Array
-    means: csr_array
+    means: PressureMeans
     groups: list[ElementGroup]
     is_split = True
 
@@ -98,7 +98,7 @@ def assemble(
         if not is_split(group):
             continue
         bulk, shear = _moduli(group.material.C)
-        part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, _dilatations(points, group))
+        part = _Part(group, bulk - (KEPT + 2 / 3) * shear, shear, *_dilatations(points, group))
         parts[number] = part
         left[number] = _softened(group, part.bulk)
         soft[number] = _softened(left[number], KEPT * shear)
@@ -114,7 +114,7 @@ def assemble(
         np.concatenate([np.full(part.count, getattr(part, name)) for part in found])
         for name in ("bulk", "shear")
     )
-    means = _means(points, found, _stiffest(len(points), soft))
+    means = pressure_means(points, found, _stiffest(len(points), soft))
     D = _assembled(len(points), found)
     return SplitMatrix(K, D, taken, KEPT * shears, (KEPT + 2) * shears, means, left)
 
@@ -131,12 +131,13 @@ def is_split(group: ElementGroup) -> bool:
 
 @record(eq=False)
 class _Part:
-    """A group, the bulk modulus taken off it, its shear modulus, and its dilatations (m, r, 3k)."""
+    """A group, the bulk modulus taken off it, its shear modulus; its dilatations and their polynomials."""
 
     group: ElementGroup
     bulk: float
     shear: float
     D: Array
+    polynomials: Array
 
     @property
     def count(self) -> int:
@@ -160,26 +161,28 @@ class _Part:
             pass
 
 
-def _dilatations(points: Array, group: ElementGroup) -> Array:
-    """Return the dilatations of elements, (m, r, 3k): their integrals with r orthonormal polynomials."""
-    tables = group.strain_tables()
+def _dilatations(points: Array, group: ElementGroup) -> tuple[Array, Array]:
+    """Return integrals of dilatations with r orthonormal polynomials (m, r, 3k), and these (m, r, r)."""
+    tables, (_, dN) = group.strain_tables(), tabulate(group.element.shape, group.rule)
     assert tables is not None
     linear = tables.C is None and tables.functions.shape[1] > 0
-    found = []
+    derivatives, weights = np.swapaxes(dN, 1, 2).reshape(-1, dN.shape[1]), group.rule.weights
+    found, polynomials = [], []
     for chunk in group.chunks():
         elements = group.at(points, chunk)
-        dV, gradients = elements._gauss
-        rows, weighted = np.swapaxes(gradients, -1, -2).reshape(*dV.shape, -1), dV[..., None]
-        volume = weighted.sum(axis=-2)[..., None]
+        J = elements._jacobian(dN)
+        normals = cofactors(J)
+        dV = (J[..., 0] * normals[..., 0, :]).sum(axis=-1) * weights
+        P = np.ones((*dV.shape, 1))
         if linear:
-            P = np.concatenate(
-                [np.ones_like(weighted), tables.functions @ elements.X / np.cbrt(volume)], axis=-1
-            )
-            moments = np.swapaxes(P * weighted, -1, -2)
-            found.append(np.linalg.solve(np.linalg.cholesky(moments @ P), moments @ rows))
-        else:
-            found.append(np.swapaxes(weighted, -1, -2) @ rows / np.sqrt(volume))
-    return np.concatenate(found)
+            length = np.cbrt(dV.sum(axis=1))[:, None, None]
+            P = np.concatenate([P, tables.functions @ elements.X / length], axis=-1)
+        polynomials.append(np.linalg.inv(np.linalg.cholesky(np.swapaxes(P * dV[..., None], 1, 2) @ P)))
+        m, r = polynomials[-1].shape[:2]
+        rows = np.einsum("mgr,mgji->mrigj", P, normals * weights[:, None, None]).reshape(m, 3 * r, -1)
+        integrals = np.swapaxes((rows @ derivatives).reshape(m, r, 3, -1), 2, 3).reshape(m, r, -1)
+        found.append(polynomials[-1] @ integrals)
+    return np.concatenate(found), np.concatenate(polynomials)
 
 
 def _moduli(C: Array) -> tuple[float, float]:
@@ -225,24 +228,3 @@ def _assembled(n_nodes: int, parts: Sequence[_Part]) -> bsr_array:
     starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
     data = np.concatenate(blocks), np.concatenate(columns).astype(np.int32), starts
     return bsr_array(data, shape=(R * (len(starts) - 1), 3 * n_nodes))
-
-
-def _means(points: Array, parts: Sequence[_Part], stiffest: Array) -> csr_array:
-    """Return the means (p, n) at corner nodes; see `SplitMatrix`.
-
-    The first polynomial of an element is 1 / √volume, and a corner has its share of the volume.
-    """
-    from scipy.sparse import csr_array
-
-    nodes, values, counts, mass = [], [], [], np.zeros(len(points))
-    for part in parts:
-        corners = part.group.nodes[:, : part.group.element.shape.corners]
-        k, volume = corners.shape[1], volumes(points, part.group).sum(axis=1)
-        mass += np.bincount(corners.ravel(), np.repeat(volume / k, k), len(points))
-        nodes.append(corners.ravel())
-        values.append(np.repeat(np.sqrt(volume) / k, k))
-        counts.append(np.tile(k * (np.arange(part.D.shape[1]) == 0), len(corners)))
-    at = np.concatenate(nodes)
-    starts = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
-    data = np.concatenate(values) / np.sqrt(mass * stiffest)[at]
-    return csr_array((data, at, starts), shape=(len(starts) - 1, len(points)))

@@ -28,7 +28,7 @@ REPLACED_PIVOTS = 14
 
 FEW, MANY = 1000, 10_000
 """Up to this many unknowns SuperLU always takes less time than 30 iterations; above the other, never."""
-QUICK = 1e9
+QUICK = 2e9
 """Unknowns times the square of their band up to which it does: some 5,000 in one layer of cells."""
 
 

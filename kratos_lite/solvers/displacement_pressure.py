@@ -8,7 +8,7 @@ With p = κ D u the equations (A + Dᵀ κ D) u = b are
 which stay well-conditioned for ν → ½.  Minimal residuals (GMRES) solve them.  Each step takes
 p = -(S⁻¹ + λ) r_p, with λ in A, and one multigrid cycle for A u = r_u - Dᵀ p.  With A₀ = A - Dᵀ λ D,
 
-    S = D blocks(A₀)⁻¹ Dᵀ + (means at corner nodes)² / 2μ + 1/κ  ≈  D A₀⁻¹ Dᵀ + 1/κ:
+    S = D blocks(A₀)⁻¹ Dᵀ + (means around corners)² / 2μ + 1/κ  ≈  D A₀⁻¹ Dᵀ + 1/κ:
 
 the second term holds for smooth pressures, the first one for those that change sign from element to element.
 Some of these hardly act on the nodes (checkerboards): no element needs to be stable.  For the others
@@ -44,7 +44,7 @@ MAX_ITERATIONS = 400
 """Iterations after which it does not converge."""
 DEGREE = 3
 """Degree of the smoother: an iteration more takes longer than a better cycle."""
-INNER, INNER_MAX = 0.06, 120
+INNER, INNER_MAX = 0.1, 120
 """Share of the energy at which a solution with S ends, and its most iterations."""
 
 
@@ -60,7 +60,7 @@ class DisplacementPressure:
         self._K, self._fixed = K, ~free
         self._cycle = multigrid.multigrid(K.A, free, points, linear, DEGREE)
         self.levels: list[int] = self._cycle.levels
-        inverse = block_inverse(K.A, free, K.D, K.kept)
+        inverse = block_inverse(K.A, free, points, K.D, K.kept)
         size = np.sqrt(np.concatenate([inverse.diagonal(), K.modulus]))
         self._weight = size  # residuals are measured by the energy that they stand for
         self._inverse_weight = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
@@ -217,7 +217,8 @@ class _Schur:
     def __init__(self, K: SplitMatrix, inverse: bsr_array, loose: Mask) -> None:
         from scipy.sparse import diags_array
 
-        means = K.means @ diags_array(loose * 1.0)  # around held nodes checkerboards have means, too
+        free = loose[K.means.ends].any(axis=1)  # around held nodes checkerboards have means, too
+        means = K.means.matrix @ diags_array(np.where(free, 1.0, 0.0))
         S = (K.D @ inverse @ K.D.T).tocsr() + means @ means.T + diags_array(1 / K.bulk)
         self.scale = 1 / np.sqrt(S.diagonal())
         scale = diags_array(self.scale)

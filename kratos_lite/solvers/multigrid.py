@@ -2,7 +2,7 @@
 
 In thin flat bodies the modes of constant curvature join them, without which plates bend slowly.
 Quadratic elements get a level of linear elements on their corner nodes first (p-multigrid), or, in thin
-flat bodies, one of the lines across the thickness there.
+bodies, one of the lines across the thickness there.
 The compiled kernels do all of it; without them pyamg makes the hierarchy.
 On stretched meshes the kernels smooth lines or small planes of close nodes exactly and aggregate them
 whole; in large planes, and where nodes have few close ones, they aggregate close nodes alone.
@@ -24,7 +24,7 @@ from kratos_lite.solvers.blas import one_thread
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share, conjugate_gradients
-from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
+from kratos_lite.solvers.plate_level import bending_modes, is_very_thin, plate_axes, plate_level
 from kratos_lite.typing import Array, Mask, Progress
 
 GoOn = Callable[[float], bool]
@@ -101,16 +101,17 @@ class Compiled:
         degree: int = DEGREE,
     ) -> None:
         axes = plate_axes(points, free)
+        thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
         self._module, fixed = module, (~free).astype(np.uint8)
         settings = fixed, places, degree, RATIO, STRENGTH
         if isinstance(A, MatrixFree):
             self._kernel = module.Multigrid(A.product, *settings)
         else:
-            self._kernel = module.Multigrid(self._matrix(A), *settings, axes is not None)
+            self._kernel = module.Multigrid(self._matrix(A), *settings, thin)
         lines = self._kernel.labels()
-        if axes is not None and linear is not None and len(lines):
-            plate = plate_level(points, free, axes, lines, linear)
+        plate = plate_level(points, free, axes, lines, linear) if linear is not None and len(lines) else None
+        if plate is not None:
             self._kernel.aggregate_plate(plate.indptr, plate.indices, plate.blocks, plate.modes)
         else:
             self._aggregate(A, fixed, points, places, linear, axes)

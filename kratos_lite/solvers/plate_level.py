@@ -1,4 +1,4 @@
-"""The coarse level of a thin flat body: six unknowns of each line of nodes across its thickness."""
+"""The coarse level of a thin body: six unknowns of each line of nodes across its thickness."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ import numpy as np
 from kratos_lite.records import record
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.typing import Array, Mask, Rows
+from kratos_lite.typing import Array, Ints, Mask, Rows
 
 FLAT = 0.1
 """Thickness of a body to its width, up to which it bends like a plate."""
 
+VERY_THIN = 0.004
+"""The same from which single precision no longer holds energies of bending beside those of shear."""
+
 
 @record(eq=False)
 class PlateLevel:
-    """Lines of nodes as the coarse level of a thin flat body.
+    """Lines of nodes as the coarse level of a thin body, flat or curved.
 
     A line has the displacement of its center, two slopes and a stretch, which give the displacements
     u - z s1 e1 - z s2 e2 + z e n of its nodes at heights z.  A node between lines takes the mean of theirs
@@ -25,7 +28,7 @@ class PlateLevel:
     Attributes
     ----------
     indptr, indices, blocks : interpolation from m lines to n nodes in rows, blocks (k, 3, 6).
-    modes : (6m, 12) rigid modes, those of constant curvature, and zeros.
+    modes : (6m, 12) rigid modes, and those of constant curvature or quadratic along the normals.
     """
 
     indptr: Rows
@@ -34,52 +37,107 @@ class PlateLevel:
     modes: Array
 
 
-def plate_level(points: Array, free: Mask, axes: Array, labels: Rows, linear: LinearLevel) -> PlateLevel:
-    """Return the lines of the corner nodes of a thin flat body, with the interpolation from them.
+def plate_level(
+    points: Array, free: Mask, axes: Array | None, labels: Rows, linear: LinearLevel
+) -> PlateLevel | None:
+    """Return the lines of the corner nodes of a thin body, with the interpolation from them.
 
     Parameters
     ----------
     points : (n, 3) m.
     free : (3n,) the components that are unknown.
-    axes : (3, 3) of the body in columns, its normal first.
+    axes : (3, 3) of a flat body in columns, its normal first; None for a curved one.
     labels : (n,) the line of each node.
     linear : gives the corner nodes and their interpolation to all nodes.
+
+    Returns
+    -------
+    The level, or None if the lines are not those of a thin body that bends.
     """
     n = len(points)
     _, line = np.unique(labels[linear.nodes], return_inverse=True)
     ends = points[linear.nodes]
     centers = np.column_stack([np.bincount(line, x) for x in ends.T]) / np.bincount(line)[:, None]
-    height = float(np.abs((ends - centers[line]) @ axes[:, 0]).max())
-    m, rows = len(centers), np.repeat(np.arange(n), np.diff(linear.indptr))
+    m, offsets = len(centers), ends - centers[line]
+    frames = np.broadcast_to(axes, (m, 3, 3)) if axes is not None else _frames(offsets, line)
+    if axes is None and not _is_shell(points, free, offsets, frames, line, linear):
+        return None
+    height = float(np.abs(np.einsum("ki,ki->k", offsets, frames[line, :, 0])).max())
+    rows = np.repeat(np.arange(n), np.diff(linear.indptr))
     pairs, where = np.unique(rows * m + line[linear.indices], return_inverse=True)
     node, at = np.divmod(pairs, m)
-    blocks = _shapes((points[node] - centers[at]) @ axes / height, axes)
+    blocks = _shapes((points[node] - centers[at]) / height, frames[at])
     blocks *= np.bincount(where, linear.weights)[:, None, None] * free.reshape(-1, 3)[node][:, :, None]
     moved = np.zeros((m, 6), dtype=bool)
     np.logical_or.at(moved, at, blocks.any(axis=1))
     indptr = np.concatenate([[0], np.cumsum(np.bincount(node, minlength=n))]).astype(np.int32)
-    modes = _modes(centers, axes, height).reshape(-1, 12) * moved.reshape(-1, 1)
+    modes = _modes(centers, frames, height, axes).reshape(-1, 12) * moved.reshape(-1, 1)
     return PlateLevel(indptr, at.astype(np.int32), blocks.astype(np.float32), modes)
 
 
-def _shapes(places: Array, axes: Array) -> Array:
-    """Return the displacements (k, 3, 6) at places (k, 3) beside their lines, along the axes in heights."""
-    z, x, y = places.T
-    normal, first, second = axes.T
-    blocks = np.zeros((len(places), 3, 6))
+def _frames(offsets: Array, line: Ints) -> Array:
+    """Return the axes (m, 3, 3) of lines in columns, their directions first; NaN for lines of one node."""
+    order = np.argsort((offsets**2).sum(axis=1), kind="stable")
+    far = np.zeros((line.max() + 1, 3))
+    far[line[order]] = offsets[order]
+    with np.errstate(invalid="ignore"):
+        normal = far / np.linalg.norm(far, axis=1)[:, None]
+    first = np.cross(normal, np.eye(3)[np.abs(far).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normal, first, np.cross(normal, first)], axis=2)
+
+
+def _is_shell(
+    points: Array, free: Mask, offsets: Array, frames: Array, line: Ints, linear: LinearLevel
+) -> bool:
+    """Return whether lines are short beside the body, of several nodes each, and free along themselves."""
+    if not np.isfinite(frames).all():
+        return False
+    X = points - points.mean(axis=0)
+    width = np.sqrt(12 * np.linalg.eigvalsh(X.T @ X)[1] / len(X))
+    held = ~free.reshape(-1, 3)[linear.nodes]
+    along = (held * frames[line, :, 0] ** 2).sum(axis=1).mean()
+    return bool(2 * np.linalg.norm(offsets, axis=1).max() < FLAT * width and along <= 0.5)
+
+
+def _shapes(places: Array, frames: Array) -> Array:
+    """Return the displacements (k, 3, 6) at places (k, 3) beside lines, in heights."""
+    z, x, y = np.einsum("ki,kij->jk", places, frames)[:, :, None]
+    normal, first, second = np.moveaxis(frames, 2, 0)
+    blocks = np.empty((len(places), 3, 6))
     blocks[:, :, :3] = np.eye(3)
-    blocks[:, :, 3] = np.outer(x / 2, normal) - np.outer(z, first)
-    blocks[:, :, 4] = np.outer(y / 2, normal) - np.outer(z, second)
-    blocks[:, :, 5] = np.outer(z, normal)
+    blocks[:, :, 3] = x / 2 * normal - z * first
+    blocks[:, :, 4] = y / 2 * normal - z * second
+    blocks[:, :, 5] = z * normal
     return blocks
 
 
-def _modes(centers: Array, axes: Array, height: float) -> Array:
+def _modes(centers: Array, frames: Array, height: float, axes: Array | None) -> Array:
     """Return the modes (m, 6, 12) of lines."""
-    up = height * axes[:, 0]
-    low, high = bending_modes(np.vstack([centers - up, centers + up]), axes).reshape(2, -1, 3, 12)
-    z, x, y = np.moveaxis((high - low).transpose(0, 2, 1) @ axes / 2, 2, 0)
+    up = height * frames[:, :, 0]
+    if axes is None:
+        low, high = _shell_modes(centers, frames, height)
+    else:
+        low, high = bending_modes(np.vstack([centers - up, centers + up]), axes).reshape(2, -1, 3, 12)
+    z, x, y = np.moveaxis(np.einsum("mic,mij->mcj", high - low, frames) / 2, 2, 0)
     return np.concatenate([(low + high) / 2, np.stack([-x, -y, z], axis=1)], axis=1)
+
+
+def _shell_modes(centers: Array, frames: Array, height: float) -> Array:
+    """Return rigid modes and quadratic functions along the normals, at the ends of lines: (2, m, 3, 12)."""
+    normal = frames[:, :, 0]
+    X = (centers - centers.mean(axis=0)) / (scale := np.ptp(centers, axis=0).max())
+    ends = np.zeros((2, len(X), 3, 12))
+    both = np.vstack([centers - height * normal, centers + height * normal])
+    ends[:, :, :, :6] = rigid_modes(both).reshape(2, -1, 3, 6)
+    for mode, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)), 6):
+        slope = np.zeros_like(X)
+        slope[:, i] += X[:, j] / scale
+        slope[:, j] += X[:, i] / scale
+        slope -= normal * np.einsum("mi,mi->m", normal, slope)[:, None]
+        w = (X[:, i] * X[:, j])[:, None] * normal
+        ends[0, :, :, mode], ends[1, :, :, mode] = w + height * slope, w - height * slope
+    return ends
 
 
 def plate_axes(points: Array, free: Mask) -> Array | None:
@@ -94,6 +152,12 @@ def plate_axes(points: Array, free: Mask) -> Array | None:
     moments, axes = np.linalg.eigh(X.T @ X)
     held = (~free.reshape(-1, 3) @ axes[:, 0] ** 2).mean()
     return None if moments[0] > FLAT**2 * moments[1] or held > 0.5 else axes
+
+
+def is_very_thin(points: Array, axes: Array) -> bool:
+    """Return whether bending takes so little energy that multigrid has to work with the matrix as it is."""
+    thickness, width, length = np.ptp(points @ axes, axis=0)
+    return bool(thickness < VERY_THIN * min(width, length))
 
 
 def bending_modes(points: Array, axes: Array) -> Array:

@@ -50,7 +50,7 @@ def long_solution(n):
     points, groups = model.mesh.points, model.element_groups()
     K = assemble_stiffness(points, groups, Pattern(len(points), [group.nodes for group in groups]))
     module, fixed = kernels("multigrid"), np.repeat(points[:, 2] == 0, 3).astype(np.uint8)
-    solver = module.Multigrid(module.Matrix(K.indptr, K.indices, K.data), fixed, points, 2, 12.0, 0.0, False)
+    solver = module.Multigrid(module.Matrix(K.indptr, K.indices, K.data), fixed, points, 2, 12.0, 0.0, 0)
     solver.aggregate(rigid_modes(points))
     b = np.where(fixed, 0.0, 1.0)
     return lambda: solver.solve(b, 0.0, 0.0, 1_000_000, None)

@@ -9,6 +9,7 @@ from kratos_lite.native import kernels
 from kratos_lite.solvers import coarse_level
 from kratos_lite.solvers import linear_solver as equations
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
+from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 
@@ -115,13 +116,35 @@ def test_plates_of_several_layers_of_quadratic_elements(element):
     assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 32
 
 
-@pytest.mark.parametrize(("element", "limit"), [("10N", 45), ("15N", 55), ("20N", 85)])
-def test_very_thin_plates_of_quadratic_elements(element, limit):
-    model = body(element, (1.0, 1.0, 0.001), "x-", (12, 12, 1))
+VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 28), "15N": (14, 38), "20N": (20, 60)}
+"""Cells along an edge of a plate 1:1000, and iterations that it may take with a clamped rim."""
+
+
+@pytest.mark.parametrize("element", VERY_THIN)
+def test_very_thin_plates(element):
+    n, limit = VERY_THIN[element]
+    model = body(element, (1.0, 1.0, 0.001), "x-", (n, n, 1))
     for side in ("x+", "y-", "y+"):
         model.fix(side)
     solver, b = hierarchy(model)
     assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= limit
+
+
+@pytest.mark.parametrize(("element", "n"), [("E8N", 30), ("10N", 14), ("20N", 16)])
+def test_very_thin_cantilevers_converge(element, n):
+    found = body(element, (1.0, 1.0, 0.001), "x-", (n, n, 1)).solve("amg")
+    assert found.report.solver == "amg", found.report.reason
+    strip = 1.5 * (1 - 0.3**2) * 9000.0 / 1e9 / 0.001**2  # q L^4 / (8 D)
+    np.testing.assert_allclose(np.abs(found.u[:, 2]).max(), strip, rtol=0.1)
+
+
+def test_enhanced_cells_whose_lines_leave_bending_smooth_larger_parts():
+    for n, parts in ((20, True), (80, False)):
+        memory = [
+            (solver := hierarchy(body(element, (1.0, 1.0, 0.01), "x-", (n, n, 1)))[0]).memory
+            for element in ("E8N", "8N")
+        ]
+        assert (memory[0] > 1.3 * memory[1]) == parts, solver.levels
 
 
 def test_a_plate_supported_along_its_lower_edges():
@@ -165,9 +188,9 @@ def test_iterations_of_a_plate_do_not_grow_with_its_mesh(turn):
         assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 26
 
 
-def cylinder(n):
+def cylinder(n, element="8N"):
     """Return part of a thin cylinder of cells with three unlike sides."""
-    mesh = kl.box((1.5, 1.0, 0.01), (n, n, 1))
+    mesh = kl.box((1.5, 1.0, 0.01), (n, n, 1), f"KinematicLinear3D{element}")
     angle, radius = mesh.points[:, 0], 1 + mesh.points[:, 2]
     points = np.column_stack([radius * np.sin(angle), mesh.points[:, 1], radius * np.cos(angle)])
     model = kl.Model(kl.Mesh(points, mesh.blocks), STEEL)
@@ -177,6 +200,41 @@ def cylinder(n):
 
 def test_sides_of_three_lengths_without_a_gap_between_them_make_no_clusters():
     assert not any(hierarchy(cylinder(40))[0].clusters)
+
+
+@pytest.mark.parametrize("element", ["10N", "15N", "20N", "27N"])
+def test_curved_shells_have_lines_along_their_normals(element):
+    solver, b = hierarchy(cylinder(12, element))
+    assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 90
+
+
+def test_modes_of_a_shell_hold_its_rigid_motions():
+    model = cylinder(12, "20N")
+    points, groups = model.mesh.points, model.element_groups()
+    flat = kl.box((1.5, 1.0, 0.01), (12, 12, 1), "KinematicLinear3D20N").points
+    lines = np.unique(np.round(flat[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+    linear = coarse_level.linear_level(points, groups)
+    level = plate_level(points, np.ones(points.size, dtype=bool), None, lines, linear)
+    own = level.indptr[linear.nodes]  # each corner belongs to one line
+    modes = level.modes.reshape(-1, 6, 12)[level.indices[own], :, :6]
+    found = np.einsum("kij,kjm->kim", level.blocks[own], modes).reshape(-1, 6)
+    want = rigid_modes(points[linear.nodes])
+    left = found - want @ np.linalg.lstsq(want, found, rcond=None)[0]
+    assert np.abs(left).max() < 1e-6
+    assert np.linalg.matrix_rank(found, tol=1e-4) == 6
+
+
+@pytest.mark.parametrize("case", ["thick", "plane strain", "single nodes"])
+def test_lines_that_are_no_shell_are_left(case):
+    size = (1.0, 1.0, 0.5 if case == "thick" else 0.01)
+    mesh = kl.box(size, (4, 4, 1), "KinematicLinear3D20N")
+    lines = np.unique(np.round(mesh.points[:, :2], 9), axis=0, return_inverse=True)[1].ravel()
+    if case == "single nodes":
+        lines = np.arange(len(mesh.points))
+    free = np.ones((len(mesh.points), 3), dtype=bool)
+    free[:, 2] = case != "plane strain"
+    linear = coarse_level.linear_level(mesh.points, kl.Model(mesh, STEEL).element_groups())
+    assert plate_level(mesh.points, free.ravel(), None, lines, linear) is None
 
 
 def test_an_unstructured_plate_takes_no_more_memory_than_its_matrix():
@@ -248,7 +306,10 @@ def hierarchy(model):
 
 @pytest.mark.parametrize(
     ("element", "size", "cells"),
-    [("8N", (1.0, 1.0, 0.1), None), ("10N", (1.0, 1.0, 20.0), None), ("20N", (1.0, 1.0, 0.01), (30, 30, 1))],
+    [
+        *[("8N", (1.0, 1.0, 0.1), None), ("10N", (1.0, 1.0, 20.0), None)],
+        *[("20N", (1.0, 1.0, 0.01), (30, 30, 1)), ("E8N", (1.0, 1.0, 0.001), (26, 26, 1))],
+    ],
 )
 def test_results_do_not_depend_on_the_number_of_threads(element, size, cells):
     module, results = kernels("multigrid"), []

@@ -448,7 +448,7 @@ def test_wrong_shapes_are_refused():
     K, free = matrix_of(system), system._equations._free
     modes = np.zeros((K.shape[0], 6))
     points = np.zeros((K.shape[0] // 3, 3))
-    options = (points, 2, 12.0, 0.0, False)
+    options = (points, 2, 12.0, 0.0, 0)
 
     def kernel(fixed):
         return MODULE.Multigrid(MODULE.Matrix(K.indptr, K.indices, K.data), fixed, *options)
@@ -493,7 +493,7 @@ def test_a_linear_level_of_the_wrong_shape_is_refused():
     for place, (value, message) in wrong.items():
         arguments = [*right[:place], value, *right[place + 1 :]]
         matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
-        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, False)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, 0)
         with pytest.raises(ValueError, match=message):
             kernel.aggregate_linear(below, *arguments)
 
@@ -513,7 +513,7 @@ def test_a_level_of_lines_of_the_wrong_shape_is_refused():
     }
     for place, (value, message) in wrong.items():
         matrix = MODULE.Matrix(K.indptr, K.indices, K.data)
-        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, True)
+        kernel = MODULE.Multigrid(matrix, fixed, points, 2, 12.0, 0.0, 1)
         with pytest.raises(ValueError, match=message):
             kernel.aggregate_plate(*right[:place], value, *right[place + 1 :])
 
