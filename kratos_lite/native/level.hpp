@@ -130,6 +130,7 @@ public:
         n = product.n;
         Dinv.assign(static_cast<size_t>(n) * 9 + 8, 0.0f);
         Doubles D = product.diagonal();
+        product.doubles = {};  // the set-up takes most memory
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
                 double block[9];
