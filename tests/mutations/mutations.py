@@ -26,6 +26,7 @@ SYSTEMS = "tests/verification/test_systems.py"
 BODY_LOADS = "tests/bodies/test_loads.py"
 MECHANICS = "tests/bodies/test_simple_mechanics.py"
 MATRICES = "tests/ale/test_matrices.py"
+PRODUCTS = "tests/assembly/test_matrix_free.py"
 MATERIALS = "tests/materials/test_orthotropic.py"
 MASS = "tests/assembly/test_exact_mass.py"
 QUANTITIES = "tests/analysis/test_quantities.py"
@@ -528,6 +529,11 @@ MUTATIONS = [
         "*methods)",
         CONDENSED,
     ),
+    Mutation("native/element_products.hpp", "mu * (H[i][j] + H[j][i])", "mu * (H[i][j] - H[j][i])", PRODUCTS),
+    Mutation(
+        "native/sum_factorization.hpp", "transposed ? M[j * n + i] : M[i * n + j]", "M[i * n + j]", PRODUCTS
+    ),
+    Mutation("native/element_products.hpp", "K[3 + i] += both * D[i]", "K[3 + i] += D[i]", PRODUCTS),
     Mutation(
         "native/sparse.hpp",
         "s1 += *reinterpret_cast<const Vec*>(a + 3) * v;",
