@@ -53,9 +53,10 @@ def test_products_are_those_of_the_matrix(kind, material, curved):
     assert abs(product.norm() / K.norm() - 1) < (0.3 if curved else 1e-12)
 
 
+@pytest.mark.parametrize("material", [STEEL, WOOD], ids=["isotropic", "orthotropic"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_smoothing_is_that_of_the_matrix(kind):
-    model = model_of(kind, WOOD, curved=True)
+def test_smoothing_is_that_of_the_matrix(kind, material):
+    model = model_of(kind, material, curved=True)
     system = system_of(model)
     product, K, r = both(model)
     free = np.zeros(len(r), dtype=bool)
