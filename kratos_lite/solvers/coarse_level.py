@@ -250,7 +250,7 @@ def _continuous(
 
     Without it the linear elements of both sides come apart there, and iterations grow fivefold.
     """
-    from scipy.sparse import csr_array, kron
+    from scipy.sparse import csr_array
 
     n = len(number)
     at = np.repeat(np.arange(n), np.diff(level.indptr))
@@ -275,15 +275,57 @@ def _continuous(
     S.eliminate_zeros()
     P = csr_array((S.data, column[S.indices], S.indptr), shape=(n, len(nodes)))
 
+    return _on(level, nodes, P[level.nodes], P)
+
+
+def _on(level: LinearLevel, nodes: Ints, inner: Any, P: Any) -> LinearLevel:
+    """Return the level on some nodes, from which `inner` leads to its corner nodes and P to all nodes."""
+    from scipy.sparse import kron
+
     def assemble() -> BlockMatrix:
-        inner: Any = kron(P[level.nodes], np.eye(3)).tocsr()
-        A = (inner.T @ level.K.scipy().tocsr() @ inner).tobsr((3, 3))
+        axes: Any = kron(inner, np.eye(3)).tocsr()
+        A = (axes.T @ level.K.scipy().tocsr() @ axes).tobsr((3, 3))
         A.sort_indices()
         return BlockMatrix(
             np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32)
         )
 
-    return LinearLevel(assemble, nodes, P.indptr.astype(np.int32), P.indices.astype(np.int32), P.data)
+    P.sort_indices()
+    rows = P.indptr.astype(np.int32), P.indices.astype(np.int32)
+    return LinearLevel(assemble, nodes, *rows, P.data, level.halved)
+
+
+def tied(level: LinearLevel, T: Any, free: Ints) -> LinearLevel:
+    """Return the level of fields that keep the ties of nodes, where these tie all components alike.
+
+    Without it the linear elements of both sides come apart.  Other ties leave the level as it is.
+
+    Parameters
+    ----------
+    level : the linear elements of the nodes, tied or not.
+    T : (3n, q) sparse, all components of the nodes from those that are free.
+    free : (q,) rows of the free components.
+    """
+    from scipy.sparse import csr_array, diags_array
+
+    n, m = T.shape[0] // 3, len(level.nodes)
+    entries = T.tocoo()
+    column = free[entries.col]
+    slave = np.flatnonzero(~np.isin(np.arange(3 * n), free))
+    is_slave = np.zeros(n, dtype=bool)
+    is_slave[np.intersect1d(slave, entries.row) // 3] = True
+    mine = is_slave[entries.row // 3]
+    row, column, data = entries.row[mine], column[mine], entries.data[mine]
+    by_axis = [
+        csr_array((data[at], (row[at] // 3, column[at] // 3)), shape=(n, n))
+        for at in (row % 3 == axis for axis in range(3))
+    ]
+    alike = all(abs(by_axis[0] - other).nnz == 0 for other in by_axis[1:])
+    if not alike or (row % 3 != column % 3).any():
+        return level
+    W = csr_array((level.weights, level.indices, level.indptr), shape=(n, m))
+    inner = diags_array(1.0 * ~is_slave[level.nodes]) + (by_axis[0] @ W)[level.nodes]
+    return _on(level, level.nodes, inner, (W @ inner).tocsr())
 
 
 def _followers(

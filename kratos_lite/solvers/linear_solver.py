@@ -242,6 +242,10 @@ class LinearSolver:
     @cached_property
     def _multigrid(self) -> Solver:
         linear, matrix = self.linear_level() if self.linear_level else None, self._blocks
+        if linear is not None and self.reduced.T is not None:
+            from kratos_lite.solvers.coarse_level import tied  # rarely needed
+
+            linear = tied(linear, self.reduced.T, self.reduced.free)
         if not matrix.is_split:
             from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
 

@@ -10,7 +10,8 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.shapes.hexahedra import Hexahedron8
-from kratos_lite.solvers.coarse_level import linear_level
+from kratos_lite.solvers.coarse_level import linear_level, tied
+from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
 STEEL = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)
 LINEAR_OF = {"3D10N": "3D4N", "3D13N": "3D5N", "3D15N": "3D6N", "3D20N": "3D8N", "3D27N": "3D8N"}
@@ -133,3 +134,53 @@ def test_shapes_without_corners_have_no_level():
             KinematicLinearShifted, KinematicLinearShifted.rule, STEEL, group.nodes, group.rows
         )
         assert linear_level(points, [other]) is None
+
+
+# ---- ties -------------------------------------------------------------------------------------------
+
+
+def periodic(axes="xyz", cells=(4, 3, 3)):
+    """Return a box of 20-node bricks on its lower side, whose faces y+ follow y- along some axes."""
+    mesh = kl.box((4.0, 3.0, 3.0), cells, "KinematicLinear3D20N")
+    model = kl.Model(mesh, kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0))
+    model.fix("z-")
+    model.add(kl.Gravity((1.0, 2.0, -9.81)))
+    X = mesh.points
+    low, high = (np.flatnonzero((X[:, 1] == y) & (X[:, 2] > 0)) for y in (0.0, 3.0))
+    for slave in high:
+        master = low[np.abs(X[low] - X[slave] * [1, 0, 1]).max(axis=1).argmin()]
+        for axis in axes:
+            model.constrain((int(slave), axis), {(int(master), axis): 1.0})
+    return model
+
+
+def test_tied_faces_of_quadratic_elements_take_few_iterations():
+    model = periodic()
+    found, expected = model.solve("amg"), model.solve("direct")
+    assert found.report.solver == "amg"
+    assert found.report.iterations <= 25  # 77 where both sides come apart
+    np.testing.assert_allclose(found.u, expected.u, rtol=0, atol=1e-10 * np.abs(expected.u).max())
+
+
+def test_ties_along_one_axis_leave_the_level_as_it_is():
+    model = periodic("y", (2, 2, 2))
+    constraints = model.supports.constraint_map
+    system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="amg")
+    level = linear_level(system.points, system.groups)
+    assert tied(level, system.reduced.T, system.reduced.free) is level
+    assert model.solve("amg").report.backward_error < 1e-14
+
+
+def test_a_level_under_ties_moves_rigidly():
+    model = periodic(cells=(2, 2, 2))
+    constraints = model.supports.constraint_map
+    system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints, solver="amg")
+    level = linear_level(system.points, system.groups)
+    kept = tied(level, system.reduced.T, system.reduced.free)
+    P = csr_array((kept.weights, kept.indices, kept.indptr))
+    ones = np.ones(P.shape[1])
+    slaves = np.flatnonzero(model.mesh.points[level.nodes][:, 1] == 3.0)
+    np.testing.assert_allclose(P @ ones, 1.0, rtol=0, atol=1e-14)
+    assert abs(kept.K @ np.tile([1.0, 0.0, 0.0], len(ones))).max() < 1e-9 * kept.K.norm()
+    held = slaves[model.mesh.points[level.nodes][slaves][:, 2] > 0]
+    assert np.abs(P[:, held]).sum() == 0  # their unknowns are those of their masters
