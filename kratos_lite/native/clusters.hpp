@@ -21,6 +21,7 @@ constexpr double COARSE_FAR = 12.5;      // the same where close nodes alone hav
 constexpr double BETWEEN = 0.1;          // of as many far links, at most so many neither near nor far
 constexpr double FILL = 1;               // nodes in the envelopes of clusters, to their blocks in A
 constexpr double CONTRAST = 1e3;           // largest stiffness of one node to that of another
+constexpr double EXTREME = 2500;         // the same of few nodes, which alone stall a smoother of single nodes
 constexpr int64_t SAMPLE = 2000;         // nodes that show whether a mesh is stretched
 
 inline double squared_distance(const double* X, int64_t i, int64_t j) {
@@ -41,15 +42,22 @@ inline std::pair<double, double> extent(const Graph& g, const double* X, int64_t
     return {low, high};
 }
 
-// Of some nodes of the whole mesh, have a few both near and far ones?
-inline bool is_stretched(const Graph& g, const double* X, double far) {
-    const int64_t step = std::max<int64_t>(1, g.rows / SAMPLE);
-    int64_t seen = 0, stretched = 0;
-    for (int64_t i = 0; i < g.rows; i += step, ++seen) {
+struct Stretch {
+    bool common, extreme;  // one of twenty nodes has both near and far ones; one of 100 has extremely near ones
+};
+
+// Of some nodes all over the mesh, at places that no order of the nodes repeats.
+inline Stretch stretch_of(const Graph& g, const double* X, double far) {
+    const int64_t seen = std::min(g.rows, SAMPLE);
+    int64_t stretched = 0, extreme = 0;
+    for (int64_t s = 0; s < seen; ++s) {
+        const double share = std::fmod(0.6180339887498949 * static_cast<double>(s), 1.0);  // golden section
+        const int64_t i = g.rows <= SAMPLE ? s : static_cast<int64_t>(share * static_cast<double>(g.rows));
         const auto [low, high] = extent(g, X, i);
         stretched += high > far * low;
+        extreme += high > EXTREME * low;
     }
-    return 20 * stretched > seen;
+    return {20 * stretched > seen, 100 * extreme > seen};
 }
 
 // A partition of the nodes, and the factor of each part of a matrix.
@@ -261,12 +269,13 @@ inline bool are_held(const Bytes& fixed, int b) {
     return 2 * b * held > static_cast<int64_t>(fixed.size());
 }
 
-// The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes belong to
-// clusters that a gap sets apart from the links between them, and near links alone unless these are
-// cheap to factorize.
+// The clusters of a mesh with nodes at X (n, 3), not factorized; none unless most nodes, or a few where
+// some are extremely near, belong to clusters that a gap sets apart from the links between them, and near
+// links alone unless these are cheap to factorize.
 inline Clusters find_clusters(const Graph& g, const double* A, int b, const Bytes& fixed, const double* X,
                               double theta, double far) {
-    if (!is_stretched(g, X, far)) return {};
+    const Stretch stretch = stretch_of(g, X, far);
+    if (!stretch.common && !stretch.extreme) return {};
     const Lengths links = lengths(g, X, far);
     Ints label(g.rows);
     int64_t clustered = 0;
@@ -277,7 +286,8 @@ inline Clusters find_clusters(const Graph& g, const double* A, int b, const Byte
         label[i] = gap ? c : i;
         clustered += gap;
     }
-    if (2 * clustered < g.rows) return {};
+    const bool most = 2 * clustered >= g.rows;
+    if (clustered == 0 || !(most || stretch.extreme)) return {};
     Clusters found;
     found.collect(g, label);
     Ints position(g.rows);
@@ -291,7 +301,7 @@ inline Clusters find_clusters(const Graph& g, const double* A, int b, const Byte
     }
     if (envelope > FILL * blocks) {
         Clusters none;
-        if (several > 2 || !are_held(fixed, b)) none.near = links.near;
+        if (most && (several > 2 || !are_held(fixed, b))) none.near = links.near;
         return none;
     }
     const Doubles own = diagonal_norms(g, A, b * b);

@@ -77,18 +77,19 @@ public:
         from.push_back(0);
         double* to = y.mutable_data();
         py::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(busy);
+        std::lock_guard<std::recursive_mutex> lock(busy);
         multiply(from.data(), to);
         return y;
     }
 
     double largest_row_sum() const {
         py::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(busy);
+        std::lock_guard<std::recursive_mutex> lock(busy);
         return norm();
     }
 
-    mutable std::mutex busy;  // the element vectors serve one product at a time
+    // The element vectors serve one product at a time; a callback between iterations may ask for another.
+    mutable std::recursive_mutex busy;
 
 private:
     std::vector<ElementTables> groups;
@@ -127,7 +128,7 @@ public:
         require(fixed.size() == 3 * elements->n, "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
         py::gil_scoped_release release;
-        std::lock_guard<std::mutex> lock(elements->busy);
+        std::lock_guard<std::recursive_mutex> lock(elements->busy);
         hierarchy.add_elements(*elements, this->fixed, std::move(X));
     }
 
@@ -243,8 +244,8 @@ public:
     Bytes fixed;
     Hierarchy hierarchy;
     // The element vectors, where there are some, serve one product at a time.
-    std::unique_lock<std::mutex> occupied() const {
-        return elements ? std::unique_lock<std::mutex>(elements->busy) : std::unique_lock<std::mutex>();
+    std::unique_lock<std::recursive_mutex> occupied() const {
+        return elements ? std::unique_lock(elements->busy) : std::unique_lock<std::recursive_mutex>();
     }
 
     std::mutex busy;  // the levels' vectors serve one solution at a time

@@ -57,6 +57,8 @@ class LinearLevel:
 
 STRETCHED = 3.0
 """Longest to shortest side of a cell above which smoothing single nodes is slow."""
+EXTREME = 30.0
+"""The same of few cells, which alone stall a smoother of single nodes."""
 SAMPLE = 2000
 """Cells of a group that show whether it is stretched."""
 LONG = 3.0
@@ -115,16 +117,20 @@ def linear_level(
 
 
 def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
-    """Return whether one of twenty elements, of some of each group, is long or flat."""
-    seen = stretched = 0
+    """Return whether, of some elements of each group, one of 20 is long or flat, or one of 200 extremely."""
+    seen = stretched = extreme = 0
     for group in groups:
         linear = group.element.shape.linear() or group.element.shape
-        some = slice(None, None, max(1, len(group) // SAMPLE))
+        some: Ints = np.arange(len(group))
+        if len(some) > SAMPLE:  # places that no order of the cells repeats: golden section
+            some = (0.6180339887498949 * some[:SAMPLE] % 1 * len(some)).astype(np.int64)
         corners = points[group.nodes[some, : linear.corners]]
         sides = _sides(linear, corners)
         seen += len(sides)
-        stretched += int(np.count_nonzero(sides.max(axis=1) > STRETCHED * sides.min(axis=1)))
-    return 20 * stretched > seen
+        long, short = sides.max(axis=1), sides.min(axis=1)
+        stretched += int(np.count_nonzero(long > STRETCHED * short))
+        extreme += int(np.count_nonzero(long > EXTREME * short))
+    return 20 * stretched > seen or 200 * extreme > seen
 
 
 def _sides(shape: type[Shape], corners: Array) -> Array:

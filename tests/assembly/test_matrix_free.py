@@ -1,5 +1,7 @@
 """The stiffness as a product, element by element: the same as with the matrix."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,23 @@ def test_a_scene_without_a_matrix_says_so_and_never_makes_one(monkeypatch):
     assert isinstance(analysis.system.K, MatrixFree)
     assert result.report.backward_error < 1e-14
     assert any("the stiffness matrix" in words for words in result.report.skipped)
+
+
+def test_a_callback_may_multiply_between_iterations():
+    model = model_of("27N", cells=(4, 4, 4))
+    alone, seen = model.static("amg").solve(), []
+
+    def progress(phase, share):
+        if phase == "solve" and 0 < share < 1:
+            seen.append(analysis.system.K @ np.ones(3 * model.mesh.n_nodes))
+
+    analysis = model.static("amg", progress=progress)
+    thread = threading.Thread(target=lambda: seen.append(analysis.solve()), daemon=True)
+    thread.start()
+    thread.join(20.0)
+    assert not thread.is_alive()
+    assert len(seen) > 3
+    np.testing.assert_array_equal(seen[-1].u, alone.u)
 
 
 def links():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Block
 from kratos_lite.native import kernels
 from kratos_lite.solvers import coarse_level
@@ -402,3 +403,26 @@ def test_superlu_is_quick_on_fewer_unknowns(monkeypatch, installed, limit):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if installed else None)
     assert equations.quick_to_factorize(limit)
     assert not equations.quick_to_factorize(limit + 1)
+
+
+def bonded(kind, thickness, layers=40):
+    """Return a column of cubes with one layer of that many times their thickness in the middle."""
+    size = 5 if kind == "8N" else 3
+    mesh = kl.box((1.0, 1.0, float(layers)), (size, size, layers), f"KinematicLinear3D{kind}")
+    heights = np.insert(np.cumsum(np.where(np.arange(layers) == layers // 2, thickness, 1.0)), 0, 0.0) / size
+    X = mesh.points.copy()
+    X[:, 2] = np.interp(X[:, 2], np.arange(layers + 1.0), heights)
+    model = kl.Model(mesh.replace(points=X), kl.Isotropic3D(E=2e11, nu=0.3, density=7800.0))
+    model.fix("z-")
+    model.add(kl.Gravity((1.0, 2.0, -9.81)))
+    return model
+
+
+@pytest.mark.parametrize("thickness", [0.01, 1e-4])
+@pytest.mark.parametrize("kind", ["8N", "10N", "15N", "20N", "27N"])
+def test_one_very_thin_layer_among_cubes_does_not_stall(kind, thickness):
+    analysis = bonded(kind, thickness).static("amg")
+    report = analysis.solve().report
+    assert (report.solver, report.backward_error < 2e-15) == ("amg", True)
+    assert report.iterations <= 30  # 60 to 190 with single nodes, or none that converge
+    assert isinstance(analysis.system.K, BlockMatrix)
