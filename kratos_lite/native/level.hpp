@@ -130,7 +130,6 @@ public:
         n = product.n;
         Dinv.assign(static_cast<size_t>(n) * 9 + 8, 0.0f);
         Doubles D = product.diagonal();
-        product.doubles = {};  // the set-up takes most memory
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
                 double block[9];
@@ -201,7 +200,7 @@ public:
 
 private:
     void step_elements(const float* from, float* to, float alpha, float beta, bool smooth) {
-        elements->multiply(from, elements->floats, [&](int64_t i, const float* sum) {
+        elements->multiply(from, [&](int64_t i, const float* sum) {
             float r[3];
             for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
             if (!smooth) {

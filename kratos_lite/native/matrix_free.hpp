@@ -3,6 +3,7 @@
 // Forces of elements are summed node by node in ascending order of elements, whatever the number of threads.
 
 #pragma once
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -28,12 +29,7 @@ public:
         s.first = pairs;
         s.width = 2 * vector_width();
         s.tensor64 = tensor;
-        s.tensor32.n = tensor.n;
-        s.tensor32.place = tensor.place;
-        s.tensor32.extra = tensor.extra;
-        std::copy(tensor.values, tensor.values + 9, s.tensor32.values);
-        std::copy(tensor.slopes, tensor.slopes + 9, s.tensor32.slopes);
-        s.tensor32.weights.assign(tensor.weights.begin(), tensor.weights.end());
+        s.tensor32 = tensor.as<float>();
         pairs += w.last * w.k;
     }
 
@@ -54,7 +50,8 @@ public:
 
     // done(i, y) with y = (K x)_i for each node i, by all threads.
     template <class T, class F>
-    void multiply(const T* x, std::vector<T>& room, const F& done) const {
+    void multiply(const T* x, const F& done) const {
+        std::vector<T>& room = std::get<std::vector<T>>(rooms);
         room.resize(4 * pairs);
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * s.first, first, last); });
@@ -71,7 +68,7 @@ public:
 
     // x has a number behind its last.
     void multiply(const double* x, double* y) const {
-        multiply(x, doubles, [&](int64_t i, const double* sum) { std::copy(sum, sum + 3, y + 3 * i); });
+        multiply(x, [&](int64_t i, const double* sum) { std::copy(sum, sum + 3, y + 3 * i); });
     }
 
     // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.
@@ -117,14 +114,12 @@ public:
     }
 
     int64_t bytes() const {
-        int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + floats.size() + 2 * doubles.size());
+        int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + std::get<0>(rooms).size() + 2 * std::get<1>(rooms).size());
         for (const ProductGroup& s : groups) all += 4 * static_cast<int64_t>(s.geometry.size());
         return all;
     }
 
     int64_t n;
-    mutable std::vector<float> floats;    // element vectors
-    mutable std::vector<double> doubles;
 
 private:
     // The group and the element of an element vector.
@@ -195,6 +190,7 @@ private:
         });
     }
 
+    mutable std::tuple<std::vector<float>, std::vector<double>> rooms;  // element vectors
     int64_t pairs = 0;
     mutable std::vector<double> kept;
     std::vector<double> X;

@@ -341,8 +341,7 @@ PYBIND11_MODULE(_multigrid, m) {
     py::class_<Product, std::shared_ptr<Product>>(m, "Product")
         .def(py::init<Numbers, std::vector<ElementTables>>(), argument("points"), py::arg("groups"))
         .def("times", &Product::times)
-        .def("norm", &Product::largest_row_sum)
-        .def("bytes", [](const Product& product) { return product.bytes(); });
+        .def("norm", &Product::largest_row_sum);
     py::class_<Pressures>(m, "Pressures")
         .def(py::init<Multigrid&, py::tuple, py::tuple, Array<double>, Array<double>, Array<double>, Array<double>,
                       double, int>(),

@@ -6,6 +6,7 @@
 // Source: Orszag, J. Comput. Phys. 37 (1980) 70-92; Kronbichler & Kormann, ACM TOMS 45 (2019) 29.
 
 #pragma once
+#include <algorithm>
 #include <vector>
 
 #include "isa.hpp"
@@ -19,6 +20,14 @@ struct TensorTables {
     std::vector<int> place;    // (k) of each node
     std::vector<int> extra;    // places without a node
     std::vector<T> weights;    // (extra, k) of the nodes there
+
+    template <class U>
+    TensorTables<U> as() const {
+        TensorTables<U> t{n, {}, {}, place, extra, {weights.begin(), weights.end()}};
+        std::copy(values, values + 9, t.values);
+        std::copy(slopes, slopes + 9, t.slopes);
+        return t;
+    }
 };
 
 // to = M from along one axis, or M^T from; added to what is there, or in its place.

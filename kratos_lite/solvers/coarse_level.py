@@ -125,7 +125,7 @@ def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
         if len(some) > SAMPLE:  # places that no order of the cells repeats: golden section
             some = (0.6180339887498949 * some[:SAMPLE] % 1 * len(some)).astype(np.int64)
         corners = points[group.nodes[some, : linear.corners]]
-        sides = _sides(linear, corners)
+        sides = sides_of(linear, corners)
         seen += len(sides)
         long, short = sides.max(axis=1), sides.min(axis=1)
         stretched += int(np.count_nonzero(long > STRETCHED * short))
@@ -133,10 +133,10 @@ def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
     return 20 * stretched > seen or 200 * extreme > seen
 
 
-def _sides(shape: type[Shape], corners: Array) -> Array:
-    """Return the lengths (m, 3) of elements of a linear shape along its axes, with corners (m, c, 3)."""
+def sides_of(shape: type[Shape], nodes: Array) -> Array:
+    """Return the lengths (m, 3) of elements along their axes, at the center; nodes (m, k, 3) in m."""
     center, extent = shape.nodes.mean(axis=0), np.ptp(shape.nodes, axis=0)
-    return extent * np.linalg.norm(np.swapaxes(corners, 1, 2) @ shape.dN(center), axis=1)
+    return extent * np.linalg.norm(np.swapaxes(nodes, 1, 2) @ shape.dN(center), axis=1)
 
 
 def _corners(shape: type[Shape]) -> Ints | None:
@@ -161,7 +161,7 @@ def _parts(points: Array, group: ElementGroup, corners: Ints, halved: bool) -> l
     halves = [_halves(shape, corners, axis) if halved else None for axis in range(3)]
     if all(cells is None for cells in halves):
         return [_Part(group, element, corners[None])]
-    sides = _sides(element.shape, points[group.nodes[:, corners]])
+    sides = sides_of(element.shape, points[group.nodes[:, corners]])
     order = np.sort(sides, axis=1)
     long = order[:, 2] > LONG * order[:, 1]
     if 2 * np.count_nonzero(long) < len(long):  # a few come apart from their neighbors, which takes more
@@ -320,6 +320,8 @@ def tied(level: LinearLevel, T: Any, free: Ints) -> LinearLevel:
     slave = np.flatnonzero(~np.isin(np.arange(3 * n), free))
     is_slave = np.zeros(n, dtype=bool)
     is_slave[np.intersect1d(slave, entries.row) // 3] = True
+    if not is_slave[level.nodes].any():
+        return level  # as with hanging nodes, which the level has left out
     mine = is_slave[entries.row // 3]
     row, column, data = entries.row[mine], column[mine], entries.data[mine]
     by_axis = [

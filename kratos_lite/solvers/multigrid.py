@@ -100,7 +100,7 @@ class Compiled:
         linear: LinearLevel | None,
         degree: int = DEGREE,
     ) -> None:
-        axes = plate_axes(points, free)
+        axes = None if isinstance(A, MatrixFree) else plate_axes(points, free)
         thin = 0 if axes is None else 2 if is_very_thin(points, axes) else 1
         places = np.ascontiguousarray(points if axes is None else _closer(points, axes[:, 0]), dtype=float)
         self._module, fixed = module, (~free).astype(np.uint8)

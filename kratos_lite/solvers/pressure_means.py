@@ -14,6 +14,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.records import record
 from kratos_lite.shapes import Shape
+from kratos_lite.solvers.coarse_level import sides_of
 from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -76,8 +77,7 @@ def pressure_means(points: Array, parts: Sequence[Pressures], modulus: Array) ->
 def _long_axes(points: Array, group: ElementGroup) -> Ints:
     """Return the axis along which each element is long, -1 for none, (m,)."""
     shape = group.element.shape
-    center, extent = shape.nodes.mean(axis=0), np.ptp(shape.nodes, axis=0)
-    sides = np.linalg.norm(np.swapaxes(points[group.nodes], 1, 2) @ shape.dN(center), axis=1) * extent
+    sides = sides_of(shape, points[group.nodes])
     order, axis = np.sort(sides, axis=1), sides.argmax(axis=1)
     edged = np.array([_partners(shape, a) is not None for a in range(3)])
     return np.where((order[:, 2] > LONG * order[:, 1]) & edged[axis], axis, -1)

@@ -9,6 +9,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements import ELEMENTS
+from kratos_lite.mesh.refinement import refine
 from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.solvers.coarse_level import linear_level, tied
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
@@ -169,6 +170,19 @@ def test_ties_along_one_axis_leave_the_level_as_it_is():
     level = linear_level(system.points, system.groups)
     assert tied(level, system.reduced.T, system.reduced.free) is level
     assert model.solve("amg").report.backward_error < 1e-14
+
+
+def test_hanging_nodes_need_no_ties():
+    mesh = kl.box(cells=(2, 2, 2), element="KinematicLinear3D20N")
+    mesh = refine(mesh, [0]).mesh
+    model = kl.Model(mesh, STEEL)
+    model.fix("z-")
+    system = ConstrainedSystem(
+        mesh.points, model.element_groups(), model.supports.constraint_map, hanging=mesh.hanging
+    )
+    level = linear_level(system.points, system.groups, mesh.hanging)
+    assert system.reduced.T is not None
+    assert tied(level, system.reduced.T, system.reduced.free) is level
 
 
 def test_a_level_under_ties_moves_rigidly():
