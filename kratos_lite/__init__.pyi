@@ -16,6 +16,7 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.point_values import PointValues as PointValues
 from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
 from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
 from kratos_lite.analysis.quantities import Quantity as Quantity
