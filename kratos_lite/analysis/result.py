@@ -13,6 +13,7 @@ from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 METHODS = ("recovery", "equilibrated")
 
 
-class Result(ElementFields):
+class Result(ElementFields, Tabular):
     """Displacements and all that follows from them; strains and stresses are made when asked for.
 
     Analyses make results.
@@ -323,8 +324,3 @@ class Result(ElementFields):
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]
-
-    def __str__(self) -> str:
-        rows = self.table()
-        width = max(len(label) for label, _ in rows)
-        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
