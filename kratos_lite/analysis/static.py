@@ -9,6 +9,7 @@ import numpy as np
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
@@ -252,6 +253,7 @@ class StaticAnalysis:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
+            warnings += check_deformation(model.mesh, u, model.supports.values, model.initial_displacement)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = _Origin(self, case.loads, model.version)
@@ -314,7 +316,7 @@ class StaticAnalysis:
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
-            notes=list(self.model.notes),
+            notes=self.model.remarks(),
             skipped=self._skipped(case.moving),
             formulation=self.model.chosen(self.groups),
         )

@@ -283,6 +283,19 @@ class Structure(Solid, Tabular):
         self.supports.check_used(used)
         return groups, part, warnings
 
+    def remarks(self) -> list[str]:
+        """Return what readers of files noted, and constants of materials that no engineering material has.
+
+        Returns
+        -------
+        Notes, one sentence each.
+        """
+        return [*self.notes, *checks.unusual_constants(self._used_materials())]
+
+    def _used_materials(self) -> list[LinearMaterial]:
+        counts = np.bincount(self._material_of + 1, minlength=1)[1:]
+        return [self._materials[i] for i in np.flatnonzero(counts)]
+
     # ---- summary ------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
@@ -292,18 +305,17 @@ class Structure(Solid, Tabular):
         -------
         Labels and values.
         """
-        used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
         without = int((self._material_of < 0).sum())
         rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []
-        rows += [("material", str(material)) for material in used]
+        rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))
         if self.supports.constraints:
             rows.append(("constraints", str(len(self.supports.constraints))))
         rows += [("load", type(load).__name__) for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
-        return rows + [("note", note) for note in self.notes]
+        return rows + [("note", note) for note in self.remarks()]
 
     def __repr__(self) -> str:
         name = type(self).__name__
