@@ -13,6 +13,7 @@ from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
+from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
@@ -198,7 +199,8 @@ class StaticAnalysis:
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
-        return self.warnings + checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+        idle = checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+        return self.warnings + idle + equal_loads(case.loads)
 
     def _system_of(self, moving: Mask) -> ConstrainedSystem:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""

@@ -12,6 +12,7 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
+from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
 from kratos_lite.solvers.linear_solver import LinearSolver
@@ -36,6 +37,7 @@ def solve_steady(
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.scatter(forces).copy()
+        warnings += equal_loads(model.loads)
         warnings += check_loads(model.loads, e.system.groups, nodal, model.supports)
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
