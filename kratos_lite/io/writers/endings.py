@@ -6,8 +6,8 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".vtk", ".json")
-"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
+RESULTS = (".vtu", ".vtk", ".json", ".csv")
+"""Formats that keep fields on nodes; most others of meshio drop them unsaid."""
 SERIES = (".pvd", ".csv", ".npz")
 """Formats of states in time: for ParaView, a table, arrays."""
 
@@ -17,7 +17,7 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
     ending = Path(path).suffix.lower()
     if not ending:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
-    if ending in SERIES:
+    if ending in SERIES and ending not in RESULTS:
         raise InputError(f"{path}: {ending} holds states in time; add --time STEP:STEPS, or write .vtu")
     if ending not in RESULTS:
         raise InputError(

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite import view, voigt
+from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.result import Result
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.io.atomic import write_whole
-from kratos_lite.io.writers.results import fields
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.shapes import Shape
