@@ -219,7 +219,7 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         "--formulation",
         metavar="WORD",
         help="of the elements, in place of what their names in the file say: standard, enhanced, b_bar, "
-        "reduced, or non_locking, that of each shape which does not lock (docs/elements.md)",
+        "reduced, or non_locking, that of each shape which does not lock",
     )
     given.add_argument(
         "--ignore-initial-displacement",
@@ -234,7 +234,7 @@ def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) ->
 
 
 def _add_motion(solve: argparse.ArgumentParser) -> None:
-    ale = solve.add_argument_group("motion of the material through the mesh (one at most; docs/ale.md)")
+    ale = solve.add_argument_group("motion of the material through the mesh (one at most)")
     _add_options(
         ale,
         ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
@@ -256,7 +256,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
 
 
 def _add_time(solve: argparse.ArgumentParser) -> None:
-    time = solve.add_argument_group("time integration (docs/dynamics.md, docs/bodies.md)")
+    time = solve.add_argument_group("time integration")
     _add_options(
         time,
         ("--time", "STEP:STEPS[:EVERY]", "step in s, their number, and every how many is kept"),

@@ -98,7 +98,7 @@ def _checked(value: Any, cls: type[Any], name: str, tail: tuple[int, ...]) -> Ar
     if array.shape != tail:
         raise InputError(
             f"{cls.__name__}.{name} must return shape {tail} here; got {array.shape}; "
-            "see docs/add-an-element.md"
+            "see docs/howto/own-element.md"
         )
     return array
 
