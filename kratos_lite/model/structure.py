@@ -255,7 +255,10 @@ class Structure(Solid):
         warnings = self.check_geometry()
         groups = self.element_groups()
         used, faces = mesh.used_nodes(), mesh.all_faces
-        warnings += checks.check_rules(mesh, groups)
+        if not all(group.is_proven for group in groups):
+            from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
+
+            warnings += check_rules(mesh, groups)
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
