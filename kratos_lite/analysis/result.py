@@ -18,6 +18,8 @@ from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
@@ -323,6 +325,25 @@ class Result(ElementFields, Tabular):
         from kratos_lite.mesh.vtk import pyvista_grid
 
         return pyvista_grid(self.mesh, *fields(self))
+
+    def plot(
+        self, path: str | Path | None = None, values: ArrayLike | str | None = None, **options: Any
+    ) -> Any:
+        """Draw the deformed body, colored; a notebook shows it, and it is written if a path is given.
+
+        Parameters
+        ----------
+        path : picture to write; .png, .pdf or .svg.
+        values : what colors it, ``"von_mises"`` if not given; see `kratos_lite.plot`.
+        options : those of `kratos_lite.plot`, with the same errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.analysis.plot import plot  # a quick start for results
+
+        return plot(self, path, values=values, **options)
 
     # ---- out -----------------------------------------------------------------------------------
 

@@ -13,8 +13,8 @@ from typing import BinaryIO, TypeAlias
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, write_whole
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.vtk import vtk_cells, with_shape
 from kratos_lite.native import threads

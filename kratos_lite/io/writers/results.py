@@ -9,8 +9,8 @@ import numpy as np
 
 from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.report import element_counts
+from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.writers.endings import check_result
 from kratos_lite.io.writers.table import write_table
 

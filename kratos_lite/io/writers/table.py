@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kratos_lite.io.atomic import refuse_nan, write_whole
+from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.io.writers.endings import check_ending
 from kratos_lite.typing import Numbers
 
