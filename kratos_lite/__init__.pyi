@@ -9,6 +9,7 @@ from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
+from kratos_lite.analysis.line_values import LineValues as LineValues
 from kratos_lite.analysis.material_derivatives import material_acceleration as material_acceleration
 from kratos_lite.analysis.material_derivatives import material_derivative as material_derivative
 from kratos_lite.analysis.material_derivatives import material_velocity as material_velocity

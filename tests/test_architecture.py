@@ -20,7 +20,7 @@ def floor(module):
         for name in names:
             if module == name or module.startswith(name + "."):
                 return number, name
-    pytest.fail(f"{module} has no floor; give it one in docs/structure.py and docs/architecture.md")
+    pytest.fail(f"{module} has no floor; give it one in docs/structure.py and docs/about/architecture.md")
 
 
 MODULES = list(structure.modules())

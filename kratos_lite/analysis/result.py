@@ -13,13 +13,15 @@ from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
-from kratos_lite.validation import choice, flag, instance
+from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
+    from kratos_lite.analysis.line_values import LineValues
     from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.mesh.locate import Located
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 METHODS = ("recovery", "equilibrated")
 
 
-class Result(ElementFields):
+class Result(ElementFields, Tabular):
     """Displacements and all that follows from them; strains and stresses are made when asked for.
 
     Analyses make results.
@@ -130,6 +132,48 @@ class Result(ElementFields):
         from kratos_lite.analysis.point_values import PointValues  # a quick start for results
 
         return PointValues(self, self._located(points), flag(recovered, "recovered"))
+
+    def along(self, a: ArrayLike, b: ArrayLike, n: int = 51, *, recovered: bool = False) -> LineValues:
+        """Return the same along a line, with the distance and the membrane and bending parts of the stress.
+
+        Parameters
+        ----------
+        a, b : (3,) m, where the line begins and ends in the undeformed mesh.
+        n : number of points, at equal distances.
+        recovered : as for `at`.
+
+        Returns
+        -------
+        LineValues
+
+        Raises
+        ------
+        InputError
+            An end is no point, or both are the same.
+        MeshError
+            A point lies outside the mesh.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> beam = kl.Model(kl.box((1, 1, 1), element="KinematicLinear3D20N"), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> y = beam.mesh.points[:, 1]
+        >>> beam.fix("x-", "xyz")
+        >>> beam.fix("x+", "x", 1e-3 * (y[beam.mesh.nodes("x+"), None] - 0.25))
+        >>> line = beam.solve().along((0.5, 0, 0.5), (0.5, 1, 0.5), n=3)
+        >>> line.distance.tolist(), line.stress[:, 0].round(6).tolist()
+        ([0.0, 0.5, 1.0], [-250.0, 250.0, 750.0])
+        >>> line.membrane[0].round(6).tolist(), line.bending[0].round(6).tolist()
+        (250.0, -500.0)
+        """
+        from kratos_lite.analysis.line_values import LineValues  # a quick start for results
+
+        ends = np.array(
+            [finite(end, f"the {name} of a line", (3,)) for end, name in ((a, "beginning"), (b, "end"))]
+        )
+        if (ends[0] == ends[1]).all():
+            raise InputError(f"a line needs two ends; both are {ends[0].tolist()}")
+        return LineValues(self, ends, whole_number(n, "n", least=2), flag(recovered, "recovered"))
 
     def _located(self, points: ArrayLike | Located) -> Located:
         """Return where points lie in the mesh; raise MeshError if one lies outside."""
@@ -259,8 +303,3 @@ class Result(ElementFields):
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]
-
-    def __str__(self) -> str:
-        rows = self.table()
-        width = max(len(label) for label, _ in rows)
-        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)

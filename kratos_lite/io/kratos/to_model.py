@@ -58,9 +58,8 @@ def model_from(
         processes(values)
     with naming(document.mesh.source):
         values.apply(model)
-    if initial_displacement:
-        _activate(model, u0)
-    with naming(document.mesh.source):
+        if initial_displacement:
+            _activate(model, u0)
         _constrain(model, document)
     return model
 

@@ -36,6 +36,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
     return body, placed(time, steps)
 
 
+def check(case: Case) -> list[str]:
+    """Return the warnings of the body; no step is taken."""
+    return prepare(case)[0].warnings()
+
+
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Take the steps of a body, and draw its path."""
     body, states = prepare(case, progress)

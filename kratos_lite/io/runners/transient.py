@@ -42,6 +42,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     return transient, placed(time, steps)
 
 
+def check(case: Case) -> list[str]:
+    """Return the warnings of the model and of its start; no step is taken."""
+    return prepare(case)[0].equations.warnings
+
+
 def _held_at_first(transient: TransientAnalysis) -> Structure:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
