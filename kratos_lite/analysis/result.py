@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
@@ -275,6 +277,25 @@ class Result(ElementFields, Tabular):
         if report.error is None:
             return str(self._error)
         return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
+
+    def plot(
+        self, path: str | Path | None = None, values: ArrayLike | str | None = None, **options: Any
+    ) -> Any:
+        """Draw the deformed body, colored; a notebook shows it, and it is written if a path is given.
+
+        Parameters
+        ----------
+        path : picture to write; .png, .pdf or .svg.
+        values : what colors it, ``"von_mises"`` if not given; see `kratos_lite.plot`.
+        options : those of `kratos_lite.plot`, with the same errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.analysis.plot import plot  # a quick start for results
+
+        return plot(self, path, values=values, **options)
 
     # ---- out -----------------------------------------------------------------------------------
 

@@ -176,7 +176,7 @@ class Mesh(Cells, Tabular):
         Parameters
         ----------
         name : of the new part; a part of that name is replaced.
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class Mesh(Cells, Tabular):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Returns
         -------
@@ -333,7 +333,7 @@ class Mesh(Cells, Tabular):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Returns
         -------

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, write_whole
 from kratos_lite.io.writers.page.content import Content, Field, Frame
 from kratos_lite.io.writers.page.library import library
 from kratos_lite.typing import Array
