@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, and `.csv`."""
+"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, `.html` for the browser, `.csv` of nodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json or .csv."""
+    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json, .html or .csv."""
     check_result(path, mode)
     ending = Path(path).suffix.lower()
     if ending == ".json":
@@ -27,6 +27,11 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
         return
     if ending == ".csv":
         write_table(path, result.columns())
+        return
+    if ending == ".html":
+        from kratos_lite.io.writers.page.write import write_result_page  # rarely needed
+
+        write_result_page(path, result)
         return
     points, cells = fields(result)
     if ending == ".vtu":
