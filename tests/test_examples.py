@@ -93,7 +93,8 @@ def test_command_lines_of_each_page_run(page, tmp_path):
 
 def test_elements_of_the_guide_conform(tmp_path):
     script = tmp_path / "guide.py"
-    script.write_text("\n".join(python_blocks((DOCS / "howto" / "own-element.md").read_text())))
+    pages = [(DOCS / "howto" / f"own-{what}.md").read_text() for what in ("element", "material")]
+    script.write_text("\n".join(python_blocks("".join(pages))))
     out = run(sys.executable, "-m", "kratos_lite", "check", script)
     assert "MyWedge3D6N: 33 checks passed, 0 failed" in out
     assert "MeanDilatation3D8N: 33 checks passed, 0 failed" in out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -13,10 +13,13 @@ from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
 from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 METHODS = ("recovery", "equilibrated")
 
 
-class Result(ElementFields):
+class Result(ElementFields, Tabular):
     """Displacements and all that follows from them; strains and stresses are made when asked for.
 
     Analyses make results.
@@ -275,6 +278,25 @@ class Result(ElementFields):
             return str(self._error)
         return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
 
+    def plot(
+        self, path: str | Path | None = None, values: ArrayLike | str | None = None, **options: Any
+    ) -> Any:
+        """Draw the deformed body, colored; a notebook shows it, and it is written if a path is given.
+
+        Parameters
+        ----------
+        path : picture to write; .png, .pdf or .svg.
+        values : what colors it, ``"von_mises"`` if not given; see `kratos_lite.plot`.
+        options : those of `kratos_lite.plot`, with the same errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.analysis.plot import plot  # a quick start for results
+
+        return plot(self, path, values=values, **options)
+
     # ---- out -----------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
@@ -302,8 +324,3 @@ class Result(ElementFields):
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]
-
-    def __str__(self) -> str:
-        rows = self.table()
-        width = max(len(label) for label, _ in rows)
-        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)

@@ -394,6 +394,37 @@ def test_check_ends_with_2_where_solve_does_and_says_the_same(run, box, command,
     assert said in done.out + done.err
 
 
+@pytest.mark.parametrize("command", ["check", "solve"])
+@pytest.mark.parametrize(
+    ("name", "slip", "line"),
+    [
+        ("DISPLACEMENT_X", "DISPLACMENT_X", 208),
+        ("VOLUME_ACCELERATION", "VOLUM_ACELERATION", 10),
+        ("YOUNG_MODULUS", "YOUNGS_MODULUS", 8),
+        ("DENSITY", "DENSTY", 7),
+    ],
+)
+def test_a_misspelt_variable_of_a_file_is_named_with_the_right_word(run, folder, command, name, slip, line):
+    Path("cube.mdpa").write_text(GRAVITY_CUBE.read_text().replace(name, slip))
+    assert run(command, "cube.mdpa").refuses(
+        f"cube.mdpa:{line}: unknown variable {slip}. Did you mean {name}?"
+    )
+
+
+def test_all_misspelt_variables_are_named_at_once(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("DENSITY", "density").replace("DISPLACEMENT_Z", "DISPLACEMENTZ")
+    Path("cube.mdpa").write_text(text)
+    assert run("check", "cube.mdpa").refuses("mean DENSITY?\n", "mean DISPLACEMENT_Z?")
+
+
+def test_a_variable_of_another_application_is_a_note(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    DENSITY", "    THERMAL_FACTOR 3\n    DENSITY")
+    Path("cube.mdpa").write_text(text)
+    done = run("solve", "cube.mdpa")
+    assert done.code == 0
+    assert "unknown variable THERMAL_FACTOR is kept, but not used" in done.out
+
+
 def test_options_of_solve_are_refused_where_a_python_file_is_checked(run, folder):
     Path("mine.py").write_text((EXAMPLES / "my_wedge.py").read_text())
     assert run("check", "mine.py", "--fix", "z-:xyz").refuses("--fix is for models; mine.py defines elements")
@@ -874,7 +905,7 @@ DESCRIBED = {
     "12_negative_density.mdpa": ":5: Properties 1: density (DENSITY) -7620 must be ≥ 0",
     "13_nu_half.mdpa": ":7: Properties 1: nu (POISSON_RATIO) 0.5 must be < 0.5",
     "14_E_zero.mdpa": ":6: Properties 1: E (YOUNG_MODULUS) 0 must be > 0 Pa",
-    "20_unknown_variable.mdpa": "found 'YOUNGS_MODULUS' at line 6: Did you mean YOUNG_MODULUS",
+    "20_unknown_variable.mdpa": ":6: unknown variable YOUNGS_MODULUS. Did you mean YOUNG_MODULUS?",
     "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 4",
 }
 """Files that read well and mean nonsense: ``info`` describes them, nothing else takes them."""

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.atomic import refuse_nan, replacing
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, replacing
 from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.formats.foreign import Found, check_ending, guarded, read_foreign
 from kratos_lite.io.formats.gmsh import check_solids
