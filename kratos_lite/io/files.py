@@ -114,8 +114,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or
-        a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
+    path : a result goes to .vtu, .vtk, .json or .html, a page for the browser; a state to .npz, from which
+        `read_state` reads it; a model or a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
     thing : a `Result`, `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
@@ -128,6 +128,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     ------
     InputError
         The thing is not one of these, or the format cannot hold it.
+    KratosLiteError
+        three.js is missing, which a page needs.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result
