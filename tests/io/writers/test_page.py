@@ -12,9 +12,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.io.writers.page.content import exaggeration
-from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face, sharp_edges
+from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face
 from kratos_lite.shapes import LINEAR, SHAPES
+from kratos_lite.view.facets import sharp_edges
 
 CELLS = [
     *("Tetrahedron4", "Tetrahedron10", "Hexahedron8", "Hexahedron20", "Hexahedron27"),
@@ -113,14 +113,6 @@ def test_sharp_edges_of_a_box_are_its_twelve():
     mesh = kl.box((3, 2, 1), (3, 2, 1))
     ends = mesh.points[sharp_edges(mesh)]
     assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 4 * (3 + 2 + 1)) < 1e-12
-
-
-def test_exaggeration_is_a_round_number():
-    X, u = np.array([[0.0, 0, 0], [3, 4, 0]]), np.array([[0.0, 0, 0], [0, 0, 1e-3]])
-    assert exaggeration(X, [u], least=1.0) == 500
-    assert exaggeration(X, [1e4 * u], least=1.0) == 1
-    assert exaggeration(X, [1e4 * u], least=0.0) == 0.05
-    assert exaggeration(X, [0 * u], least=1.0) == 1
 
 
 def test_a_page_holds_mesh_and_fields(result, tmp_path):
