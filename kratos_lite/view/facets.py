@@ -184,6 +184,11 @@ def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:
 
 def outline(mesh: Mesh) -> Array:
     """Return the sharp edges of the undeformed body, (m, 2, 3) m."""
+    return mesh.points[sharp_edges(mesh)]
+
+
+def sharp_edges(mesh: Mesh) -> Ints:
+    """Return the edges along which faces of the undeformed body meet at an angle, (m, 2) rows of nodes."""
     pairs, normals = [], []
     for block in mesh.boundary:
         assert block.shape is not None
@@ -198,4 +203,4 @@ def outline(mesh: Mesh) -> Array:
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).
     sharp = (counts == 2) & (np.linalg.norm(mean, axis=1) < 2 * np.cos(np.radians(15)))
-    return mesh.points[unique[sharp]]
+    return np.asarray(unique[sharp])
