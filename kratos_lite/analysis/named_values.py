@@ -12,15 +12,16 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 from kratos_lite.view.figure import Values
 
+SIZES = ("largest", "middle", "smallest")
 NAMES = {
     "displacement": "displacement",
     **{f"u{axis}": f"displacement along {axis}" for axis in "xyz"},
     "reaction": "reaction",
     "von_mises": "von Mises stress",
     "tresca": "Tresca stress",
-    **{f"s{i}": f"principal stress {i}" for i in (1, 2, 3)},
+    **{f"s{i}": f"{size} principal stress" for i, size in enumerate(SIZES, 1)},
     **{f"s{name.lower()}": f"stress {name.lower()}" for name in voigt.NAMES},
-    **{f"e{i}": f"principal strain {i}" for i in (1, 2, 3)},
+    **{f"e{i}": f"{size} principal strain" for i, size in enumerate(SIZES, 1)},
     **{
         f"e{name.lower()}": f"{'shear ' if name[0] != name[1] else ''}strain {name.lower()}"
         for name in voigt.NAMES
