@@ -29,6 +29,8 @@ NAMES = {
     "error": "estimated error of each element in the energy norm",
 }
 """What each name means."""
+MOTIONS = ("displacement", "ux", "uy", "uz")
+"""Those that need nothing but displacements."""
 
 
 @runtime_checkable
@@ -57,11 +59,10 @@ def named_values(result: Fields, name: str) -> Values:
     title = NAMES[name]
     if name == "error":
         return Values(result.error().per_element, title, "√J", log=True)
-    if name in ("displacement", "reaction"):
-        vectors = result.u if name == "displacement" else result.reactions
-        return Values(np.linalg.norm(vectors, axis=1), title, "m" if name == "displacement" else "N")
-    if name[0] == "u":
-        return Values(result.u[:, "xyz".index(name[1])], title, "m")
+    if name in MOTIONS:
+        return motion_values(result.u, name)
+    if name == "reaction":
+        return Values(np.linalg.norm(result.reactions, axis=1), title, "N")
     if name[0] == "e":
         return Values(
             _component(
@@ -70,6 +71,12 @@ def named_values(result: Fields, name: str) -> Values:
             title,
         )
     return Values(_component(result.stress("node"), name if len(name) > 3 else name[1:]), title, "Pa")
+
+
+def motion_values(u: Array, name: str) -> Values:
+    """Return the values of displacements (n, 3) by a name of `MOTIONS`."""
+    numbers = np.linalg.norm(u, axis=1) if name == "displacement" else u[:, "xyz".index(name[1])]
+    return Values(numbers, NAMES[name], "m")
 
 
 def _component(tensor: Array, name: str) -> Array:

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.state import State, at
+from kratos_lite.analysis.state import State, at, check_state_of_body
+from kratos_lite.analysis.subjects import evenly
 from kratos_lite.bodies import Body, RigidLink
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
 from kratos_lite.validation import short, whole_number
+from kratos_lite.view.figure import Subject
 from kratos_lite.view.marks import Marks
 from kratos_lite.view.trajectory import Path, trajectory_figure
 
@@ -73,6 +75,24 @@ def _row(body: Body, state: State) -> Array:
             float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
         ]
         return np.concatenate([[state.time, *energies, sum(energies)], body.mass_center()])
+
+
+def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> list[Subject]:
+    """Return a body in its states, at most so many, with their times as titles."""
+    found = states_of(body, states)
+    assert body.mesh is not None
+    X, chosen = body.mesh.points, [found[row] for row in evenly(len(found), most)]
+    return [
+        Subject(
+            body.mesh,
+            body.position(X, check_state_of_body(state, body).q) - X,
+            None,
+            f"{title or ''}\nt = {state.time:.3f} s".strip(),
+            marks_of(body, state.q),
+            True,
+        )
+        for state in chosen
+    ]
 
 
 def marks_of(body: Body, q: Array) -> Marks:

@@ -133,6 +133,12 @@ def fit(figure: Any, margin: float = 0.1) -> None:
     figure.set_size_inches(new)
 
 
+def pixels(figure: Any) -> Any:
+    """Return a figure as an array (height, width, 3) uint8, a copy."""
+    figure.canvas.draw()
+    return np.array(figure.canvas.buffer_rgba())[..., :3]
+
+
 # ---- files -----------------------------------------------------------------------------------------
 
 
@@ -196,13 +202,13 @@ def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) 
 # ---- what is drawn ---------------------------------------------------------------------------------
 
 
-def polygons(axes: Any, corners: Array, colors: Array, widths: Array) -> Any:
+def polygons(axes: Any, corners: Array, colors: Array) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
     return axes.add_collection(
-        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=widths, zorder=2),
+        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=0.45, zorder=2),
         autolim=False,
     )
 

@@ -186,8 +186,7 @@ def draw_facets(axes: Any, rows: Array, facets: Facets, colors: Array, ink: Arra
     above = (near.max(axis=1) - near.mean(axis=1)).max() if len(P) else 0.0
     order = np.argsort(np.concatenate([near.mean(axis=1), E.mean(axis=1) @ rows[2] + above]), kind="stable")
     both = np.vstack([colors, np.tile(ink, (len(E), 1))])[order]
-    widths = np.repeat([0.4, 0.5], [len(P), len(E)])[order]
-    return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both, widths)
+    return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both)
 
 
 def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:

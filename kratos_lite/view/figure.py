@@ -55,6 +55,7 @@ class Subject:
     values : what colors it.
     title : above the picture.
     marks : what holds it.
+    moving : whether it moves through space, so that its first place is none to show.
     """
 
     mesh: Mesh
@@ -62,6 +63,7 @@ class Subject:
     values: Values | None = None
     title: str = ""
     marks: Marks | None = None
+    moving: bool = False
 
 
 @record(eq=False)
@@ -89,6 +91,7 @@ class Scene:
     window : lower left and upper right of what is shown, in m in the picture.
     colors : scale of colors, or None.
     plane : that cuts the bodies, or None.
+    zoomed : whether the window cuts them off.
     """
 
     subjects: Sequence[Subject]
@@ -97,7 +100,7 @@ class Scene:
     window: tuple[Array, Array]
     colors: Any
     plane: Plane | None
-    zoomed: bool
+    zoomed: bool = False
 
     def place(self, subject: Subject) -> Array:
         """Return where the nodes of a subject are drawn, (n, 3) m."""
@@ -134,18 +137,14 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
     scene.window = window_of(np.concatenate([_drawn(scene, subject) for subject in subjects]))
     if options.zoom is not None:
         scene.window = _zoomed(scene, options.zoom)
-    if plane is not None and not any((plane.distance(s.mesh.points) < 0).any() for s in subjects):
-        d = plane.distance(points)
-        raise InputError(
-            f"clip leaves nothing to draw: along its normal the body spans {d.min() + plane.offset:g} … "
-            f"{d.max() + plane.offset:g} m"
-        )
+    if plane is not None:
+        plane.check(points)
     return scene
 
 
 def _drawn(scene: Scene, subject: Subject) -> Array:
     """Return the nodes of a subject in the picture, (k, 2), deformed and not."""
-    points = [subject.mesh.points, scene.place(subject)]
+    points = [scene.place(subject)] if subject.moving else [subject.mesh.points, scene.place(subject)]
     if subject.marks is not None:
         points.append(subject.marks.points())
     return np.concatenate(points) @ scene.rows[:2].T
@@ -205,15 +204,18 @@ def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
 # ---- layout ----------------------------------------------------------------------------------------
 
 
-def compose(scene: Scene, options: Options) -> tuple[Any, list[Any], float]:
-    """Return the figure with all but the bodies, its panels, and how many m are an inch in them."""
+def compose(scene: Scene, options: Options, title: str | None = None) -> tuple[Any, list[Any], float]:
+    """Return the figure with all but the bodies, its panels, and how many m are an inch in them.
+
+    A `title` takes the place of those of the subjects, as the longest one of an animation.
+    """
     extent = scene.window[1] - scene.window[0]
     columns = _columns(len(scene.subjects), extent, options.size)
     counts = np.array([columns, -(-len(scene.subjects) // columns)])
     last: list[Any] = []
 
     def lay_out(inch: float) -> Any:
-        last[:] = [*_laid_out(scene, options, columns, inch), inch]
+        last[:] = [*_laid_out(scene, options, columns, inch, title), inch]
         return last[0]
 
     fitted(extent, counts, options.size, lay_out)
@@ -250,7 +252,9 @@ def _columns(count: int, extent: Array, size: tuple[float, float]) -> int:
     return max(range(1, count + 1), key=scale)
 
 
-def _laid_out(scene: Scene, options: Options, columns: int, inch: float) -> tuple[Any, list[Any]]:
+def _laid_out(
+    scene: Scene, options: Options, columns: int, inch: float, title: str | None
+) -> tuple[Any, list[Any]]:
     """Return figure and axes; `inch` is that many m in the picture."""
     low, high = scene.window
     size = (high - low) / inch
@@ -259,12 +263,12 @@ def _laid_out(scene: Scene, options: Options, columns: int, inch: float) -> tupl
     for subject in scene.subjects:
         axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_title(subject.title, fontsize=11, pad=8)
+        axes.set_title(subject.title if title is None else title, fontsize=11, pad=8)
         panels.append(axes)
     step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + GAP])
     # The rulers are those of the first panel of the last line, where they are in nobody's way.
     first = (len(panels) - 1) // columns * columns
-    if scene.zoomed:
+    if scene.zoomed or scene.subjects[first].moving:
         draw_triad(panels[first], scene.rows, scene.window, inch)
     else:
         subject = scene.subjects[first]
@@ -309,7 +313,8 @@ def _place_title(figure: Any, title: str) -> None:
 def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int = MANY) -> list[Any]:
     """Draw one subject; return what was drawn."""
     drawn = []
-    if (subject.u is not None and subject.u.any()) or scene.plane is not None:
+    deformed = subject.u is not None and subject.u.any() and not subject.moving
+    if deformed or scene.plane is not None:
         ends = outline(subject.mesh)
         drawn.append(canvas.lines(axes, ends @ scene.rows[:2].T))
     values = None if subject.values is None else subject.values.numbers
