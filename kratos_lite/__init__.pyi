@@ -1,6 +1,8 @@
 """The public names, one a line; ``import kratos_lite`` reads them here."""
 
 from kratos_lite import ale as ale
+from kratos_lite.analysis.comparison import Comparison as Comparison
+from kratos_lite.analysis.comparison import compare as compare
 from kratos_lite.analysis.derived_quantities import reaction_resultant as reaction_resultant
 from kratos_lite.analysis.error_estimate import ErrorEstimate as ErrorEstimate
 from kratos_lite.analysis.error_estimate import QuantityError as QuantityError

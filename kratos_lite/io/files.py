@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
-from kratos_lite.io.formats import ending, read_document, write_document
+from kratos_lite.io.formats import ending, input_file, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.validation import path_of
 
@@ -25,8 +25,8 @@ def read(
 
     Parameters
     ----------
-    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, or
-        any format of meshio.
+    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, a folder
+        with a ``ProjectParameters.json``, or any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
@@ -59,8 +59,8 @@ def read_case(
 
     Parameters
     ----------
-    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; or a Python
-        script that defines `body`, `dt` and `steps`.
+    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; a folder with
+        a ``ProjectParameters.json``; or a Python script that defines `body`, `dt` and `steps`.
     materials : take the materials from a model file; False leaves them to the caller.
     strict : refuse `.mdpa` rows that do not stand on lines of their own.
     allow_outside : let a .json file name files outside its folder.
@@ -77,7 +77,7 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
-    path = path_of(path)
+    path = input_file(path_of(path))
     if ending(path) == ".json":
         from kratos_lite.io.settings import read_settings
 
@@ -114,9 +114,10 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or
-        a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
-    thing : a `Result`, `State`, `Model` or `Mesh`.
+    path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
+        values at points to .csv; a state to .npz, from which `read_state` reads; a model or a mesh to .mdpa,
+        an .elem set, .vtu or a format of meshio.
+    thing : a `Result`, what its `at` or `along` returns, a `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
@@ -128,13 +129,17 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     ------
     InputError
         The thing is not one of these, or the format cannot hold it.
+    KratosLiteError
+        three.js is missing, which a page needs.
     """
     from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.state import State
     from kratos_lite.io.formats.document import Document
     from kratos_lite.io.writers.results import write_result
     from kratos_lite.io.writers.state import write_state
+    from kratos_lite.io.writers.table import write_table
     from kratos_lite.mesh import Mesh
 
     path = path_of(path)
@@ -143,6 +148,9 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return []
     if mode is not None:
         raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
+    if isinstance(thing, PointValues):
+        write_table(path, thing.columns())
+        return []
     if isinstance(thing, State):
         write_state(path, thing)
         return []
@@ -153,7 +161,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
         return write_document(path, _document_of(thing) if isinstance(thing, Mesh) else thing)
-    raise InputError(f"a Result, State, Model or Mesh can be written; got {type(thing).__name__}")
+    known = "a Result, PointValues, State, Model or Mesh"
+    raise InputError(f"{known} can be written; got {type(thing).__name__}")
 
 
 def _document_of(mesh: Mesh) -> Document:

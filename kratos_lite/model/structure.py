@@ -114,7 +114,7 @@ class Structure(Solid, Tabular):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask or node rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask or node rows.
         axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
         value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
             which statics take at the time 0.
@@ -188,6 +188,8 @@ class Structure(Solid, Tabular):
         ------
         InputError
             `load` is neither a load nor a motion, or the amplitude is invalid.
+        MeshError
+            There is no such part or node, or the point of a load lies outside the mesh.
         ModelError
             The motion does not fit the model, or there is one already.
 
@@ -207,7 +209,9 @@ class Structure(Solid, Tabular):
             return
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
-        self.loads.append(load if amplitude is None else ScaledLoad(load, amplitude))
+        load = load if amplitude is None else ScaledLoad(load, amplitude)
+        load.check(self.mesh)
+        self.loads.append(load)
 
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes of all nodes.

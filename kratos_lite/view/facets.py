@@ -198,6 +198,20 @@ def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:
 
 def outline(mesh: Mesh) -> Array:
     """Return the sharp edges of the undeformed body in straight pieces, (m, 2, 3) m."""
+    rows, m = _sharp(mesh)
+    a, b = np.moveaxis(mesh.points[rows], 1, 0)
+    t = np.linspace(0, 1, 7 if (m != (a + b) / 2).any() else 2)[:, None, None]
+    curves = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
+    return np.stack([curves[:-1], curves[1:]], axis=2).reshape(-1, 2, 3)
+
+
+def sharp_edges(mesh: Mesh) -> Ints:
+    """Return the edges along which faces of the undeformed body meet at an angle, (m, 2) rows of nodes."""
+    return _sharp(mesh)[0]
+
+
+def _sharp(mesh: Mesh) -> tuple[Ints, Array]:
+    """Return sharp edges (m, 2) as rows of nodes, and their middles (m, 3) m."""
     pairs, middles, normals = [], [], []
     for block in mesh.boundary:
         assert block.shape is not None
@@ -215,8 +229,4 @@ def outline(mesh: Mesh) -> Array:
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).
     sharp = (counts == 2) & (np.linalg.norm(mean, axis=1) < 2 * np.cos(np.radians(15)))
-    a, b = np.moveaxis(mesh.points[unique[sharp]], 1, 0)
-    m = np.concatenate(middles)[first[sharp]]
-    t = np.linspace(0, 1, 7 if (m != (a + b) / 2).any() else 2)[:, None, None]
-    curves = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
-    return np.stack([curves[:-1], curves[1:]], axis=2).reshape(-1, 2, 3)
+    return np.asarray(unique[sharp]), np.concatenate(middles)[first[sharp]]

@@ -280,10 +280,10 @@ def test_run_file_says_the_same_as_options(run, box):
     assert same(displacement("by_file.json"), displacement("by_options.json"), 1e-14)
     told = run("info", "run.json")
     assert told.code == 0
-    assert told.out.startswith("file        run.json\nnodes       27\n")
-    assert "material    Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
-    assert "fixed       27 components" in told.out
-    assert "load        Gravity" in told.out
+    assert told.out.startswith("file         run.json\nnodes        27\n")
+    assert "material     Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
+    assert "fixed        27 components" in told.out
+    assert "load         Gravity" in told.out
     assert run("check", "run.json").out.startswith("run.json: 27 nodes, 8 elements, no errors")
     assert run("convert", "run.json", "run.mdpa").code == 0
     assert run("solve", "run.mdpa", "--json", "again.json").code == 0
@@ -392,6 +392,37 @@ def test_check_ends_with_2_where_solve_does_and_says_the_same(run, box, command,
     done = run(command, "box.vtu", *words)
     assert done.code == 2
     assert said in done.out + done.err
+
+
+@pytest.mark.parametrize("command", ["check", "solve"])
+@pytest.mark.parametrize(
+    ("name", "slip", "line"),
+    [
+        ("DISPLACEMENT_X", "DISPLACMENT_X", 208),
+        ("VOLUME_ACCELERATION", "VOLUM_ACELERATION", 10),
+        ("YOUNG_MODULUS", "YOUNGS_MODULUS", 8),
+        ("DENSITY", "DENSTY", 7),
+    ],
+)
+def test_a_misspelt_variable_of_a_file_is_named_with_the_right_word(run, folder, command, name, slip, line):
+    Path("cube.mdpa").write_text(GRAVITY_CUBE.read_text().replace(name, slip))
+    assert run(command, "cube.mdpa").refuses(
+        f"cube.mdpa:{line}: unknown variable {slip}. Did you mean {name}?"
+    )
+
+
+def test_all_misspelt_variables_are_named_at_once(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("DENSITY", "density").replace("DISPLACEMENT_Z", "DISPLACEMENTZ")
+    Path("cube.mdpa").write_text(text)
+    assert run("check", "cube.mdpa").refuses("mean DENSITY?\n", "mean DISPLACEMENT_Z?")
+
+
+def test_a_variable_of_another_application_is_a_note(run, folder):
+    text = GRAVITY_CUBE.read_text().replace("    DENSITY", "    THERMAL_FACTOR 3\n    DENSITY")
+    Path("cube.mdpa").write_text(text)
+    done = run("solve", "cube.mdpa")
+    assert done.code == 0
+    assert "unknown variable THERMAL_FACTOR is kept, but not used" in done.out
 
 
 def test_options_of_solve_are_refused_where_a_python_file_is_checked(run, folder):
@@ -587,6 +618,28 @@ def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command)
     for name in (".", "sub", ".."):
         assert run(command, name, *rest).refuses("folder")
     assert not Path("out.mdpa").exists()
+
+
+def test_a_folder_is_its_run_file_of_kratos(run, folder):
+    shutil.copytree(EXAMPLES / "cantilever", "beam")
+    by_folder, by_file = (
+        run("solve", name, "--json", "a.json") for name in ("beam", "beam/ProjectParameters.json")
+    )
+    assert (by_folder.code, by_file.code) == (0, 0)
+    assert by_folder.rows["largest displacement"] == by_file.rows["largest displacement"]
+    for command in ("check", "info"):
+        assert run(command, "beam").out == run(command, "beam/ProjectParameters.json").out != ""
+    assert run("convert", "beam", "beam.vtu").code == 0
+    assert kl.read("beam").mesh.n_nodes == kl.read("beam/cantilever.mdpa").mesh.n_nodes
+    Path("beam/ProjectParameters.json").unlink()
+    assert run("solve", "beam").refuses("beam: is a folder without ProjectParameters.json; name a file in it")
+
+
+def test_a_folder_beside_a_set_of_its_name_is_the_stem(run, folder):
+    kl.write("cube.elem", kl.read(GRAVITY_CUBE))
+    Path("cube").mkdir()
+    Path("cube/ProjectParameters.json").write_text("{}")
+    assert run("solve", "cube").code == 0
 
 
 def fingerprints():
@@ -874,7 +927,7 @@ DESCRIBED = {
     "12_negative_density.mdpa": ":5: Properties 1: density (DENSITY) -7620 must be ≥ 0",
     "13_nu_half.mdpa": ":7: Properties 1: nu (POISSON_RATIO) 0.5 must be < 0.5",
     "14_E_zero.mdpa": ":6: Properties 1: E (YOUNG_MODULUS) 0 must be > 0 Pa",
-    "20_unknown_variable.mdpa": "found 'YOUNGS_MODULUS' at line 6: Did you mean YOUNG_MODULUS",
+    "20_unknown_variable.mdpa": ":6: unknown variable YOUNGS_MODULUS. Did you mean YOUNG_MODULUS?",
     "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 4",
 }
 """Files that read well and mean nonsense: ``info`` describes them, nothing else takes them."""
