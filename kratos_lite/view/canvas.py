@@ -85,6 +85,18 @@ def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
     return figure, axes
 
 
+def new_plot(size: tuple[float, float], *units: str) -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone, numbers with prefixes of their units."""
+    figure = empty(size)
+    from matplotlib.ticker import EngFormatter
+
+    axes = figure.add_subplot()
+    axes.spines[["top", "right"]].set_visible(False)
+    for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
+        axis.set_major_formatter(EngFormatter(unit) if unit else lambda value, _: f"{value:g}")
+    return figure, axes
+
+
 def axes_in_inches(figure: Any, place: Any, size: Any) -> Any:
     """Return new axes with their lower left corner and size in inches."""
     width, height = figure.get_size_inches()
