@@ -19,6 +19,7 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.plot import animate as animate
 from kratos_lite.analysis.plot import plot as plot
 from kratos_lite.analysis.point_values import PointValues as PointValues
 from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
