@@ -2,8 +2,8 @@
 
 Sets: ``kratos error growth stall assembly parse skips cube1 motion ale``.
 
-``report`` makes docs/benchmarks.md and its picture from the results kept; ``references`` makes the energies
-of the scenes without an exact field.  See benchmarks/README.md.
+``report`` makes docs/about/benchmarks.md and its picture from the results kept; ``references`` makes the
+energies of the scenes without an exact field.  See benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from benchmarks.programs import HELPERS, PROGRAMS
 from benchmarks.tables import Row
 
 RESULTS = Path(__file__).with_name("results")
-PAGE, PICTURES = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "benchmarks"
+PAGE, PICTURES = ROOT / "docs" / "about" / "benchmarks.md", ROOT / "docs" / "images" / "benchmarks"
 QUICK_SIZES = {"4N": (4, 8), "8N": (4, 8), "10N": (2, 4), "20N": (2, 4), "27N": (2, 4)}
 QUICK_PROGRAMS = ("kratos_lite", "kratos_lite NumPy", "Kratos", "scikit-fem")
 

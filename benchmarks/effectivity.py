@@ -2,7 +2,7 @@
 
 ``python -m benchmarks effectivity`` solves the scenes with all elements on two meshes each, compares
 `result.error()` with the error of the solution, and recovered and averaged stresses at nodes with the exact
-ones; it writes benchmarks/results/effectivity.json and the last section of docs/accuracy.md.
+ones; it writes benchmarks/results/effectivity.json and the last section of docs/about/estimated-errors.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kratos_lite.verification.errors import errors
 from kratos_lite.verification.meshes import kind_of
 
 RESULTS = Path(__file__).with_name("results") / "effectivity.json"
-PAGE = ROOT / "docs" / "accuracy.md"
+PAGE = ROOT / "docs" / "about" / "estimated-errors.md"
 NAMES = ("manufactured", "sphere", "bending", "l_domain", "cavity", "hole_incompressible")
 KINDS = ("4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N", *scenes.FORMULATIONS)
 SIZES = {1: (4, 8), 2: (2, 4)}

@@ -1,4 +1,4 @@
-"""From rows to tables, ratios and docs/benchmarks.md."""
+"""From rows to tables, ratios and docs/about/benchmarks.md."""
 
 from __future__ import annotations
 
@@ -356,13 +356,13 @@ def text(rows: Sequence[Row]) -> str:
     return "\n".join(parts)
 
 
-def page(kept: Sequence[dict[str, Any]], images: str = "images/benchmarks") -> str:
-    """Return docs/benchmarks.md of the results kept."""
+def page(kept: Sequence[dict[str, Any]], images: str = "../images/benchmarks") -> str:
+    """Return docs/about/benchmarks.md of the results kept."""
     rows = [row for found in kept for row in found["rows"]]
     lines = [
         "# Benchmarks\n",
         "This page is made by `python -m benchmarks report` from `benchmarks/results/`; what is measured "
-        "and how is stated in [the charter](../benchmarks/README.md). Compare ratios, not seconds: each "
+        "and how is stated in `benchmarks/README.md`. Compare ratios, not seconds: each "
         "table is from one run, in which the programs took turns.\n",
         table(
             ["run", "date", "machine", "versions"],

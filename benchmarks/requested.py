@@ -4,7 +4,7 @@
 solves meshes made by hand, uniform ones and at the re-entrant corner graded ones, of several elements.  Times
 are of the processor, that of the solution alone; hand-made meshes have theirs at the true error of the
 adaptive solution, on the line through the two meshes of one element nearest to it.  It writes
-benchmarks/results/adaptive.json; docs/accuracy.md shows it.
+benchmarks/results/adaptive.json; docs/about/estimated-errors.md shows it.
 """
 
 from __future__ import annotations

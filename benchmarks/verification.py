@@ -25,7 +25,7 @@ from kratos_lite.verification.problem import Row, StaticProblem
 from kratos_lite.verification.scenes import Scene
 from kratos_lite.verification.table import verify
 
-PAGE = ROOT / "docs" / "verification.md"
+PAGE = ROOT / "docs" / "about" / "verification.md"
 RESULTS = ROOT / "benchmarks" / "results" / "verification.json"
 COMMAND = "python -m benchmarks.verification"
 PEERS = ("Kratos", "CalculiX", "scikit-fem")

@@ -65,4 +65,4 @@ print(f"the hub carries {force[2] / 1e3:.2f} kN")
 # %%
 if len(sys.argv) > 1:
     title = "Wheel at 60 rad/s, pressed from below: von Mises stress"
-    kl.draw(sys.argv[1], mesh, result.u, result.von_mises("node"), title=title, unit="Pa", size=(6, 5))
+    result.plot(sys.argv[1], title=title, size=(6, 5))

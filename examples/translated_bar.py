@@ -56,4 +56,5 @@ if len(sys.argv) > 1:
     along = np.concatenate([moment.u[:, 0] for moment in moments])
     upward = np.outer(along, (0, 0, 1))
     title = f"Displacement along the bar drawn upwards, {moments[1].time:g} s from one to the next"
-    kl.draw(sys.argv[1], mesh, upward, along, title=title, unit="m", scale=3000, size=(6, 4))
+    drawn = {"displacement": upward, "scale": 3000, "values": along, "unit": "m"}
+    kl.plot(mesh, sys.argv[1], **drawn, title=title, view="iso", size=(6, 4))

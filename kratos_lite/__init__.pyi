@@ -9,6 +9,7 @@ from kratos_lite.analysis.integrators import Bossak as Bossak
 from kratos_lite.analysis.integrators import CentralDifference as CentralDifference
 from kratos_lite.analysis.integrators import GeneralizedAlpha as GeneralizedAlpha
 from kratos_lite.analysis.integrators import Newmark as Newmark
+from kratos_lite.analysis.line_values import LineValues as LineValues
 from kratos_lite.analysis.material_derivatives import material_acceleration as material_acceleration
 from kratos_lite.analysis.material_derivatives import material_derivative as material_derivative
 from kratos_lite.analysis.material_derivatives import material_velocity as material_velocity
@@ -16,6 +17,8 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.plot import plot as plot
+from kratos_lite.analysis.point_values import PointValues as PointValues
 from kratos_lite.analysis.quantities import DisplacementAt as DisplacementAt
 from kratos_lite.analysis.quantities import MeanDisplacement as MeanDisplacement
 from kratos_lite.analysis.quantities import Quantity as Quantity
@@ -78,12 +81,8 @@ from kratos_lite.io.files import read_case as read_case
 from kratos_lite.io.files import write as write
 from kratos_lite.io.run import run as run
 from kratos_lite.io.runners.outcome import Outcome as Outcome
-from kratos_lite.io.writers.pictures import draw as draw
-from kratos_lite.io.writers.pictures import draw_element as draw_element
-from kratos_lite.io.writers.pictures import draw_history as draw_history
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.io.writers.state import read_state as read_state
-from kratos_lite.io.writers.trajectory import draw_trajectory as draw_trajectory
 from kratos_lite.materials import MATERIALS as MATERIALS
 from kratos_lite.materials import LinearMaterial as LinearMaterial
 from kratos_lite.materials.isotropic3d import Isotropic3D as Isotropic3D

@@ -1,4 +1,4 @@
-"""Records: classes made of their fields, as dataclasses are, that take no time to define.
+"""Records: classes made of their fields, as dataclasses are, that take no time to define; and their tables.
 
 `dataclasses.dataclass` compiles the methods of each class anew, half a millisecond at every start of a
 program; those of records are shared.  A record becomes a dataclass when anybody asks it for what dataclasses
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["field", "names_of", "record", "replace"]
+__all__ = ["Tabular", "field", "names_of", "record", "replace"]
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as record
@@ -57,6 +57,33 @@ LATER = ("__dataclass_fields__", "__dataclass_params__", "__match_args__", "__si
 """What a record has only from the moment when it is asked for."""
 REQUIRED = object()
 """In place of the default of a field that has none."""
+
+
+class Tabular:
+    """What is shown as a table of labels and values, printed or in a notebook."""
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary.
+
+        Returns
+        -------
+        Labels and values.
+        """
+        return []
+
+    def __str__(self) -> str:
+        rows = self.table()
+        width = max((len(label) for label, _ in rows), default=0)
+        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+    def _repr_html_(self) -> str:
+        from html import escape  # notebooks alone need it
+
+        cell = '<td style="text-align: left">'
+        rows = "".join(
+            f"<tr>{cell}{escape(label)}</td>{cell}{escape(text)}</td></tr>\n" for label, text in self.table()
+        )
+        return f"<table>\n<caption>{escape(type(self).__name__)}</caption>\n{rows}</table>"
 
 
 def replace(item: Any, **changes: Any) -> Any:

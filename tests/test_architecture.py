@@ -20,7 +20,7 @@ def floor(module):
         for name in names:
             if module == name or module.startswith(name + "."):
                 return number, name
-    pytest.fail(f"{module} has no floor; give it one in docs/structure.py and docs/architecture.md")
+    pytest.fail(f"{module} has no floor; give it one in docs/structure.py and docs/about/architecture.md")
 
 
 MODULES = list(structure.modules())
@@ -74,7 +74,7 @@ def test_the_picture_of_the_structure_is_current():
 
 def test_few_floors_and_few_modules_at_the_root():
     root = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__", "__main__"}
-    assert len(root) <= 7, sorted(root)
+    assert len(root) <= 8, sorted(root)
     assert len(FLOORS) <= 12
 
 

@@ -43,28 +43,27 @@ def test_python_of_the_readme_runs(number, tmp_path):
         assert abs(float(out) / -0.13221477551020406 - 1) < 1e-12
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        "users.md",
-        "elements.md",
-        "accuracy.md",
-        "add-an-element.md",
-        "formats.md",
-        "exercises.md",
-        "bodies.md",
-        "dynamics.md",
-        "ale.md",
-    ],
+DOCS = EXAMPLES.parent / "docs"
+PAGES = sorted(
+    str(page.relative_to(DOCS))
+    for folder in (DOCS, DOCS / "howto", DOCS / "reference")
+    for page in folder.glob("*.md")
+    if python_blocks(page.read_text())
 )
+
+
+def test_pages_with_python_are_found():
+    assert len(PAGES) >= 9
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
-    blocks = python_blocks((EXAMPLES.parent / "docs" / page).read_text())
-    assert blocks
+    blocks = python_blocks((DOCS / page).read_text())
     script = tmp_path / "page.py"
     script.write_text("\n".join(blocks))
     out = run(sys.executable, "-W", "error", script, cwd=tmp_path)
-    if page == "ale.md":
-        lines = re.findall(r"^kratos-lite (.*)$", (EXAMPLES.parent / "docs" / page).read_text(), re.M)
+    if page == "howto/moving-material.md":
+        lines = re.findall(r"^kratos-lite (.*)$", (DOCS / page).read_text(), re.M)
         assert len(lines) == 6
         for line in lines:
             run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
@@ -84,7 +83,7 @@ def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
 @pytest.mark.parametrize("page", ["bodies.md", "dynamics.md"])
 def test_command_lines_of_each_page_run(page, tmp_path):
     pytest.importorskip("matplotlib")
-    text = (EXAMPLES.parent / "docs" / page).read_text().replace("\\\n", "")
+    text = (DOCS / page).read_text().replace("\\\n", "")
     lines = re.findall(r"^kratos-lite ([^#\n]*)", text, re.M)
     assert len(lines) >= 3
     (tmp_path / "examples").symlink_to(EXAMPLES)
@@ -94,7 +93,7 @@ def test_command_lines_of_each_page_run(page, tmp_path):
 
 def test_elements_of_the_guide_conform(tmp_path):
     script = tmp_path / "guide.py"
-    script.write_text("\n".join(python_blocks((EXAMPLES.parent / "docs" / "add-an-element.md").read_text())))
+    script.write_text("\n".join(python_blocks((DOCS / "howto" / "own-element.md").read_text())))
     out = run(sys.executable, "-m", "kratos_lite", "check", script)
     assert "MyWedge3D6N: 33 checks passed, 0 failed" in out
     assert "MeanDilatation3D8N: 33 checks passed, 0 failed" in out
@@ -127,7 +126,7 @@ def test_the_gust_bends_the_tower_twice_as_far_as_the_steady_wind(tmp_path):
     assert time == pytest.approx(np.pi / omega, abs=0.02)
     assert f"{largest:.6e} m at node" in out
     assert json.loads(gust.read_text()) == json.loads(
-        re.findall(r"```json\n(.*?)```", (EXAMPLES.parent / "docs" / "dynamics.md").read_text(), re.DOTALL)[0]
+        re.findall(r"```json\n(.*?)```", (DOCS / "dynamics.md").read_text(), re.DOTALL)[0]
     )
 
 
@@ -198,7 +197,7 @@ def test_a_scene_in_python_is_integrated(tmp_path):
     assert rows[-1][6:9] == pytest.approx(end.tolist(), abs=1e-5)
     assert rows[-1][12:] == pytest.approx([0.136, 23.2, 0.052], rel=1e-9)  # J ω: drag has no torque
     assert abs(number(r"energy drift +(\S+)", out)) < 1e-6
-    assert "examples/bodies/thrown_box.py" in (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+    assert "examples/bodies/thrown_box.py" in (DOCS / "bodies.md").read_text()
 
 
 def test_both_forms_of_the_spinning_bar_stretch_alike():
@@ -218,7 +217,7 @@ def test_a_stiff_box_keeps_its_energy_by_energy_momentum_alone():
 
 
 def test_the_scene_of_the_guide_is_sound(tmp_path):
-    page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+    page = (DOCS / "bodies.md").read_text()
     (scene,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
     (tmp_path / "scene.json").write_text(scene)
     run(sys.executable, "-m", "kratos_lite", "solve", tmp_path / "scene.json", "-q")
@@ -230,7 +229,7 @@ def test_the_guide_names_every_type_and_key():
     from kratos_lite.io.readers.body_file import KEYS, MESHES, OPTIONS, OUTPUTS
     from kratos_lite.io.readers.body_loads import CONSTRAINTS, LOADS
 
-    page = (EXAMPLES.parent / "docs" / "bodies.md").read_text()
+    page = (DOCS / "bodies.md").read_text()
     table = page[page.index("| key | value |") :]
     for name in (*KEYS, *OUTPUTS, *LOADS, *CONSTRAINTS):
         assert f"`{name}`" in table, name

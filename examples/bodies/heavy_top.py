@@ -39,4 +39,4 @@ print(f"vertical momentum {top.angular_momentum()[2]:.9f}, at first {25 * np.cos
 
 # %%
 if len(sys.argv) > 1:
-    kl.draw_trajectory(sys.argv[1], top, states[:880], shown=3, title="half a nutation", size=(6, 6))
+    kl.plot(top, sys.argv[1], states=states[:880], shown=3, title="half a nutation", size=(6, 6))

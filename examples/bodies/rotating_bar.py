@@ -31,4 +31,4 @@ for formulation in ("total_lagrangian", "corotational"):
 
 # %%
 if len(sys.argv) > 1:
-    kl.draw_trajectory(sys.argv[1], bar, states, title="spinning bar", size=(6, 6))
+    kl.plot(bar, sys.argv[1], states=states, title="spinning bar", size=(6, 6))

@@ -33,4 +33,4 @@ print(f"strain energy {body.internal_energy():.3f} J at the end")
 
 # %%
 if len(sys.argv) > 2:
-    kl.draw_trajectory(sys.argv[2], body, states, title=f"{kind} box", size=(6, 6))
+    kl.plot(body, sys.argv[2], states=states, title=f"{kind} box", size=(6, 6))

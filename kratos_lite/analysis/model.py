@@ -13,6 +13,8 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.matrices import LocalSystem, Matrices
@@ -250,6 +252,22 @@ class Model(Structure):
         from kratos_lite.analysis.modal import complex_modes
 
         return complex_modes(self, count, progress)
+
+    def plot(self, path: str | Path | None = None, **options: Any) -> Any:
+        """Draw the body; a notebook shows it, and it is written if a path is given.
+
+        Parameters
+        ----------
+        path : picture to write; .png, .pdf or .svg.
+        options : those of `kratos_lite.plot`, with the same errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.analysis.plot import plot  # a quick start without it
+
+        return plot(self, path, **options)
 
     # ---- the equations themselves --------------------------------------------------------------
 

@@ -34,8 +34,11 @@ class Solved(Protocol):
     u: Array
     reactions: Array
 
-    def stress(self, at: Any) -> Any:
-        """Return stresses (..., 6) in Pa at points, of elements or recovered at nodes."""
+    def at(self, points: ArrayLike) -> Any:
+        """Return displacements and stresses at points."""
+
+    def stress(self, at: str) -> Any:
+        """Return stresses (..., 6) in Pa of elements or recovered at nodes."""
 
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses (n, 6) in Pa at the nodes of the material of an element."""
@@ -112,7 +115,7 @@ class Quantity(ABC):
 
 
 class DisplacementAt(Quantity):
-    """The displacement of a point along an axis, as ``result.displacement(at=point)``.
+    """The displacement of a point along an axis, as ``result.at(point).displacement``.
 
     Parameters
     ----------
@@ -132,7 +135,7 @@ class DisplacementAt(Quantity):
     >>> bar.add(kl.Traction("x+", (0, 0, 1.0)))
     >>> tip = kl.DisplacementAt((4, 0.5, 0.5), "z")
     >>> result = bar.solve()
-    >>> bool(abs(tip.value(result) / result.displacement(at=(4, 0.5, 0.5))[2] - 1) < 1e-12)
+    >>> bool(abs(tip.value(result) / result.at((4, 0.5, 0.5)).displacement[2] - 1) < 1e-12)
     True
     """
 
@@ -266,7 +269,7 @@ class ReactionOf(Quantity):
 
 
 class StressAt(Quantity):
-    """A component of the stress at a point, as ``result.stress(at=point)``.
+    """A component of the stress at a point, as ``result.at(point).stress``.
 
     It is that of the element which holds the point.  Recovered stresses at nodes are closer, as a rule, and
     the estimate of the error goes by them.
@@ -300,7 +303,7 @@ class StressAt(Quantity):
 
     def value(self, result: Solved) -> float:
         """Return the stress in Pa."""
-        return float(result.stress(at=self.point)[COMPONENTS.index(self.component)])
+        return float(result.at(self.point).stress[COMPONENTS.index(self.component)])
 
     def load(self, result: Solved) -> Array:
         """Return ∫ B^T C dV / V (n, 3) of the component, of the elements around the point."""
@@ -319,7 +322,7 @@ class StressAt(Quantity):
         at_point = float(located.interpolate(recovered)[c]) - self.value(result)
         N, _ = tabulate(group.element.shape, group.rule)
         volume = volumes(result.mesh.points, group)
-        off = recovered[group.nodes][..., c] @ N.T - result.stress(at="element")[group.rows, None, c]
+        off = recovered[group.nodes][..., c] @ N.T - result.stress("element")[group.rows, None, c]
         out = np.zeros(result.mesh.n_elements)
         out[located.rows] = at_point - (off * volume).sum() / volume.sum()
         return out

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
-from kratos_lite.records import field, record
+from kratos_lite.records import Tabular, field, record
 from kratos_lite.typing import Array
 
 
@@ -48,7 +48,7 @@ class RefinementStep:
 
 
 @record
-class Report:
+class Report(Tabular):
     """What was solved, how, and how well.
 
     Attributes
@@ -94,6 +94,15 @@ class Report:
     error_of: str = "the energy norm"
     error_asked: float | None = None
     history: list[RefinementStep] = field(default_factory=list)
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of the summary.
+
+        Returns
+        -------
+        Labels and values.
+        """
+        return self.load_rows() + self.solution_rows()
 
     def load_rows(self, size: float = 0.0) -> list[tuple[str, str]]:
         """Return the rows of the summary about formulation, unknowns and loads, forces of `size` N in all."""

@@ -4,34 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from kratos_lite import voigt
+from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.report import Report, element_counts, vector
-from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
-from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
-from kratos_lite.validation import choice, instance
+from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import ArrayLike
 
     from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
+    from kratos_lite.analysis.line_values import LineValues
+    from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.quantities import Quantity
-    from kratos_lite.assembly.recovery import Recovery
     from kratos_lite.mesh.locate import Located
 
-At: TypeAlias = "str | ArrayLike | Located"
-"""Gauss points, elements or nodes by the names of `PLACES`; or points (..., 3) in m, or where they lie."""
-PLACES = ("gauss", "element", "node", "averaged", "raw")
 METHODS = ("recovery", "equilibrated")
 
 
-class Result:
+class Result(ElementFields, Tabular):
     """Displacements and all that follows from them; strains and stresses are made when asked for.
 
     Analyses make results.
@@ -58,42 +58,32 @@ class Result:
         u0: Array | None = None,
         origin: Origin | None = None,
     ) -> None:
-        self.mesh = mesh
-        self.groups = list(groups)
-        self.u = u
+        super().__init__(mesh, groups, u, u0)
         self.reactions = reactions
         self.loads = loads
-        for array in (u, reactions, loads):
-            array.setflags(write=False)  # strains and stresses are made of them later
+        for array in (reactions, loads):
+            array.setflags(write=False)  # others are made of them later
         self.report = report
-        self._strained = u if u0 is None else u - u0
         self._origin = origin
 
     # ---- nodal values --------------------------------------------------------------------------
 
-    def displacement(self, where: Where | None = None, *, at: ArrayLike | Located | None = None) -> Array:
-        """Return the displacements of nodes, or at points anywhere in the mesh.
+    def displacement(self, where: Where | None = None) -> Array:
+        """Return the displacements of nodes.
 
         Parameters
         ----------
         where : nodes by part, predicate, mask or rows; all if not given.
-        at : in their place, points (..., 3) in m of the undeformed mesh, or what ``mesh.locate`` has found.
 
         Returns
         -------
-        (n, 3) in m, (k, 3) of some, or (..., 3) at points.
+        (n, 3) in m, or (k, 3) of some.
 
         Raises
         ------
-        InputError
-            Both nodes and points are given, or points are not finite.
         MeshError
-            A point lies outside the mesh, or there is no such part or node.
+            There is no such part or node.
         """
-        if at is not None:
-            if where is not None:
-                raise InputError("ask for displacements of nodes (where) or at points (at), not both")
-            return self._located(at).interpolate(self.u)
         return self.u if where is None else self.u[self.mesh.nodes(where)]
 
     def reaction(self, where: Where | None = None) -> Array:
@@ -109,93 +99,25 @@ class Result:
         """
         return self.reactions if where is None else self.reactions[self.mesh.nodes(where)]
 
-    # ---- element values ------------------------------------------------------------------------
+    # ---- anywhere in the mesh --------------------------------------------------------------------
 
-    def _field(self, at: At, stress: bool) -> Any:
-        if not (at is None or isinstance(at, str)):
-            from kratos_lite.assembly.point_fields import at_located  # as for the recovery
-
-            return at_located(self.groups, self._located(at), self._strained, stress=stress)
-        place = choice(at, "at", PLACES)
-        if place == "gauss":
-            points, u = self.mesh.points, self._strained
-            return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
-        if place == "raw":
-            from kratos_lite.assembly.nodal_values import extrapolated
-
-            points, u = self.mesh.points, self._strained
-            return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
-        if place == "node":
-            return self._recovery.nodal(self._strained, stress=stress)
-        return self._averages(stress)[place == "averaged"]
-
-    @cached_property
-    def _recovery(self) -> Recovery:
-        from kratos_lite.assembly.recovery import Recovery  # a quick start for results
-
-        return Recovery(self.mesh, self.groups)
-
-    def _located(self, at: ArrayLike | Located) -> Located:
-        """Return where points lie in the mesh; raise MeshError if one lies outside."""
-        from kratos_lite.mesh.locate import Located  # as for the recovery
-
-        if not isinstance(at, Located):
-            return self.mesh.locate(at, required=True)
-        if at.mesh is not self.mesh:
-            raise InputError(
-                "these points were located in another mesh; locate them in that of the result, as in "
-                "result.stress(at=result.mesh.locate(points))"
-            )
-        return at.require()
-
-    def _averages(self, stress: bool) -> tuple[Array, Array]:
-        """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
-        from kratos_lite.assembly.nodal_values import averages  # as for the recovery
-
-        m = self.mesh.n_elements
-        return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
-
-    def strain(self, at: At = "gauss") -> Any:
-        """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
+    def at(self, points: ArrayLike | Located, *, recovered: bool = False) -> PointValues:
+        """Return displacements, strains and stresses at points anywhere in the mesh.
 
         Parameters
         ----------
-        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for recovered
-            values, the most accurate at nodes; ``"averaged"`` for values extrapolated to the nodes of each
-            element and averaged there; ``"raw"`` for these of each element; or points (..., 3) in m anywhere
-            in the undeformed mesh, or what ``mesh.locate`` has found of them.
+        points : (..., 3) in m of the undeformed mesh, or what ``mesh.locate`` has found of them.
+        recovered : interpolate the stresses recovered at the nodes, which are continuous in each material and
+            closer at surfaces, as a rule; otherwise they are C B u of the element that holds the point.
 
         Returns
         -------
-        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6) of
-        elements; (n, 6) of nodes; raw (m, k, 6) of k nodes each, or a list of (k, 6) where these differ; or
-        (..., 6) at points, B(ξ) u of the element that contains the point.  On a face between elements,
-        where strains jump, that is the element in the lowest row.
+        PointValues
 
         Raises
         ------
         InputError
-            There is no such place, or points are not finite.
-        MeshError
-            A point lies outside the mesh.
-        """
-        return self._field(at, stress=False)
-
-    def stress(self, at: At = "gauss") -> Any:
-        """Return stresses in Voigt order xx yy zz xy yz zx.
-
-        Parameters
-        ----------
-        at : as for `strain`.
-
-        Returns
-        -------
-        In Pa, shaped as by `strain`.
-
-        Raises
-        ------
-        InputError
-            There is no such place, or points are not finite.
+            The points are not finite, or were located in another mesh.
         MeshError
             A point lies outside the mesh.
 
@@ -205,139 +127,68 @@ class Result:
         >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
         >>> bar.fix("z-")
         >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
-        >>> stress = bar.solve().stress(at=[[0.2, 0.3, 0.9], [0.5, 0.5, 0.5]])
-        >>> stress[:, 2].round(9).tolist()
-        [5.0, 5.0]
+        >>> values = bar.solve().at([[0.2, 0.3, 0.9], [0.5, 0.5, 0.5]])
+        >>> values.stress[:, 2].round(9).tolist(), values.displacement[1, 2].round(9).tolist()
+        ([5.0, 5.0], 2.5e-06)
         """
-        if isinstance(at, str) and at == "node":
-            return self._nodal_stress
-        return self._field(at, stress=True)
+        from kratos_lite.analysis.point_values import PointValues  # a quick start for results
 
-    @cached_property
-    def _nodal_stress(self) -> Array:
-        return np.asarray(self._field("node", stress=True))
+        return PointValues(self, self._located(points), flag(recovered, "recovered"))
 
-    def stress_of_material(self, row: int) -> Array:
-        """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
+    def along(self, a: ArrayLike, b: ArrayLike, n: int = 51, *, recovered: bool = False) -> LineValues:
+        """Return the same along a line, with the distance and the membrane and bending parts of the stress.
 
         Parameters
         ----------
-        row : of an element of this material.
+        a, b : (3,) m, where the line begins and ends in the undeformed mesh.
+        n : number of points, at equal distances.
+        recovered : as for `at`.
 
         Returns
         -------
-        (n, 6) in Pa, 0 at nodes that no element of this material has.
-        """
-        stress = np.zeros((self.mesh.n_nodes, 6))
-        for region, values in self._recovery.by_region(self._strained):
-            if any((group.rows == row).any() for group in region.groups):
-                stress[region.nodes] = values
-        return stress
-
-    def von_mises(self, at: At = "gauss") -> Any:
-        """Return von Mises stresses.
-
-        Parameters
-        ----------
-        at : as for `strain`.
-
-        Returns
-        -------
-        (m, g), (m,), (n,) or (...) in Pa.
+        LineValues
 
         Raises
         ------
         InputError
-            There is no such place, or points are not finite.
+            An end is no point, or both are the same.
         MeshError
             A point lies outside the mesh.
-        """
-        stress = self.stress(at)
-        if isinstance(stress, list):
-            return [voigt.von_mises(s) for s in stress]
-        return voigt.von_mises(stress)
-
-    def at_integration_points(self, name: str, element: int | None = None) -> Any:
-        """Return a quantity at the integration points by its name in Kratos.
-
-        It is what ``CalculateOnIntegrationPoints`` of KinematicLinear or SmallDisplacementElement returns.
-        Strains are small: the Green-Lagrange strain is the linear one, and all stress measures agree.
-
-        Parameters
-        ----------
-        name : one of
-
-            - ``CAUCHY_STRESS_VECTOR``, ``PK2_STRESS_VECTOR``, ``STRESSES`` (6,), ``CAUCHY_STRESS_TENSOR``,
-              ``PK2_STRESS_TENSOR`` (3, 3), ``VON_MISES_STRESS``: Pa, with the prestress;
-            - ``GREEN_LAGRANGE_STRAIN_VECTOR``, ``STRAIN`` (6,), ``GREEN_LAGRANGE_STRAIN_TENSOR`` (3, 3);
-            - ``STRAIN_ENERGY``: ½ ε:C:ε in J/m³;
-            - ``CONSTITUTIVE_MATRIX``: C (6, 6) in Pa;
-            - ``STRAIN_INTERPOLATION_OPERATOR``: B (6, 3k) in 1/m of k nodes;
-            - ``JACOBIAN``, ``JACOBIAN_0``: det J in m³, ``INTEGRATION_WEIGHT``: weight times det J in m³;
-            - ``INTEGRATION_COORDINATES``, ``INTEGRATION_POINT_GLOBAL``: X (3,) in m,
-              ``INTEGRATION_POINT_LOCAL``: ξ (3,), ``DISPLACEMENT``: (3,) in m.
-
-            Vectors have the order xx yy zz xy yz xz of Kratos, strains engineering shear; strain tensors
-            hold half of it.
-        element : id of an element; all elements if not given.
-
-        Returns
-        -------
-        (g, ...) of one element with g points, points in the order of its rule; or (m, g, ...) of all, in the
-        order of the mesh; or a list of (g, ...) where elements have different rules.
-
-        Raises
-        ------
-        InputError
-            There is no such name.
-        MeshError
-            There is no such element, or several have this id.
 
         Examples
         --------
         >>> import kratos_lite as kl
-        >>> bar = kl.Model(kl.box((1, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
-        >>> bar.fix("z-")
-        >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
-        >>> result = bar.solve()
-        >>> result.at_integration_points("CAUCHY_STRESS_VECTOR", element=2)[:, 2].round(9).tolist()
-        [5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0]
-        >>> weight = result.at_integration_points("INTEGRATION_WEIGHT")
-        >>> energy = (result.at_integration_points("STRAIN_ENERGY") * weight).sum()
-        >>> bool(abs(energy / result.energy() - 1) < 1e-12)
-        True
+        >>> beam = kl.Model(kl.box((1, 1, 1), element="KinematicLinear3D20N"), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> y = beam.mesh.points[:, 1]
+        >>> beam.fix("x-", "xyz")
+        >>> beam.fix("x+", "x", 1e-3 * (y[beam.mesh.nodes("x+"), None] - 0.25))
+        >>> line = beam.solve().along((0.5, 0, 0.5), (0.5, 1, 0.5), n=3)
+        >>> line.distance.tolist(), line.stress[:, 0].round(6).tolist()
+        ([0.0, 0.5, 1.0], [-250.0, 250.0, 750.0])
+        >>> line.membrane[0].round(6).tolist(), line.bending[0].round(6).tolist()
+        (250.0, -500.0)
         """
-        from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints  # rarely needed
+        from kratos_lite.analysis.line_values import LineValues  # a quick start for results
 
-        quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
-        groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
-        made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
-        return in_order(groups, made) if element is None else made[0][0]
+        ends = np.array(
+            [finite(end, f"the {name} of a line", (3,)) for end, name in ((a, "beginning"), (b, "end"))]
+        )
+        if (ends[0] == ends[1]).all():
+            raise InputError(f"a line needs two ends; both are {ends[0].tolist()}")
+        return LineValues(self, ends, whole_number(n, "n", least=2), flag(recovered, "recovered"))
 
-    # ---- totals --------------------------------------------------------------------------------
+    def _located(self, points: ArrayLike | Located) -> Located:
+        """Return where points lie in the mesh; raise MeshError if one lies outside."""
+        from kratos_lite.mesh.locate import Located
 
-    @cached_property
-    def _totals(self) -> tuple[float, float, int]:
-        """Strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
-        return totals(self.mesh.points, self.groups, self._strained)
-
-    def totals(self) -> tuple[float, float, int]:
-        """Return what one pass over the elements gives.
-
-        Returns
-        -------
-        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element.
-        """
-        return self._totals
-
-    def energy(self) -> float:
-        """Return the strain energy ½ ∫ ε:C:ε dV.
-
-        Returns
-        -------
-        In J.
-        """
-        return self._totals[0]
+        if not isinstance(points, Located):
+            return self.mesh.locate(points, required=True)
+        if points.mesh is not self.mesh:
+            raise InputError(
+                "these points were located in another mesh; locate them in that of the result, as in "
+                "result.at(result.mesh.locate(points))"
+            )
+        return points.require()
 
     # ---- error ---------------------------------------------------------------------------------
 
@@ -427,6 +278,25 @@ class Result:
             return str(self._error)
         return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
 
+    def plot(
+        self, path: str | Path | None = None, values: ArrayLike | str | None = None, **options: Any
+    ) -> Any:
+        """Draw the deformed body, colored; a notebook shows it, and it is written if a path is given.
+
+        Parameters
+        ----------
+        path : picture to write; .png, .pdf or .svg.
+        values : what colors it, ``"von_mises"`` if not given; see `kratos_lite.plot`.
+        options : those of `kratos_lite.plot`, with the same errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from kratos_lite.analysis.plot import plot  # a quick start for results
+
+        return plot(self, path, values=values, **options)
+
     # ---- out -----------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
@@ -454,8 +324,3 @@ class Result:
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]
-
-    def __str__(self) -> str:
-        rows = self.table()
-        width = max(len(label) for label, _ in rows)
-        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)

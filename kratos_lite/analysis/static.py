@@ -109,6 +109,21 @@ class StaticAnalysis:
             start = finite(start, "start", (self.model.mesh.n_nodes, 3))
         return self._solve(case, case.moving, tolerance, start)
 
+    def check(self) -> list[str]:
+        """Check the loads of the model, too, as a solution does, without solving.
+
+        Returns
+        -------
+        Warnings, one sentence each.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            A load does not fit, or a change of the model has broken it.
+        """
+        self._follow()
+        return self._warnings(self._load(self.model.loads))
+
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
@@ -180,6 +195,10 @@ class StaticAnalysis:
             moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
         return LoadSet(loads, external, forces, moving, phase)
 
+    def _warnings(self, case: LoadSet) -> list[str]:
+        """Return the warnings of the model and of a load set."""
+        return self.warnings + checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+
     def _system_of(self, moving: Mask) -> ConstrainedSystem:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""
         if self.system is None or (moving & ~self._solved).any():
@@ -209,7 +228,7 @@ class StaticAnalysis:
     ) -> Result:
         """Solve for a load set with the equations of all parts in `moving`."""
         model, phase = self.model, case.phase
-        warnings = self.warnings + checks.check_loads(case.loads, self.groups, case.forces, model.supports)
+        warnings = self._warnings(case)
         u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
         solution = Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():

@@ -17,7 +17,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import NON_LOCKING, element_of
+from kratos_lite.elements.formulations import NON_LOCKING, element_of, is_of_library
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -71,6 +71,11 @@ class ElementGroup:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether class and rule are those of the library, which leave no hourglass modes in a mesh."""
+        return self.rule is self.element.rule and is_of_library(self.element)
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""

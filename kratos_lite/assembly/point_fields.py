@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from kratos_lite.elements.tables import cofactors, determinant
 from kratos_lite.errors import InputError
 from kratos_lite.mesh.locate import Located
 from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from kratos_lite.assembly.recovery import Recovery
 
 
 def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
@@ -39,13 +43,25 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
         if stress and not group.element.inherits("stress"):
             raise InputError(
                 f"{group.element.__name__} has its own stress, known at Gauss points alone; "
-                "ask for at='gauss'"
+                "ask for result.stress('gauss')"
             )
         if stress:
             value = group.material.stress(value)
             value = value if group.prestress is None else value + group.prestress[mine]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)
+
+
+def recovered_at(recovery: Recovery, located: Located, u: Array, *, stress: bool = True) -> Array:
+    """Return recovered stresses in Pa, or strains, (..., 6) at points, between nodes of one material."""
+    out = np.zeros((*located.rows.shape, 6))
+    for region, values in recovery.by_region(u, stress=stress):
+        mine = np.isin(located.rows, np.concatenate([group.rows for group in region.groups]))
+        if mine.any():
+            nodal = np.zeros((len(located.mesh.points), 6))
+            nodal[region.nodes] = values
+            out[mine] = located[mine].interpolate(nodal)
+    return out
 
 
 def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
@@ -62,7 +78,7 @@ def _strain(group: ElementGroup, X: Array, xi: Array, u: Array) -> Array:
     if element.inherits("B") and not element.inherits(*STRAIN):
         raise InputError(
             f"{element.__name__} has its own strain, known at Gauss points alone; write its B(xi) too, or "
-            "ask for at='gauss'"
+            "ask for result.stress('gauss')"
         )
     if not element.inherits("B_at_gauss_points", "strain"):
         _check_B(element(X[0], group.rule), group.material.C)
@@ -78,5 +94,5 @@ def _check_B(cell: KinematicLinear, C: Array) -> None:
     if not miss <= 1e-8 * np.abs(strain).max():
         raise InputError(
             f"B(xi) of {type(cell).__name__} is not that of its strain at the Gauss points; "
-            "make both alike, or ask for at='gauss'"
+            "make both alike, or ask for result.stress('gauss')"
         )

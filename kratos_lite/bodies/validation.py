@@ -36,6 +36,10 @@ def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> l
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
+    if not all(group.is_proven for group in groups):
+        from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
+
+        check_rules(mesh, groups)
     check_spurious_modes(mesh, groups, None, mesh.all_faces)
     return groups
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
-from kratos_lite.cli.options import build_parser, parser_of
+from kratos_lite.cli.options import build_parser
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
 
@@ -63,7 +63,7 @@ def _run(words: Sequence[str]) -> int:
     options, rest = parser.parse_known_args(words)
     options.rest = rest
     if rest and options.command != "bench":
-        parser_of(parser, options.command).error(f"unrecognized arguments: {' '.join(rest)}")
+        parser.refuse(options.command, rest)
     try:
         from kratos_lite.cli import commands
 

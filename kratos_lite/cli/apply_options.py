@@ -71,7 +71,7 @@ def case_of(options: Namespace) -> Case:
         if options.error is not None:
             case.error = share(options.error, "--error")
     else:
-        _refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
+        refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
     if case.is_of_model and case.time is not None:
         case.time = case.time.starting_from(case.model.supports, case.model.initial_displacement)
@@ -97,7 +97,7 @@ def share(text: str, what: str) -> float:
     return found
 
 
-def _refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
+def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
     """Raise InputError for the first of some options that is given."""
     for name in names:
         if getattr(options, name) not in (None, False, []):
@@ -110,7 +110,7 @@ def _take_modes(case: Case, options: Namespace) -> None:
         raise InputError("--modes and --time: give one of them")
     if options.output or options.json or options.picture or options.state:
         raise InputError("--modes prints a table; it writes no files")
-    _refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
+    refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
     case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
 
 
@@ -133,9 +133,9 @@ def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration 
             else TimeIntegration(step, steps, every)
         )
     if time is None:
-        _refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
+        refuse(options, OF_TIME, "belongs to a time integration; add --time STEP:STEPS")
         return None
-    _refuse(
+    refuse(
         options, ("solver", "tolerance", "error"), "is for statics; time integration chooses its own solver"
     )
     changes: dict[str, Any] = {}

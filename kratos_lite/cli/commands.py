@@ -14,13 +14,12 @@ from kratos_lite.cli.progress import TerminalProgress
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 if TYPE_CHECKING:
-    from kratos_lite.analysis.model import Model
     from kratos_lite.io.case import Case
     from kratos_lite.io.formats.document import Document
     from kratos_lite.io.runners.outcome import Outcome
     from kratos_lite.mesh import Mesh
 
-EXIT_VALUE_MISSED = 3
+EXIT_UNSOLVABLE, EXIT_VALUE_MISSED = 2, 3
 ROOT = Path(__file__).resolve().parents[2]
 """The source checkout, if the package is used from one."""
 
@@ -142,69 +141,61 @@ def _document(options: Namespace) -> Document:
 
 
 def check(options: Namespace) -> int:
-    """Report every problem of a file."""
+    """Report what keeps a file from being solved with these options, and what is doubtful."""
+    use_threads(options.threads)
     return _within_numbers(_check, options)
 
 
 def _check(options: Namespace) -> int:
-    from kratos_lite.io.files import read_case
-    from kratos_lite.io.outputs import check_outputs
+    from kratos_lite.cli.apply_options import OF_MODELS, case_of, refuse
 
     path = Path(options.input)
     if path.suffix == ".py":
         from kratos_lite.io.readers.script import is_script
 
         if not is_script(path):
+            refuse(options, OF_MODELS, f"is for models; {path} defines elements and materials")
             return _check_python(path)
-    case = read_case(path, strict=not options.lenient)
-    check_outputs(case)
-    what, needs, warnings = _needs_of(case)
-    print(f"{path}: {what}{f', {case.time}' if case.time else ''}, no errors")
-    for text in warnings:
-        print(f"note     {text}")
-    for text in needs:
-        print(f"to solve {text}")
-    return 0
+
+    case = case_of(options)
+    needs, warnings = _needs(case)
+    what = f"{path}: {_what(case)}{f', {case.time}' if case.time else ''}"
+    lines = [f"{what}, {'cannot be solved' if needs else 'no errors'}"]
+    lines += [f"error    {text}" for text in needs]
+    lines += [f"note     {text}" for text in warnings]
+    _print([] if options.quiet else lines)
+    return EXIT_UNSOLVABLE if needs else 0
 
 
-def _needs_of(case: Case) -> tuple[str, list[str], list[str]]:
-    """Return what a case is, what it lacks, and its warnings; no step is taken."""
-    from kratos_lite.io.run import prepare
+def _what(case: Case) -> str:
+    if not case.is_of_model:
+        return f"{case.body.kind} body"
+    return f"{case.model.mesh.n_nodes} nodes, {case.model.mesh.n_elements} elements"
+
+
+def _needs(case: Case) -> tuple[list[str], list[str]]:
+    """Return what a case lacks to be solved, and its warnings; a model gets all it lacks on the way."""
+    from kratos_lite.io.run import check as checked
 
     if not case.is_of_model:
-        body, _ = prepare(case)
-        return f"{body.kind} body", [], []
-    model = case.model
-    what = f"{model.mesh.n_nodes} nodes, {model.mesh.n_elements} elements"
-    if case.time is None:
-        needs, warnings = _needs(model)
-    else:
-        needs, warnings = [], model.check_geometry()
-        try:
-            warnings = prepare(case)[0].equations.warnings
-        except ModelError as error:
-            needs = [str(error)]
-    return what, needs, [*warnings, *model.notes]
-
-
-def _needs(model: Model) -> tuple[list[str], list[str]]:
-    """Return what a model lacks for a solution, and its warnings; the model gets all it lacks on the way."""
+        return [], checked(case)
     from kratos_lite.materials.isotropic3d import Isotropic3D
 
-    needs: list[str] = []
+    model, needs = case.model, list[str]()
     warnings = model.check_geometry()
     cures: tuple[Callable[[], None], ...] = (
-        lambda: model.assign(Isotropic3D(E=1.0, nu=0.0)),
+        lambda: model.assign(Isotropic3D(E=1.0, nu=0.0, density=1.0)),
         lambda: model.fix(range(model.mesh.n_nodes), override=True),
         lambda: None,
     )
     for cure in cures:
         try:
-            return needs, model.check()
+            warnings = checked(case)
+            break
         except ModelError as error:
             needs += [str(error)] if str(error) not in needs else []
             cure()
-    return needs, warnings
+    return needs, [*warnings, *model.notes]
 
 
 def _check_python(path: Path) -> int:
@@ -220,7 +211,7 @@ def _check_python(path: Path) -> int:
         for finding in findings:
             word = "ok" if finding.passed else "not run" if finding.skipped else "FAILED"
             print(f"  {word:<8}{finding}")
-    return 2 if broken else 0
+    return EXIT_UNSOLVABLE if broken else 0
 
 
 def convert(options: Namespace) -> int:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import re
-from typing import Any, NoReturn
+from typing import Any
 
 from kratos_lite import __version__
-from kratos_lite.errors import nearest
+from kratos_lite.cli.parser import Formatter, Parser
 
 EXIT_CODES = """exit codes:
   0    done
@@ -29,6 +29,7 @@ EXAMPLES = {
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
     "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
     "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+    "  kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5\n"
     "  kratos-lite check my_element.py",
     "verify": "kratos-lite verify\n  kratos-lite verify patch macneal_harder --element 3D8N --element 3D20N\n"
     "  kratos-lite verify my_element.py -o my_element.md",
@@ -44,51 +45,7 @@ RESTART = (
 )
 
 
-COMMANDS = {"march": "solve, with --time STEP:STEPS", "run": "solve"}
-"""Words for which a command of another name does what is likely meant."""
-
-
-class Formatter(argparse.RawDescriptionHelpFormatter):
-    """Looks for the width of the terminal when help is shown, not for each option that is added."""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, width=80)
-
-    def format_help(self) -> str:
-        """Return the text for this terminal."""
-        fitting = argparse.HelpFormatter(self._prog)
-        self._width, self._max_help_position = fitting._width, fitting._max_help_position
-        return super().format_help()
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors name what was likely meant."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what is wrong with the words, and end."""
-        hint = self._hint(message)
-        super().error(f"{message}.{hint}" if hint else message)
-
-    def _hint(self, message: str) -> str:
-        """Return the known option, choice or command nearest to what is wrong."""
-        if unknown := re.search(r"unrecognized arguments:.*?--([\w-]+)", message):
-            known = [word[2:] for word in self._option_string_actions if word.startswith("--")]
-            return nearest(unknown[1], known).replace("called ", "called --").replace("mean ", "mean --")
-        if choice := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message):
-            other = COMMANDS.get(choice[1], "") if "COMMAND" in message else ""
-            known = re.findall(r"[\w-]+", choice[2])
-            return f" Did you mean {other}?" if other else nearest(choice[1], known)
-        return ""
-
-
-def parser_of(parser: argparse.ArgumentParser, command: str) -> argparse.ArgumentParser:
-    """Return the parser of a command."""
-    (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
-    found: argparse.ArgumentParser = commands.choices[command]
-    return found
-
-
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Return the parser of all commands."""
     parser = Parser(
         prog="kratos-lite",
@@ -102,9 +59,13 @@ def build_parser() -> argparse.ArgumentParser:
     info = _add(commands, "info", "describe a file without solving it")
     info.add_argument("input", help=f"{MODEL}; or {BODY}")
     check = _add(
-        commands, "check", "report every problem of a file, or of the elements and materials in a Python file"
+        commands,
+        "check",
+        "report what keeps a file from being solved, by the words of solve, without solving it; or every "
+        "problem of the elements and materials in a Python file",
     )
     check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
+    _add_case(check)
     convert = _add(commands, "convert", "convert a model file to another format")
     convert.add_argument("input", help=MODEL)
     convert.add_argument("output", help=".mdpa, .elem, .vtu or any format of meshio, chosen by the extension")
@@ -136,11 +97,16 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
 def _add_solve(commands: Any) -> None:
     solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
     solve.add_argument("input", help=f"{MODEL}; or {BODY}")
-    _add_outputs(solve)
-    _add_model(solve)
-    _add_motion(solve)
-    _add_time(solve)
-    how = solve.add_argument_group("solver")
+    _add_case(solve)
+
+
+def _add_case(command: argparse.ArgumentParser) -> None:
+    """Add what changes the case of an input; `check` takes the same words as `solve`."""
+    _add_outputs(command)
+    _add_model(command)
+    _add_motion(command)
+    _add_time(command)
+    how = command.add_argument_group("solver")
     how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument(
@@ -219,7 +185,7 @@ def _add_model(solve: argparse.ArgumentParser) -> None:
         "--formulation",
         metavar="WORD",
         help="of the elements, in place of what their names in the file say: standard, enhanced, b_bar, "
-        "reduced, or non_locking, that of each shape which does not lock (docs/elements.md)",
+        "reduced, or non_locking, that of each shape which does not lock",
     )
     given.add_argument(
         "--ignore-initial-displacement",
@@ -234,7 +200,7 @@ def _add_options(group: Any, *options: tuple[str, str, str], **settings: Any) ->
 
 
 def _add_motion(solve: argparse.ArgumentParser) -> None:
-    ale = solve.add_argument_group("motion of the material through the mesh (one at most; docs/ale.md)")
+    ale = solve.add_argument_group("motion of the material through the mesh (one at most)")
     _add_options(
         ale,
         ("--rotation", "AXIS:RATE[:ACCELERATION]", "about x, y, z or X,Y,Z, in rad/s and rad/s²"),
@@ -256,7 +222,7 @@ def _add_motion(solve: argparse.ArgumentParser) -> None:
 
 
 def _add_time(solve: argparse.ArgumentParser) -> None:
-    time = solve.add_argument_group("time integration (docs/dynamics.md, docs/bodies.md)")
+    time = solve.add_argument_group("time integration")
     _add_options(
         time,
         ("--time", "STEP:STEPS[:EVERY]", "step in s, their number, and every how many is kept"),

@@ -7,10 +7,10 @@ from argparse import Namespace
 from contextlib import ExitStack
 from pathlib import Path
 
+from kratos_lite.atomic import write_whole
 from kratos_lite.cli.progress import TerminalProgress
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import write_whole
 from kratos_lite.testing.files import MODULE, REGISTRIES, run_module
 from kratos_lite.verification import page
 from kratos_lite.verification.problem import Row

@@ -16,6 +16,7 @@ from kratos_lite.elements.overridden_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
+from kratos_lite.records import Tabular
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
@@ -28,7 +29,7 @@ GEOMETRY = ("__init__", "N", "dN", "J", "detJ", "dNdX", "dV", "_jacobian", "_gau
 """What an element class may redefine so that its geometry is not that of the tables of shape and rule."""
 
 
-class PlacedCell:
+class PlacedCell(Tabular):
     """Geometry of a cell: shape × rule at the places X of its nodes; see `KinematicLinear`."""
 
     shape: ClassVar[type[Shape]]
@@ -250,6 +251,32 @@ class PlacedCell:
         change = np.abs(J - J[..., :1, :, :]).max(axis=(-3, -2, -1))
         size = np.abs(self.X).max(axis=(-2, -1))
         return bool((change <= 8 * np.finfo(float).eps * size).all())
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of a summary: shape, rule and nodes.
+
+        Returns
+        -------
+        Labels and values.
+
+        Examples
+        --------
+        >>> from kratos_lite import KinematicLinear3D8N
+        >>> print(KinematicLinear3D8N(0.5 * KinematicLinear3D8N.nodes))
+        shape   Hexahedron8
+        nodes   8
+        rule    Gauss-Legendre 2x2x2: 8 points, degree 3
+        volume  1 m³
+        """
+        count, rule = int(np.prod(self.X.shape[:-2])), self.rule
+        volume = self._volumes(rule).sum()
+        return [
+            *([("elements", str(count))] if self.X.ndim > 2 else []),
+            ("shape", self.shape.__name__),
+            ("nodes", str(len(self.nodes))),
+            ("rule", f"{rule.name}: {len(rule)} points, degree {rule.degree}"),
+            ("volume", f"{volume:g} m³"),
+        ]
 
 
 def _table(shape: type[Shape], name: str, xi: Array, tail: tuple[int, ...]) -> Array:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
+from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
 
 STRAIN = ("B", "B_at_gauss_points", "strain")
@@ -36,7 +37,8 @@ def takes_many(cls: type[Any]) -> bool:
     return all(
         vars(base).get("batched", False)
         for base in cls.__mro__
-        if any(
+        if base is not Tabular  # its methods know no X
+        and any(
             isinstance(value, METHODS) for name, value in vars(base).items() if name != "__annotate_func__"
         )
     )
@@ -98,7 +100,7 @@ def _checked(value: Any, cls: type[Any], name: str, tail: tuple[int, ...]) -> Ar
     if array.shape != tail:
         raise InputError(
             f"{cls.__name__}.{name} must return shape {tail} here; got {array.shape}; "
-            "see docs/add-an-element.md"
+            "see docs/howto/own-element.md"
         )
     return array
 

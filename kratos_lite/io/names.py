@@ -59,6 +59,31 @@ def nearest_variable(name: str, known: Iterable[str]) -> str:
     return nearest(name, get_close_matches(name, list(known), cutoff=0.8))
 
 
+def misspelt(name: str, known: Iterable[str]) -> str | None:
+    """Return the word that a name surely means, which differs by a letter or two; digits are never slips.
+
+    >>> misspelt("DISPLACMENT_X", ["DISPLACEMENT_X"]), misspelt("YOUNG_MODULUS_1", ["YOUNG_MODULUS"])
+    ('DISPLACEMENT_X', None)
+    """
+    if any(letter.isdigit() for letter in name):
+        return None
+    found = {word: _slips(name.upper(), word) for word in known if abs(len(name) - len(word)) <= 2}
+    best = min(found, key=lambda word: (found[word], -len(word)), default="")
+    return best if best and found[best] <= (2 if len(best) > 8 else 1) else None
+
+
+def _slips(a: str, b: str) -> int:
+    """Return how many letters are missing, too many, wrong or exchanged between two words."""
+    above, row = [0] * (len(b) + 1), list(range(len(b) + 1))
+    for i, letter in enumerate(a, 1):
+        last, above, row = above, row, [i]
+        for j, other in enumerate(b, 1):
+            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (letter != other)))
+            if i > 1 and j > 1 and (letter, a[i - 2]) == (b[j - 2], other):
+                row[j] = min(row[j], last[j - 2] + 1)
+    return row[-1]
+
+
 def element_shape(name: str) -> type[Shape] | None:
     """Return the shape of an element name, or None for one that is no solid.
 

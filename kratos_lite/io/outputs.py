@@ -36,7 +36,7 @@ def check_outputs(case: Case) -> None:
         if single is not None:
             check_ending(single, wanted)
     if outputs.picture is not None:
-        from kratos_lite.io.writers.pictures import check_picture  # rarely needed
+        from kratos_lite.view.canvas import check_picture  # rarely needed
 
         check_picture(outputs.picture)
     if not case.is_of_model and outputs.json is not None:
@@ -52,9 +52,7 @@ def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
     for path in outputs.results:
         write_result(path, result, outputs.mode)
     if outputs.picture is not None:
-        from kratos_lite.io.writers.pictures import draw
-
-        draw(outputs.picture, result)
+        result.plot(outputs.picture)
 
 
 def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: bool = False) -> None:

@@ -59,6 +59,14 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     return outcome
 
 
+def check(case: Case) -> list[str]:
+    """Return the warnings of a case, checked as `run` does, without solving or taking a step."""
+    check_case(case)
+    check_outputs(case)
+    warnings: list[str] = runner_of(case).check(case)
+    return warnings
+
+
 def check_case(case: Case) -> None:
     """Raise InputError for a case that cannot be run as it stands."""
     if not isinstance(case, Case):

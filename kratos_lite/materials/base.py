@@ -86,10 +86,11 @@ class LinearMaterial:
         MaterialError
             If it is not.
         """
-        if not np.allclose(self.C, self.C.T, rtol=1e-10, atol=0):
-            raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
         scale = np.sqrt(np.abs(np.diag(self.C)))
-        smallest = np.linalg.eigvalsh(self.C / np.outer(scale, scale))[0]
+        scales = np.outer(scale, scale)  # a C that was turned has round-off in place of zeros
+        if not (np.abs(self.C - self.C.T) <= 1e-10 * scales).all():
+            raise MaterialError(f"{type(self).__name__}: C is not symmetric; check the Poisson ratios")
+        smallest = np.linalg.eigvalsh(self.C / scales)[0]
         if not smallest > 0:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 

@@ -20,7 +20,7 @@ from kratos_lite.mesh.selection import (
     find_part,
 )
 from kratos_lite.mesh.topology import inverted, mirror
-from kratos_lite.records import replace
+from kratos_lite.records import Tabular, replace
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 PART = "kl.Part(nodes=[4, 5])"
 
 
-class Mesh(Cells):
+class Mesh(Cells, Tabular):
     """Points (n, 3) in m, element blocks, condition blocks and named parts.
 
     A mesh does not change, and its arrays are read-only; `replace` makes another one from it.
@@ -176,7 +176,7 @@ class Mesh(Cells):
         Parameters
         ----------
         name : of the new part; a part of that name is replaced.
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class Mesh(Cells):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Returns
         -------
@@ -282,6 +282,34 @@ class Mesh(Cells):
         found = locate(self, points)
         return found.require() if required else found
 
+    # ---- summary ---------------------------------------------------------------------------
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return the rows of a summary: nodes, extent, elements, conditions and parts.
+
+        Returns
+        -------
+        Labels and values.
+
+        Examples
+        --------
+        >>> print(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], {"KinematicLinear3D4N": [[0, 1, 2, 3]]}))
+        nodes     4
+        extent    [0, 1] × [0, 1] × [0, 1] m
+        elements  1 KinematicLinear3D4N
+        """
+        rows = [("nodes", str(self.n_nodes))]
+        if self.n_nodes:
+            low, high = self.points.min(axis=0), self.points.max(axis=0)
+            sides = [f"[{a + 0.0:g}, {b + 0.0:g}]" for a, b in zip(low, high, strict=True)]  # no -0
+            rows.append(("extent", " × ".join(sides) + " m"))
+        for label, blocks in (("elements", self.blocks), ("conditions", self.conditions)):
+            rows += [(label, f"{len(block)} {block.name}") for block in blocks if len(block)]
+        return rows + [("part", f"{name}: {part}") for name, part in self.parts.items()]
+
+    def __repr__(self) -> str:
+        return f"Mesh({self.n_nodes} nodes, {self.n_elements} elements)"
+
     # ---- faces -----------------------------------------------------------------------------
 
     def reoriented(self) -> Mesh:
@@ -305,7 +333,7 @@ class Mesh(Cells):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask (n,) or rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Returns
         -------

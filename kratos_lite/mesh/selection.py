@@ -11,16 +11,18 @@ from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Part, distinct, without_repeats
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.typing import Array, Ints
-from kratos_lite.validation import whole_numbers
+from kratos_lite.validation import finite, whole_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 Where: TypeAlias = "str | Callable[[Array], ArrayLike] | ArrayLike"
-"""Nodes by part name, by a predicate on the points (n, 3), or by node rows or a mask."""
+"""Nodes by part name, by a point (x, y, z) in m, by a predicate on the points (n, 3), by rows or a mask."""
 WhereElements: TypeAlias = "str | int | ArrayLike | None"
 """Elements by part name, by property id, by element rows, or all."""
 
+AT_NODE = 1e-6
+"""Distance from a point up to which a node lies at it, as share of the size of the mesh."""
 SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
 """Names of the sides of the bounding box: axis and end."""
 
@@ -42,7 +44,7 @@ def find_part(name: Any, parts: Mapping[str, Part], points: Array) -> Part:
         raise MeshError(f"part {name!r} is not unique; write one of {', '.join(ends)}")
     have = ", ".join(part for part in parts if part not in SIDES)
     have = f"have {have} and" if have else "have"
-    raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, parts)}")
+    raise MeshError(f"there is no part {name!r}; {have} the sides x- … z+.{nearest(name, [*parts, *SIDES])}")
 
 
 def _side(points: Array, axis: int, end: int) -> Ints:
@@ -52,16 +54,63 @@ def _side(points: Array, axis: int, end: int) -> Ints:
 
 
 def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, points: Array) -> Ints:
-    """Return the rows of nodes by a predicate, a mask or rows, each once and in the order given."""
+    """Return the rows of nodes by a point, predicate, mask or rows, each once and in the order given."""
+    if (point := point_of(where)) is not None:
+        rows, nearby = nodes_at(point, points)
+        if not len(rows):
+            raise MeshError(
+                f"there is no node at {point.tolist()} m; {nearby}; choose that one, or read values anywhere "
+                "in the mesh by result.at(points)"
+            )
+        return rows
     n, chosen = len(points), where(points.copy()) if callable(where) else where
     if getattr(chosen, "dtype", None) == np.bool_ or (isinstance(chosen, (list, tuple)) and _flags(chosen)):
         if np.shape(chosen) != (n,):
             raise MeshError(f"a node mask must have shape ({n},); got {np.shape(chosen)}")
         return np.flatnonzero(chosen)
-    rows = whole_numbers(
-        chosen, "nodes are chosen by part name, predicate, mask or rows; rows", error=MeshError
-    )
+    known = "nodes are chosen by part name, point (x, y, z), predicate, mask or rows; rows"
+    rows = whole_numbers(chosen, known, error=MeshError)
     return without_repeats(whole_numbers(rows, "node rows", size=n, error=MeshError).ravel())
+
+
+def point_of(where: Any) -> Array | None:
+    """Return the point (3,) in m that a choice of nodes means, or None if it means anything else.
+
+    Raises
+    ------
+    MeshError
+        It is three whole numbers, which may be a point or rows; or a point that is not finite.
+
+    Examples
+    --------
+    >>> point_of((1.0, 0, 0)), point_of([1, 0]), point_of(np.array([1, 0, 0]))
+    (array([1., 0., 0.]), None, None)
+    """
+    if isinstance(where, (tuple, list)):
+        if len(where) != 3 or not all(isinstance(x, (int, float, np.number)) for x in where):
+            return None
+        if all(type(x) is int for x in where):
+            point = ", ".join(f"{x}.0" for x in where)
+            raise MeshError(
+                f"{where} may be a point or three node rows: write ({point}) for the point in m, "
+                f"np.array({list(where)}) for the rows"
+            )
+        if not any(isinstance(x, (float, np.floating)) for x in where):
+            return None
+    elif not (isinstance(where, np.ndarray) and where.shape == (3,) and where.dtype.kind == "f"):
+        return None
+    return finite(where, "a point", (3,), error=MeshError)
+
+
+def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
+    """Return the rows of the nodes at a point (3,), nearest first, and what is near to it in words."""
+    if not len(points):
+        return NO_ROWS, "there are no nodes"
+    distance = np.linalg.norm(points - point, axis=1)
+    rows = np.flatnonzero(distance <= AT_NODE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    near = int(distance.argmin())
+    text = f"the nearest node is that at {points[near].tolist()} m (row {near}), {distance[near]:.3g} m away"
+    return rows[np.argsort(distance[rows], kind="stable")], text
 
 
 def _flags(chosen: Sequence[Any]) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
@@ -21,8 +20,6 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
-from kratos_lite.quadrature import Rule
-from kratos_lite.registry import remembered
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.typing import Array, Mask
 
@@ -132,43 +129,6 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
     return (
         f"{mesh.place(block, cell)}: det J = {det[worst]:.3g} at {where} must be > 0; nodes {nodes}; {cure}"
     )
-
-
-@remembered
-def spurious_modes(element: type[KinematicLinear], rule: Rule) -> int:
-    """Return how many zero-energy modes beyond the six rigid ones a rule leaves to the reference cell."""
-    cell = element(element.nodes, rule)
-    if element.inherits(*MECHANICS):
-        B = np.vstack([cell.B(xi) for xi in rule.points])
-        values = np.linalg.svd(B, compute_uv=False)
-        rank = int((values > 1e-9 * values[0]).sum())
-    else:
-        rank = int(np.linalg.matrix_rank(cell.stiffness(np.eye(6)), tol=1e-12, hermitian=True))
-    return 3 * len(element.nodes) - 6 - rank
-
-
-def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
-    """Check rules that replace an element's own: det J > 0 at their points; warn of spurious modes."""
-    replaced = [group for group in groups if group.rule is not group.element.rule]
-    for group in replaced:
-        _, dN = tabulate(group.element.shape, group.rule)
-        part = group.take(~clearly_positive(mesh.points, group.nodes, group.element, dN, len(dN)))
-        for chunk in part.chunks():
-            bad = (part.at(mesh.points, chunk).determinants(dN) <= 0).any(axis=1)
-            if bad.any():
-                element = mesh.element_ids[part.rows[chunk][int(np.argmax(bad))]]
-                raise MeshError(
-                    f"element {element} ({group.element.__name__}): det J must be > 0 at all points of "
-                    f"{group.rule}; the element's own rule, or a better shape, avoids this"
-                )
-    found = dict.fromkeys((group.element, group.rule) for group in replaced)
-    said = [
-        f"{element.__name__} with {len(rule)} Gauss points has {n} spurious zero-energy modes; "
-        f"its own rule has {len(element.rule)} points and none"
-        for element, rule in found
-        if (n := spurious_modes(element, rule)) > 0
-    ]
-    return list(dict.fromkeys(said))
 
 
 def check_coincident(

@@ -15,7 +15,7 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_own
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_of_library
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, with_rows
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
@@ -66,7 +66,7 @@ def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of linear tetrahedra, and of linear pyramids unless they are few, between other elements."""
     counts: dict[type[KinematicLinear], int] = {}
     for group in groups:
-        if is_own(group.element) and len(group.element.nodes) in (4, 5):
+        if is_of_library(group.element) and len(group.element.nodes) in (4, 5):
             counts[group.element] = counts.get(group.element, 0) + len(group)
     half = sum(map(len, groups)) / 2
     return [
@@ -116,7 +116,7 @@ class Walls:
 
 def _has_two_sides(kind: type[KinematicLinear]) -> bool:
     """Return whether an element is a linear brick or wedge of the library."""
-    return is_own(kind) and len(kind.nodes) == kind.shape.corners and max(opposite_of(kind.shape)) > 0
+    return is_of_library(kind) and len(kind.nodes) == kind.shape.corners and max(opposite_of(kind.shape)) > 0
 
 
 def _in_bending(

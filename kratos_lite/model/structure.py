@@ -19,6 +19,7 @@ from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.solid import Solid
 from kratos_lite.model.supports import AXES, Fixing, Supports
+from kratos_lite.records import Tabular
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
 from kratos_lite.typing import Array
@@ -46,7 +47,7 @@ class Attachment(ABC):
         """
 
 
-class Structure(Solid):
+class Structure(Solid, Tabular):
     """What is analyzed: a solid with supports, loads and motion.
 
     Parameters
@@ -113,7 +114,7 @@ class Structure(Solid):
 
         Parameters
         ----------
-        where : part name, predicate on the points (n, 3), mask or node rows.
+        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask or node rows.
         axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
         value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
             which statics take at the time 0.
@@ -187,6 +188,8 @@ class Structure(Solid):
         ------
         InputError
             `load` is neither a load nor a motion, or the amplitude is invalid.
+        MeshError
+            There is no such part or node, or the point of a load lies outside the mesh.
         ModelError
             The motion does not fit the model, or there is one already.
 
@@ -206,7 +209,9 @@ class Structure(Solid):
             return
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
-        self.loads.append(load if amplitude is None else ScaledLoad(load, amplitude))
+        load = load if amplitude is None else ScaledLoad(load, amplitude)
+        load.check(self.mesh)
+        self.loads.append(load)
 
     def rigid_modes(self) -> Array:
         """Return the rigid-body modes of all nodes.
@@ -255,7 +260,10 @@ class Structure(Solid):
         warnings = self.check_geometry()
         groups = self.element_groups()
         used, faces = mesh.used_nodes(), mesh.all_faces
-        warnings += checks.check_rules(mesh, groups)
+        if not all(group.is_proven for group in groups):
+            from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
+
+            warnings += check_rules(mesh, groups)
         warnings += rigid_body_mode_check.check_joints(mesh, faces)
         warnings += checks.check_coincident(mesh, used, self.supports.constraints)
         warnings += checks.check_scales(mesh, groups)
@@ -284,11 +292,9 @@ class Structure(Solid):
         -------
         Labels and values.
         """
-        mesh = self.mesh
         used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
         without = int((self._material_of < 0).sum())
-        rows = [("nodes", str(mesh.n_nodes))]
-        rows += [("elements", f"{len(block)} {block.name}") for block in mesh.blocks if len(block)]
+        rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in used]
         rows += [("material", f"none for {without} elements")] if without else []
@@ -297,15 +303,7 @@ class Structure(Solid):
             rows.append(("constraints", str(len(self.supports.constraints))))
         rows += [("load", type(load).__name__) for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
-        for name, part in mesh.parts.items():
-            sizes = (
-                f"{len(part.nodes)} nodes, {len(part.elements)} elements, {len(part.conditions)} conditions"
-            )
-            rows.append(("part", f"{name}: {sizes}"))
         return rows + [("note", note) for note in self.notes]
-
-    def __str__(self) -> str:
-        return "\n".join(f"{label:<12}{value}" for label, value in self.table())
 
     def __repr__(self) -> str:
         name = type(self).__name__

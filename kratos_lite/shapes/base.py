@@ -95,7 +95,7 @@ class Shape:
         TypeError
             If the subclass does not define it.
         """
-        raise TypeError("a shape must define N(xi); see docs/add-an-element.md")
+        raise TypeError("a shape must define N(xi); see docs/howto/own-element.md")
 
     @staticmethod
     def dN(xi: ArrayLike) -> Array:
@@ -114,7 +114,7 @@ class Shape:
         TypeError
             If the subclass does not define it.
         """
-        raise TypeError("a shape must define dN(xi); see docs/add-an-element.md")
+        raise TypeError("a shape must define dN(xi); see docs/howto/own-element.md")
 
 
 def at_points(function: Callable[[ArrayLike], Array], points: Array) -> Array:

@@ -61,7 +61,7 @@ def problems(shape: type[Shape]) -> list[str]:
     """Return what is wrong with the data of a shape that stands in its class; stop at what hides the rest."""
     missing = [name for name in ("cell", "nodes", "corners", "degree") if not hasattr(shape, name)]
     if missing:
-        return [f"states no {', '.join(missing)}: see docs/add-an-element.md"]
+        return [f"states no {', '.join(missing)}: see docs/howto/own-element.md"]
     if shape.cell not in LINEAR:
         return [f"has the cell {shape.cell!r}; cells are {', '.join(LINEAR)}"]
     ideal, n = LINEAR[shape.cell].nodes, len(shape.nodes)

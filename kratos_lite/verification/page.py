@@ -95,7 +95,8 @@ def summary(rows: Sequence[Row]) -> str:
 
 INTRO = (
     "How well each element finds what is known. `kratos-lite verify` computes the table, of the elements of "
-    "the library or of [your own](add-an-element.md): `kratos-lite verify my_element.py --element My8N`.",
+    "the library or of [your own](../howto/own-element.md): "
+    "`kratos-lite verify my_element.py --element My8N`.",
     "Every row has a value that is known: from a closed form, or from a publication that the last column "
     "names. `pass`: the error is at most that of the column *limit* (*exact*: rounding alone). Where an "
     "element need not be exact it has a grade instead, by the relative error, after MacNeal and Harder: "

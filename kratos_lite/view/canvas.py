@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import KratosLiteError
+from kratos_lite.atomic import write_whole
+from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
+
+DPI = 150
+"""Dots per inch."""
 
 
 def _canvas() -> Any:
@@ -19,17 +26,32 @@ def _canvas() -> Any:
     return FigureCanvasAgg
 
 
-def _empty(size: tuple[float, float]) -> Any:
-    """Return a figure that needs no screen."""
-    canvas = _canvas()
+@remembered
+def _figure_class() -> Any:
+    """Return a class of figures that a notebook shows, also where nobody has imported pyplot."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, dpi=150, layout="constrained")
+    class Picture(Figure):
+        """A figure that needs no screen."""
+
+        def _repr_png_(self) -> bytes:
+            file = BytesIO()
+            self.savefig(file, format="png")
+            return file.getvalue()
+
+    return Picture
+
+
+def empty(size: tuple[float, float], layout: str | None = "constrained") -> Any:
+    """Return a figure without axes; its size in inches."""
+    canvas = _canvas()
+    figure = _figure_class()(figsize=size, dpi=DPI, layout=layout)
     canvas(figure)
     return figure
 
 
-def _without_frame(axes: Any) -> Any:
+def without_frame(axes: Any) -> Any:
+    """Return axes, now without ticks, in which a metre to the right is one upwards."""
     axes.set_aspect("equal")
     axes.axis("off")
     return axes
@@ -37,22 +59,22 @@ def _without_frame(axes: Any) -> Any:
 
 def new_figure(size: tuple[float, float]) -> tuple[Any, Any]:
     """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
-    figure = _empty(size)
-    return figure, _without_frame(figure.add_subplot())
+    figure = empty(size)
+    return figure, without_frame(figure.add_subplot())
 
 
 def new_figure_with_curves(size: tuple[float, float]) -> tuple[Any, Any, Any]:
     """Return a figure with axes as those of `new_figure`, and beneath them axes for curves."""
-    figure = _empty(size)
+    figure = empty(size)
     upper, lower = figure.subplots(2, 1, height_ratios=[3, 1])
     lower.spines[["top", "right"]].set_visible(False)
     lower.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True)
-    return figure, _without_frame(upper), lower
+    return figure, without_frame(upper), lower
 
 
 def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
     """Return a figure with axes for curves alone, both logarithmic."""
-    figure = _empty(size)
+    figure = empty(size)
     from matplotlib.ticker import LogLocator
 
     axes = figure.add_subplot(xscale="log", yscale="log")
@@ -64,50 +86,116 @@ def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
     return figure, axes
 
 
+def axes_in_inches(figure: Any, place: Any, size: Any) -> Any:
+    """Return new axes with their lower left corner and size in inches."""
+    width, height = figure.get_size_inches()
+    return figure.add_axes((place[0] / width, place[1] / height, size[0] / width, size[1] / height))
+
+
+def text_in_inches(figure: Any, place: tuple[float, float], text: str) -> None:
+    """Write a title, centered, its foot at a place."""
+    figure.text(*place, text, transform=figure.dpi_scale_trans, ha="center", va="bottom", size=11)
+
+
+def bounds(figure: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return lower left and upper right in inches of all that a figure shows."""
+    box = figure.get_tightbbox(figure.canvas.get_renderer())
+    return (box.x0, box.y0), (box.x1, box.y1)
+
+
+def fit(figure: Any, margin: float = 0.1) -> None:
+    """Make a figure as large as what it shows."""
+    (x0, y0), (x1, y1) = bounds(figure)
+    old, corner = figure.get_size_inches(), np.array([x0 - margin, y0 - margin])
+    new = np.ceil((np.array([x1 + margin, y1 + margin]) - corner) * DPI) / DPI
+    for axes in figure.axes:
+        box = axes.get_position(original=True)
+        place, size = np.array(box.p0) * old - corner, np.array(box.size) * old
+        axes.set_position([*(place / new), *(size / new)])
+    for text in figure.texts:
+        text.set_position(np.array(text.get_position()) - corner)
+    figure.set_size_inches(new)
+
+
+# ---- files -----------------------------------------------------------------------------------------
+
+
 def file_types() -> list[str]:
     """Return the endings of files that a figure can be saved as, without the dot."""
     return sorted(_canvas().get_supported_filetypes())
 
 
-def colors_of(value: Array) -> tuple[Any, Array]:
-    """Return the scale of the color bar and the color of each value."""
+def check_picture(path: str | Path) -> str:
+    """Return the type of a picture, before any work is done.
+
+    Raises InputError for a type that cannot be written, KratosLiteError where matplotlib is missing.
+    """
+    kind, known = Path(path).suffix[1:].lower() or "png", file_types()
+    if kind not in known:
+        raise InputError(f"{path}: pictures cannot be written as .{kind}; known are {' '.join(known)}")
+    return kind
+
+
+def save(figure: Any, path: str | Path) -> None:
+    """Write a figure, as a whole or not at all."""
+    kind = check_picture(path)
+    write_whole(path, lambda file: figure.savefig(file, format=kind))
+
+
+# ---- colors ----------------------------------------------------------------------------------------
+
+
+def color_scale(low: float, high: float, *, log: bool = False) -> Any:
+    """Return what gives numbers from low to high their colors; a constant is in the middle."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import LogNorm, Normalize
 
-    low, high = (float(value.min()), float(value.max())) if len(value) else (0.0, 1.0)
-    if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant is shown in the middle of the scale
+    if high - low <= 1e-6 * max(abs(low), abs(high)):
         half = 0.5 * max(abs(low), abs(high)) or 1.0
-        low, high = low - half, high + half
-    shown = ScalarMappable(Normalize(low, high), colormaps["viridis"])
-    return shown, shown.to_rgba(value)
+        low, high = (low / 2, 2 * high) if log else (low - half, high + half)
+    norm = LogNorm(low, high, clip=True) if log else Normalize(low, high)
+    return ScalarMappable(norm, colormaps["viridis"])
 
 
-def color_bar(figure: Any, axes: Any, colors: Any, unit: str) -> None:
-    """Draw the color bar with one prefix for all its numbers."""
-    from matplotlib.ticker import EngFormatter, FuncFormatter
+def color_bar(axes: Any, colors: Any, unit: str, *, upright: bool) -> None:
+    """Fill axes with the color bar, with one prefix for all its numbers."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator
 
-    power = int(np.clip(3 * np.floor(np.log10(max(map(abs, colors.get_clim()))) / 3), -24, 24))
-    shown = FuncFormatter(lambda value, _: f"{value / 10.0**power:g}")
-    bar = figure.colorbar(colors, ax=axes, shrink=0.7, pad=0.03, aspect=25, format=shown)
+    low, high = colors.get_clim()
+    power = int(np.clip(3 * np.floor(np.log10(max(abs(low), abs(high))) / 3), -24, 24))
+    shown = FuncFormatter(lambda value, _: f"{round(value / 10.0**power, 9) + 0.0:g}")
+    way = "vertical" if upright else "horizontal"
+    bar = axes.figure.colorbar(colors, cax=axes, orientation=way, format=shown)
+    if isinstance(colors.norm, LogNorm):
+        bar.set_ticks(LogLocator(subs=(1, 2, 5)))
+        bar.minorticks_off()
+    bar.ax.tick_params(labelsize=9)
     prefix = EngFormatter.ENG_PREFIXES[power]
     bar.set_label(prefix + unit if unit else f"× 1e{power}" if power else "")
     bar.outline.set_visible(False)
 
 
-def polygons(axes: Any, corners: Array, colors: Array, widths: Array) -> None:
+# ---- what is drawn ---------------------------------------------------------------------------------
+
+
+def polygons(axes: Any, corners: Array, colors: Array, widths: Array) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    axes.add_collection(
-        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=widths, zorder=2)
+    return axes.add_collection(
+        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=widths, zorder=2),
+        autolim=False,
     )
 
 
-def lines(axes: Any, ends: Array, color: str = "0.55", width: float = 0.8) -> None:
-    """Draw thin lines (m, 2, 2) behind everything else."""
+def lines(axes: Any, ends: Array, color: str = "0.55", width: float = 0.8, zorder: float = 1) -> Any:
+    """Draw thin lines (m, 2, 2), by default behind everything else."""
     from matplotlib.collections import LineCollection
 
     pieces: Any = ends
-    axes.add_collection(LineCollection(pieces, colors=color, linewidths=width, zorder=1))
+    return axes.add_collection(
+        LineCollection(pieces, colors=color, linewidths=width, zorder=zorder), autolim=False
+    )

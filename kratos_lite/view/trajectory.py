@@ -10,8 +10,10 @@ import numpy as np
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
+from kratos_lite.view.camera import View, rows_of
 from kratos_lite.view.canvas import new_figure, new_figure_with_curves
-from kratos_lite.view.surface import ISOMETRIC, PLAIN, draw_facets, fineness, visible
+from kratos_lite.view.facets import INK, MANY, colored, draw_facets, facets_of
+from kratos_lite.view.rulers import rounded
 
 FADED = 0.25
 """Strength of the colors of the first position; the last has 1."""
@@ -25,6 +27,7 @@ def trajectory_figure(
     times: Array,
     curves: Mapping[str, Array],
     *,
+    view: View | None = None,
     title: str = "",
     unit: str = "J",
     size: tuple[float, float] = (8, 8),
@@ -41,6 +44,7 @@ def trajectory_figure(
     centers : (k, 3) m, path of the mass center.
     times : (k,) s.
     curves : (k,) numbers against time by name.
+    view : where one looks from, as for `kratos_lite.plot`.
     title : above the picture.
     unit : of the curves.
     size : largest width and height in inches, at 150 dots per inch.
@@ -59,14 +63,16 @@ def trajectory_figure(
     if not mesh.boundary or not len(positions):
         raise InputError("there is nothing to draw: no position, or no element of a known shape")
     figure, axes, below = new_figure_with_curves(size) if len(times) > 1 else (*new_figure(size), None)
-    n, edged = fineness(len(positions) * sum(map(len, mesh.boundary)))
+    everything = np.concatenate([*positions, centers])
+    rows = rows_of("iso" if view is None else view, everything)
     for strength, x in zip(np.linspace(FADED, 1, len(positions)), positions, strict=True):
-        _body(axes, mesh, x, float(strength) if len(positions) > 1 else 1.0, n, edged)
-    axes.plot(*(centers @ ISOMETRIC[:2].T).T, color=PATH, lw=1.2, zorder=3)
-    axes.plot(*(centers[[0, -1]] @ ISOMETRIC[:2].T).T, ".", color=PATH, ms=6, zorder=3)
-    corners = np.concatenate([*positions, centers]) @ ISOMETRIC[:2].T
-    _label_times(axes, positions, times, 0.05 * float(np.ptp(corners, axis=0).max()))
-    _triad(axes, corners)
+        _body(axes, mesh, rows, x, float(strength) if len(positions) > 1 else 1.0, MANY // len(positions))
+    axes.plot(*(centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
+    axes.plot(*(centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)
+    corners = everything @ rows[:2].T
+    axes.update_datalim(corners)
+    _label_times(axes, rows, positions, times, 0.05 * float(np.ptp(corners, axis=0).max()))
+    _triad(axes, rows, corners)
     axes.autoscale_view()
     axes.set_title(title, fontsize=11)
     if below is not None:
@@ -85,9 +91,9 @@ def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array], unit: st
         below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _label_times(axes: Any, positions: Sequence[Array], times: Array, near: float) -> None:
+def _label_times(axes: Any, rows: Array, positions: Sequence[Array], times: Array, near: float) -> None:
     """Write the times of the first and the last position beneath them; as one text if these are one."""
-    ends = [x @ ISOMETRIC[:2].T for x in (positions[0], positions[-1])]
+    ends = [x @ rows[:2].T for x in (positions[0], positions[-1])]
     feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{times[i]:.3g} s" for i in (0, -1)]
     if np.abs(ends[0] - ends[1]).max() < near:
         feet, texts = feet[1:], [" and ".join(dict.fromkeys(texts))]
@@ -98,23 +104,18 @@ def _label_times(axes: Any, positions: Sequence[Array], times: Array, near: floa
         )
 
 
-def _triad(axes: Any, drawn: Array) -> None:
+def _triad(axes: Any, rows: Array, drawn: Array) -> None:
     """Draw the three axes, of one length that is written to them, left of and below what is drawn."""
     (left, low), extent = drawn.min(axis=0), float(np.ptp(drawn, axis=0).max())
-    power = 10.0 ** np.floor(np.log10(0.2 * extent))
-    length = power * max(step for step in (1, 2, 5) if step * power <= 0.2 * extent * (1 + 1e-9))
+    length = rounded(0.2 * extent)
     start = np.array([left - 1.1 * length, low + 0.41 * length])
-    for name, along in zip("xyz", ISOMETRIC[:2].T, strict=True):
+    for name, along in zip("xyz", rows[:2].T, strict=True):
         axes.plot(*np.array([start, start + length * along]).T, color="0.35", lw=1.0, zorder=3)
         axes.text(*(start + 1.18 * length * along), name, ha="center", va="center", size=9, color="0.25")
     axes.text(*(start - (0, 0.5 * length)), f"{length:g} m", ha="center", va="top", size=9, color="0.25")
 
 
-def _body(axes: Any, mesh: Mesh, x: Array, strength: float, n: int, edged: bool) -> None:
+def _body(axes: Any, mesh: Mesh, rows: Array, x: Array, strength: float, most: int) -> None:
     """Draw one position over those before it, its colors mixed with white."""
-    drawn = [visible(block, x, np.zeros(len(x)), n) for block in mesh.boundary]
-    P, light, _, E = (np.concatenate(arrays) for arrays in zip(*drawn, strict=True))
-    colors = np.ones((len(P), 4))
-    colors[:, :3] -= strength * (1 - np.array(PLAIN) * light[:, None])
-    ink = np.array([0.1, 0.1, 0.15, 0.55 * strength])
-    draw_facets(axes, P, colors, E if edged else E[:0], ink)
+    facets = facets_of(mesh, x, None, rows, most=most)
+    draw_facets(axes, rows, facets, colored(facets, strength=strength), (*INK[:3], INK[3] * strength))

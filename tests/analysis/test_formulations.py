@@ -91,7 +91,7 @@ def test_stress_at_the_gauss_points_is_the_stress_between_them(element):
         found = model.mesh.locate(points)
         inside = found.rows == group.rows[row]
         assert inside.all()
-        assert np.abs(result.stress(at=points) - gauss[group.rows[row]]).max() < 1e-9 * scale
+        assert np.abs(result.at(points).stress - gauss[group.rows[row]]).max() < 1e-9 * scale
 
 
 # ---- moving material ------------------------------------------------------------------------------------

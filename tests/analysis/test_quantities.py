@@ -62,9 +62,9 @@ def pulled_bar(kind="KinematicLinear3D8N", cells=(4, 2, 2), end=0.01):
 def test_values_are_those_of_the_result():
     result = pulled_bar().solve()
     point = (1.3, 0.4, 0.2)
-    assert kl.DisplacementAt(point, "y").value(result) == pytest.approx(result.displacement(at=point)[1])
-    assert kl.StressAt(point, "xy").value(result) == result.stress(at=point)[3]
-    assert kl.StressAt(point, "xz").value(result) == result.stress(at=point)[5]
+    assert kl.DisplacementAt(point, "y").value(result) == pytest.approx(result.at(point).displacement[1])
+    assert kl.StressAt(point, "xy").value(result) == result.at(point).stress[3]
+    assert kl.StressAt(point, "xz").value(result) == result.at(point).stress[5]
     reaction = kl.ReactionOf("x-", "x").value(result)
     assert reaction == pytest.approx(result.reaction("x-")[:, 0].sum())
     assert kl.MeanDisplacement("x+", "x").value(result) == pytest.approx(0.01)
@@ -284,7 +284,7 @@ def test_prestress_and_prescribed_values_are_no_part_of_the_adjoint():
     a, b = (model.solve() for model in (plain, other))
     both = plain.solve().error(of=quantity), other.solve().error(of=quantity)
     difference = b.error(of=quantity).value - a.error(of=quantity).value
-    stress = b.stress(at=(1.2, 0.4, 0.3)) - a.stress(at=(1.2, 0.4, 0.3))
+    stress = b.at((1.2, 0.4, 0.3)).stress - a.at((1.2, 0.4, 0.3)).stress
     assert difference == pytest.approx(stress[0])
     assert both[1].per_element.shape == both[0].per_element.shape
 

@@ -92,7 +92,7 @@ def test_a_state_is_drawn_deformed(tmp_path):
     pytest.importorskip("matplotlib")
     transient = shaken_bar().transient()
     *_, state = kl.integrate(transient, dt=0.02, steps=5)
-    kl.draw(tmp_path / "bar.png", transient.equations.model.mesh, state.u, state.u[:, 0])
+    kl.plot(transient, tmp_path / "bar.png", values="ux", states=state)
     assert (tmp_path / "bar.png").stat().st_size > 10_000
 
 

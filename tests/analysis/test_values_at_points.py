@@ -163,12 +163,12 @@ def test_strains_at_points_of_a_field_that_the_element_holds_are_exact(kind):
     mesh, field = (regular, quadratic) if kind[-3:] in ("10N", "20N", "27N") else (distorted(kind), linear)
     result, points = held_model(mesh, field(mesh.points)[0]).solve(), inner_points()
     u, strain = field(points)
-    assert np.abs(result.displacement(at=points) - u).max() < 1e-13
-    assert np.abs(result.strain(at=points) - strain).max() < 1e-13
+    assert np.abs(result.at(points).displacement - u).max() < 1e-13
+    assert np.abs(result.at(points).strain - strain).max() < 1e-13
     stress = strain * ([2 * MU] * 3 + [MU] * 3)
     stress[:, :3] += LAM * strain[:, :3].sum(axis=1, keepdims=True)
-    assert np.abs(result.stress(at=points) - stress).max() < 1e-12 * np.abs(stress).max()
-    assert result.von_mises(at=points).shape == (40,)
+    assert np.abs(result.at(points).stress - stress).max() < 1e-12 * np.abs(stress).max()
+    assert result.at(points).von_mises.shape == (40,)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -181,8 +181,8 @@ def test_values_at_gauss_points_are_found_again_by_their_places(kind):
     result = model.solve()
     places = result.at_integration_points("INTEGRATION_COORDINATES")
     for at_gauss, at_points in (
-        (result.strain(), result.strain(at=places)),
-        (result.stress(), result.stress(at=places)),
+        (result.strain(), result.at(places).strain),
+        (result.stress(), result.at(places).stress),
     ):
         assert np.abs(at_points - at_gauss).max() < 1e-10 * np.abs(at_gauss).max()
 
@@ -191,26 +191,78 @@ def test_points_may_be_one_none_or_located_before():
     mesh = distorted("KinematicLinear3D8N")
     result = held_model(mesh, linear(mesh.points)[0]).solve()
     point = [0.4, 0.4, 0.3]
-    assert result.strain(at=point).shape == (6,)
-    assert result.stress(at=np.zeros((0, 3))).shape == (0, 6)
+    assert result.at(point).strain.shape == (6,)
+    assert result.at(np.zeros((0, 3))).stress.shape == (0, 6)
     located = mesh.locate([point, [9.0, 9.0, 9.0]])
-    inside = result.stress(at=located[located.inside])
-    assert (inside == result.stress(at=[point])).all()
+    inside = result.at(located[located.inside]).stress
+    assert (inside == result.at([point]).stress).all()
 
 
 def test_a_point_outside_the_mesh_is_an_error_that_says_how_far():
     result = held_model(kl.box(), np.zeros((8, 3))).solve()
-    for method in (result.stress, result.strain, result.von_mises, result.displacement):
-        with pytest.raises(kl.MeshError, match=r"point 1 at .* lies outside the mesh"):
-            method(at=[[0.5, 0.5, 0.5], [2.0, 0.5, 0.5]])
+    with pytest.raises(kl.MeshError, match=r"point 1 at .* lies outside the mesh"):
+        result.at([[0.5, 0.5, 0.5], [2.0, 0.5, 0.5]])
     with pytest.raises(kl.InputError, match="located in another mesh"):
-        result.stress(at=kl.box(cells=(2, 1, 1)).locate([0.5, 0.5, 0.5]))
+        result.at(kl.box(cells=(2, 1, 1)).locate([0.5, 0.5, 0.5]))
     larger = result.mesh.replace(points=result.mesh.points * 10)  # of the same size, but with other gradients
-    for method in (result.stress, result.strain, result.von_mises, result.displacement):
-        with pytest.raises(kl.InputError, match="these points were located in another mesh"):
-            method(at=larger.locate([0.5, 0.5, 0.5]))
-    with pytest.raises(kl.InputError, match="not both"):
-        result.displacement("x-", at=[0.5, 0.5, 0.5])
+    with pytest.raises(kl.InputError, match="these points were located in another mesh"):
+        result.at(larger.locate([0.5, 0.5, 0.5]))
+    with pytest.raises(kl.InputError, match="recovered must be True or False"):
+        result.at([0.5, 0.5, 0.5], recovered="yes")
+
+
+def test_points_in_place_of_a_word_are_sent_to_at():
+    result = held_model(kl.box(), np.zeros((8, 3))).solve()
+    for method in (result.stress, result.strain, result.von_mises, result.tresca, result.principal_stresses):
+        with pytest.raises(kl.InputError, match=r"one of gauss, element, .* result\.at\(points\)\.stress"):
+            method([0.5, 0.5, 0.5])
+
+
+def test_recovered_stresses_at_nodes_are_those_of_the_nodes_and_do_not_cross_materials():
+    mesh = kl.box((2, 1, 1), (4, 2, 2), element="KinematicLinear3D20N")
+    mesh.add_part("left", lambda X: X[:, 0] < 1.01)
+    mesh.add_part("right", lambda X: X[:, 0] > 0.99)
+    soft, stiff = (kl.Isotropic3D(E=E, nu=0.0) for E in (1e5, 1e6))
+    model = kl.Model(mesh, {"left": soft, "right": stiff})
+    x = mesh.points[:, 0]
+    u = np.zeros_like(mesh.points)
+    u[:, 0] = x * x
+    model.fix(np.arange(mesh.n_nodes), "xyz", u)
+    result = model.solve()
+    inner = mesh.points[np.abs(x - 1) > 0.01]
+    values = result.at(inner, recovered=True)
+    assert np.abs(values.stress - result.stress("node")[np.abs(x - 1) > 0.01]).max() < 1e-6
+    beside = result.at([[1 - 1e-9, 0.4, 0.4], [1 + 1e-9, 0.4, 0.4]], recovered=True)
+    assert np.abs(beside.stress[:, 0] / [2e5, 2e6] - 1).max() < 1e-6
+    assert np.abs(beside.displacement[:, 0] - 1).max() < 1e-6
+
+
+def test_stresses_of_points_and_places_are_functions_of_the_same_tensor():
+    mesh = distorted("KinematicLinear3D8N")
+    u = 1e-3 * np.random.default_rng(1).uniform(-1, 1, mesh.points.shape)
+    result, points = held_model(mesh, u).solve(), inner_points(6).reshape(2, 3, 3)
+    values = result.at(points)
+    tensor = values.stress[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    principal = np.linalg.eigvalsh(tensor)[..., ::-1]
+    size = np.abs(principal).max()
+    assert np.abs(values.principal_stresses - principal).max() < 1e-14 * size
+    assert np.abs(values.tresca - principal[..., 0] + principal[..., 2]).max() < 1e-14 * size
+    V = values.principal_directions
+    assert np.abs(V @ tensor @ np.swapaxes(V, -1, -2) - principal[..., None] * np.eye(3)).max() < 1e-14 * size
+    for at, shape in (("gauss", (2, 8)), ("element", (2,)), ("node", (12,))):
+        stress = result.stress(at)
+        assert result.tresca(at).shape == shape
+        mises = np.sqrt(
+            ((result.principal_stresses(at) - stress[..., :3].mean(-1)[..., None]) ** 2).sum(-1) * 1.5
+        )
+        assert np.abs(result.von_mises(at) - mises).max() < 1e-14 * size
+        assert result.principal_directions(at).shape == (*shape, 3, 3)
+
+
+def test_principal_stresses_of_elements_with_different_rules_are_a_list():
+    model = held_model(mesh := kl.box(cells=(2, 1, 1)), 1e-3 * mesh.points)
+    model.use_rule(3, [1])
+    assert [s.shape for s in model.solve().principal_stresses()] == [(8, 3), (27, 3)]
 
 
 def test_own_b_operator_gives_the_strain_at_points():
@@ -227,10 +279,10 @@ def test_own_b_operator_gives_the_strain_at_points():
         mesh = kl.box(element="TwiceTheStrain")
         u, strain = linear(mesh.points)
         result = held_model(mesh, u).solve()
-        assert np.abs(result.strain(at=[[0.2, 0.7, 0.4]]) - 2 * strain[0]).max() < 1e-15
+        assert np.abs(result.at([[0.2, 0.7, 0.4]]).strain - 2 * strain[0]).max() < 1e-15
         result = held_model(kl.box(element="OwnStrainAlone"), u).solve()
         with pytest.raises(kl.InputError, match="OwnStrainAlone has its own strain"):
-            result.strain(at=[0.2, 0.7, 0.4])
+            _ = result.at([0.2, 0.7, 0.4]).strain
 
 
 def test_states_of_a_transient_have_stresses_at_points():
@@ -239,6 +291,6 @@ def test_states_of_a_transient_have_stresses_at_points():
     bar.add(kl.Traction("z+", (0, 0, 1e3)))
     transient = bar.transient()
     *_, state = kl.integrate(transient, dt=1e-3, steps=20)
-    stress = transient.result(state).stress(at=[0.3, 0.3, 0.3])
+    stress = transient.result(state).at([0.3, 0.3, 0.3]).stress
     top = state.u[bar.mesh.nodes("z+"), 2].mean()
     assert abs(stress[2] - 1e6 * top) < 1e-9 * abs(stress[2])

@@ -61,10 +61,10 @@ def test_a_path_is_drawn_from_states_of_the_body_alone(tmp_path):
         (body(), [kl.State.of(model().transient())], "this is the state of a model"),
         (body(), [3], "a State of a rigid body is needed"),
         (body(), 3, "states in the order of time are needed; got 3"),
-        (model().transient(), [], "a path is that of a body"),
+        (model().transient(), [], "there is no state to draw"),
     ):
         with pytest.raises(InputError, match=words):
-            kl.draw_trajectory(tmp_path / "path.png", owner, states)
+            kl.plot(owner, tmp_path / "path.png", states=states)
 
 
 @pytest.mark.parametrize("subject", [None, [body()], model(), 3])

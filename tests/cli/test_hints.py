@@ -25,7 +25,18 @@ GUST = Path(__file__).parents[2] / "examples" / "tower" / "gust.json"
         (["solve", "a.json", "--march", "1e-3:10"], "It is called --time here"),
         (["solve", "a.json", "--ends", "periodic"], "It is called --boundaries here"),
         (["solve", "a.json", "--csv", "a.csv"], "It is called --output here"),
-        (["solve", "a.json", "--tractoin", "z+:0,0,1"], "Did you mean --traction?"),
+        (
+            ["solve", "a.json", "--tractoin", "z+:0,0,1"],
+            "--tractoin: there is no such option. Did you",
+        ),
+        (
+            ["solve", "a.json", "--gravty=0,0,1"],
+            "error: --gravty: there is no such option. Did you mean --gra",
+        ),
+        (["check", "a.json", "-gravty", "0,0,1"], "Did you mean --gravity?"),
+        (["info", "a.json", "--fix", "z-:xyz"], "--fix: info does not take it; solve and check do"),
+        (["solve", "a.json", "--gravity", "0", "0", "-9.81"], "joined by commas, as in --gravity 0,0,-9.81"),
+        (["solve", "a.json", "b.json"], "'b.json' is one word too many"),
         (["convert", "a.mdpa", "b.vtu", "--lenent"], "Did you mean --lenient?"),
         (["march", "a.json"], "Did you mean solve, with --time STEP:STEPS?"),
         (["slove", "a.json"], "Did you mean solve?"),
@@ -36,6 +47,7 @@ def test_an_option_or_command_of_another_name_is_answered_with_ours(run, words, 
     done = run(*words)
     assert (done.code, done.out) == (2, "")
     assert done.err.count("error: ") == 1
+    assert len(done.err.splitlines()) == 2
     assert hint in done.err
 
 

@@ -363,7 +363,7 @@ def test_an_own_b_that_is_not_that_of_the_gauss_points_gives_no_stress_at_points
 
     result = cantilever("Two8N").solve()
     with pytest.raises(kl.InputError, match="is not that of its strain at the Gauss points"):
-        result.stress(at=[result.mesh.points.mean(axis=0)])
+        _ = result.at([result.mesh.points.mean(axis=0)]).stress
 
 
 def test_a_step_of_the_wrong_shape_is_refused():

@@ -52,7 +52,7 @@ def with_options(words: list[str], rng: Random) -> list[str]:
 def command_of(seed: Seed, rng: Random) -> list[str]:
     """Return a command for an input."""
     words = _command_of(seed, rng)
-    return with_options(words, rng) if words[0] == "solve" else words
+    return with_options(words, rng) if words[0] in ("solve", "check") else words
 
 
 def _command_of(seed: Seed, rng: Random) -> list[str]:
@@ -111,9 +111,11 @@ def _of_words(code: int | None, told: str, said: str, files: list[str], words: l
         found.append(f"exit code {code}: {said[-300:]}")
     if "Traceback" in said or re.search(r"\w+Warning\b", said):
         found.append(f"says {said[-300:]}")
+    if code == 2 and words[0] == "check" and "cannot be solved\nerror    " in told and not said:
+        return found
     if code == 2 and said.count("error: ") != 1:
         found.append(f"exit code 2 with {said!r}")
-    if said.startswith("usage: "):
+    if said.endswith("--help lists what there is\n"):
         return found
     values = tuple(f"{word.partition('=')[2]}:" for word in words)
     is_of_option = said.removeprefix("error: ").startswith(values)

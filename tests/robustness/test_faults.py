@@ -159,7 +159,7 @@ OUTPUTS = {
 @pytest.mark.parametrize("output", OUTPUTS)
 def test_a_disk_that_fills_up_is_one_error_and_nothing_half_written(folder, output):
     before = contents(folder)
-    done = run({"at": "kratos_lite.io.atomic:os.urandom", "file_size": 1000}, *OUTPUTS[output])
+    done = run({"at": "kratos_lite.atomic:os.urandom", "file_size": 1000}, *OUTPUTS[output])
     assert refused(done, f"{FIRST.get(output, output)}: cannot be written: ", "free some space")
     assert contents(folder) == before
 
@@ -188,7 +188,7 @@ def test_a_folder_where_nothing_may_be_written_is_named(folder, output):
     Path("shut").mkdir(mode=0o555)
     *words, name = OUTPUTS[output]
     before = contents(folder)
-    done = run({"at": "kratos_lite.io.atomic:replacing", "nobody": True}, *words, f"shut/{name}")
+    done = run({"at": "kratos_lite.atomic:replacing", "nobody": True}, *words, f"shut/{name}")
     assert refused(done, f"shut/{FIRST.get(name, name)}: cannot be written: Permission denied")
     assert contents(folder) == before
 

@@ -355,9 +355,8 @@ ELSEWHERE = {
     *(("Motion", name) for name in ("rate", "acceleration", "part")),
     *((name, "C") for name in ("B_at_gauss_points", "internal_load", "strain")),
     *((name, "xi") for name in ("N", "dN")),
-    *(("draw", name) for name in ("displacement", "values")),
+    *(("plot", name) for name in ("clim", "displacement", "points", "values")),
     ("PlacedCell", "X"),
     ("Block", "shape"),
-    ("draw_element", "points"),
 }
 """Arguments of bases, of pictures, and of shapes, which trust their callers."""

@@ -81,7 +81,7 @@ def test_a_part_that_moves_in_another_case_only_stays_exactly_at_rest():
 
 
 def by_prescribed_value(model):
-    model.fix([0, 3, 9], "z", 1e-3, override=True)
+    model.fix(np.array([0, 3, 9]), "z", 1e-3, override=True)
 
 
 def by_link_between_parts(model):

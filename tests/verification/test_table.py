@@ -14,7 +14,8 @@ from kratos_lite.verification.problem import ELEMENTS, Problem, Row
 from kratos_lite.verification.sources import SOURCES
 from kratos_lite.verification.table import PROBLEMS, chosen, verify
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "verification.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "about" / "verification.md").read_text(encoding="utf-8")
 FAMILIES = list(dict.fromkeys(name.partition("/")[0] for name in PROBLEMS))
 
 

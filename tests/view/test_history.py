@@ -3,8 +3,6 @@
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.io.writers.pictures import draw_history
-from kratos_lite.view import history_figure
 
 
 @pytest.fixture(scope="module")
@@ -17,8 +15,8 @@ def result():
 
 
 def test_it_is_written_in_the_type_of_its_name(result, tmp_path):
-    draw_history(tmp_path / "a.png", result)
-    draw_history(tmp_path / "a.svg", result, title="bar")
+    kl.plot(result.report, tmp_path / "a.png")
+    kl.plot(result.report, tmp_path / "a.svg", title="bar")
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 
@@ -29,7 +27,7 @@ def test_the_figure_has_all_meshes_and_the_error_asked_for(result):
     steps = result.report.history
     unknowns, errors = np.array([s.unknowns for s in steps]), np.array([s.error for s in steps])
     assert result.report.error_asked == 0.2
-    axes = history_figure(unknowns, errors, goal=0.2, of="the energy norm").axes[0]
+    axes = kl.plot(result.report).axes[0]
     drawn, goal = axes.get_lines()
     assert np.abs(drawn.get_xdata() - unknowns).max() == 0
     assert np.abs(drawn.get_ydata() - 100 * errors).max() == 0
@@ -37,9 +35,8 @@ def test_the_figure_has_all_meshes_and_the_error_asked_for(result):
     assert axes.get_ylabel() == "error of the energy norm in %"
 
 
-def test_a_result_without_a_history_is_refused(tmp_path):
+def test_a_report_without_a_history_is_refused(tmp_path):
     model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3))
     model.fix("x-")
-    for thing in (model.solve(), model):
-        with pytest.raises(kl.InputError, match=r"a result of model.solve\(error=...\) has a history"):
-            draw_history(tmp_path / "a.png", thing)
+    with pytest.raises(kl.InputError, match=r"no history to draw: that of model.solve\(error=...\) has"):
+        kl.plot(model.solve().report, tmp_path / "a.png")

@@ -53,6 +53,10 @@ def _read(path: Path, strict: bool) -> Document:
         raise InputError(f"{path}: there is no such file")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file in it")
+    from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
+
+    if kind in GEOMETRY:
+        raise InputError(f"{path}: is a geometry, not a mesh; mesh it with {meshing(path)} and give the .msh")
     from kratos_lite.io.formats.meshio import read_meshio
 
     return read_meshio(path)

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kratos_lite.atomic import refuse_nan, replacing
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, replacing
 from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.formats.foreign import Found, check_ending, guarded, read_foreign
+from kratos_lite.io.formats.gmsh import check_solids
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
 from kratos_lite.records import replace
 from kratos_lite.shapes import SHAPES, Shape
@@ -58,13 +59,14 @@ def read_meshio(path: str | Path) -> Document:
     Raises
     ------
     InputError
-        The ending is unknown, the file cannot be read, or it holds no mesh in three dimensions.
+        The ending is unknown, the file cannot be read, it holds no solid cells, or some that no element has.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is no ordinary file; name a file")  # a pipe might never end
     found = read_foreign(path)
     _check(path, found)
+    check_solids(path, found, frozenset(CELLS))
     return _Reading(path, found).document()
 
 
@@ -188,8 +190,6 @@ class _Reading:
                 raise InputError(f"{self.path}: {block.name} listed twice; save it from Gmsh as version 4.1")
         used = sorted({int(i) for block in elements for i in np.unique(block.properties)} or {1})
         conditions = [replace(block, properties=np.full(len(block), used[0])) for block in conditions]
-        if not elements:
-            self.notes.append(Note(0, "there are no solid cells (tetrahedra, pyramids, wedges, hexahedra)"))
         elements, node_ids = self._named(elements)
         self._note_lost()
         source, parts, points = self.path.name, self._parts(), self.found.points

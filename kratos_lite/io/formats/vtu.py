@@ -13,8 +13,8 @@ from typing import BinaryIO, TypeAlias
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, write_whole
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.native import threads
 from kratos_lite.typing import Numbers

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import Problems, naming, nearest
 from kratos_lite.io.formats.document import Data, Document, Note
-from kratos_lite.io.kratos.properties import apply_properties
+from kratos_lite.io.kratos.properties import USED, apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
+from kratos_lite.io.names import misspelt
 from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
 from kratos_lite.typing import Array, Ints
 
@@ -42,6 +43,7 @@ def model_from(
         With the place in the file of each unknown element and each impossible material.
     """
     check_elements(document)
+    _check_variables(document)
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh.blocks)
@@ -58,9 +60,8 @@ def model_from(
         processes(values)
     with naming(document.mesh.source):
         values.apply(model)
-    if initial_displacement:
-        _activate(model, u0)
-    with naming(document.mesh.source):
+        if initial_displacement:
+            _activate(model, u0)
         _constrain(model, document)
     return model
 
@@ -77,6 +78,27 @@ def check_elements(document: Document) -> None:
             text = f"unknown element {block.name!r} ({len(block)} of them);{hint} Known are {have}"
             problems.add(f"{text} and their Kratos names", line)
     problems.raise_if_any()
+
+
+def _check_variables(document: Document) -> None:
+    """Raise InputError for variables that are one of a load, support or constant but for a letter or two."""
+    problems, source = Problems(), document.mesh.source
+    of_data = {*LOADING, *VECTORS, *SPLIT}
+    for properties in document.properties.values():
+        for name in properties.values.keys() - USED:
+            _check_spelling(name, USED, problems, properties.source or source, properties.lines.get(name))
+    for data in (*document.nodal_data, *document.condition_data):
+        if data.variable not in of_data:
+            _check_spelling(data.variable, of_data, problems, data.source or source, data.line)
+    problems.raise_if_any()
+
+
+def _check_spelling(
+    name: str, known: Collection[str], problems: Problems, source: str, line: int | None
+) -> None:
+    if meant := misspelt(name, sorted(known)):
+        place = ":".join(str(part) for part in (source, line) if part)
+        problems.add(f"{place}: unknown variable {name}. Did you mean {meant}?")
 
 
 def _renamed(blocks: Sequence[Block]) -> list[str]:

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.typing import Progress
+
+
+def check(case: Case) -> list[str]:
+    """Return the warnings of the model, checked as its solution does."""
+    model = case.model
+    if model.motion is None:
+        return StaticAnalysis(model, case.solver, case.tolerance).check()
+    from kratos_lite.analysis.equations_of_motion import EquationsOfMotion  # statics start quicker without it
+
+    equations = EquationsOfMotion(model, free=False, steady=True)
+    equations.load(0.0)
+    return equations.warnings
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.analysis.plot import plot
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
@@ -16,7 +17,6 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.series import SeriesWriter
-from kratos_lite.io.writers.trajectory import draw_trajectory
 from kratos_lite.typing import Array, Progress
 
 
@@ -36,6 +36,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[Body, Iterato
     return body, placed(time, steps)
 
 
+def check(case: Case) -> list[str]:
+    """Return the warnings of the body; no step is taken."""
+    return prepare(case)[0].warnings()
+
+
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Take the steps of a body, and draw its path."""
     body, states = prepare(case, progress)
@@ -44,7 +49,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     seconds = perf_counter() - clock
     if case.outputs.picture is not None:
         title = case.files[0].stem.replace("_", " ") if case.files else ""
-        draw_trajectory(case.outputs.picture, body, summary.kept, title=title)
+        plot(body, case.outputs.picture, states=summary.kept, title=title)
     return Outcome(case, [*rows_of(body), *summary.rows(seconds)])
 
 

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from math import pi
 
+from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.typing import Progress
+
+
+def check(case: Case) -> list[str]:
+    """Return the warnings of the model, checked as the search for its frequencies does."""
+    return EquationsOfMotion(case.model, steady=case.model.motion is not None).warnings
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:

@@ -16,8 +16,6 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
-from kratos_lite.io.writers.pictures import draw
-from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.structure import Structure
@@ -42,6 +40,11 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     return transient, placed(time, steps)
 
 
+def check(case: Case) -> list[str]:
+    """Return the warnings of the model and of its start; no step is taken."""
+    return prepare(case)[0].equations.warnings
+
+
 def _held_at_first(transient: TransientAnalysis) -> Structure:
     """Return the model of a transient with a load at its start that balances stiffness and damping there."""
     e = transient.equations
@@ -58,15 +61,11 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     start = transient.state()
     summary, clock = _Summary(transient), perf_counter()
     follow(case, transient, start, states, summary)
-    rows = summary.rows(case, perf_counter() - clock)
+    rows, result = summary.rows(case, perf_counter() - clock), transient.result(summary.last)
     if case.outputs.picture is not None:
-        _draw(case.outputs.picture, case.model.mesh, summary.last)
-    return Outcome(case, rows, transient.result(summary.last))
-
-
-def _draw(path: str, mesh: Mesh, state: State) -> None:
-    title = f"displacement at t = {state.time:g} s"
-    draw(path, mesh, state.u, np.linalg.norm(state.u, axis=1), title=title, unit="m")
+        title = f"displacement at t = {summary.last.time:g} s"
+        result.plot(case.outputs.picture, "displacement", title=title)
+    return Outcome(case, rows, result)
 
 
 class _Summary:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from kratos_lite import voigt
 from kratos_lite.analysis.report import element_counts
+from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.writers.endings import check_result
 
 if TYPE_CHECKING:

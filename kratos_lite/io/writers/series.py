@@ -8,9 +8,9 @@ from types import TracebackType
 from typing import Any
 
 from kratos_lite.analysis.transient import TransientAnalysis
+from kratos_lite.atomic import refuse_nan, write_arrays, write_whole
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import refuse_nan, write_arrays, write_whole
 from kratos_lite.io.formats.vtu import check_mode, write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_series
 from kratos_lite.io.writers.recorded import Recorded, arrays_of, recorded

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from kratos_lite.analysis.state import BODY_FIELDS, MODEL_FIELDS, State
+from kratos_lite.atomic import read_arrays, write_arrays
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import read_arrays, write_arrays
 
 HEAD = ("kind", "integrator", "time", "step", "substeps")
 WHAT = "a state that kl.write wrote"

@@ -46,6 +46,24 @@ class Load(ABC):
             The load does not fit the mesh.
         """
 
+    def check(self, mesh: Mesh) -> None:
+        """Check that what the load acts on exists; `Structure.add` asks for it.
+
+        Parameters
+        ----------
+        mesh : points, elements and named parts.
+
+        Raises
+        ------
+        MeshError
+            The load has an attribute `where`, and there is no such part or node.
+        """
+        where = getattr(self, "where", None)
+        if isinstance(where, str):
+            mesh.part(where)
+        elif where is not None and not callable(where):
+            mesh.nodes(where)
+
     def refined(self, finer: Finer) -> Load:
         """Return the same load on a finer mesh.
 
@@ -177,6 +195,10 @@ class ScaledLoad(TimeDependentLoad):
                 f"an amplitude multiplies a constant load such as Gravity or Traction; got {name}"
             )
         self.load, self.amplitude = load, function_of(amplitude, "the amplitude of a load")
+
+    def check(self, mesh: Mesh) -> None:
+        """Check that what the load acts on exists."""
+        self.load.check(mesh)
 
     def refined(self, finer: Finer) -> Load:
         """Return the load on a finer mesh, with the same amplitude."""

@@ -12,12 +12,12 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, WhereElements
 from kratos_lite.model.loads.base import Load, OfPlace, vectors
+from kratos_lite.typing import Array, Mask
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kratos_lite.mesh.finer import Finer
-from kratos_lite.typing import Array, Mask
 
 
 class BodyForce(Load):
@@ -89,6 +89,17 @@ class BodyForce(Load):
         chosen = np.zeros(mesh.n_elements, dtype=bool)
         chosen[slice(None) if self.where is None else mesh.elements(self.where)] = True
         return chosen
+
+    def check(self, mesh: Mesh) -> None:
+        """Check that the elements which carry it exist.
+
+        Raises
+        ------
+        MeshError
+            There is no such part, property or element.
+        """
+        if self.where is not None:
+            mesh.elements(self.where)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return ∫ N b dV as nodal forces (n, 3) in N.

@@ -8,39 +8,67 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh.selection import nodes_at, point_of
 from kratos_lite.model.loads.base import Load, vectors
+from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kratos_lite.mesh.finer import Finer
-from kratos_lite.typing import Array
 
 
 class PointLoad(Load):
-    """The same force on each node of a part.
+    """A force on a point, or the same force on each node of a part.
 
     Parameters
     ----------
-    where : nodes.
-    force : (3,) float, N, on each node.
+    where : a point (x, y, z) in m, or nodes.  A force on a point acts on the node there, or else on the nodes
+        of the element around it, by its shape functions N.
+    force : (3,) float, N: in all on a point, on each of several nodes.
+
+    Examples
+    --------
+    >>> from kratos_lite import box
+    >>> PointLoad((0.5, 0.5, 1.0), (0, 0, -8.0)).forces(box(), [])[:, 2].tolist()
+    [0.0, -2.0, 0.0, -2.0, 0.0, -2.0, 0.0, -2.0]
     """
 
     def __init__(self, where: Where, force: ArrayLike) -> None:
         self.where = where
         self.force = vectors(force, "a point load", "(3,) in N")
+        self._point = point_of(where)
+
+    def check(self, mesh: Mesh) -> None:
+        """Check that the point lies in the mesh, or that the nodes exist.
+
+        Raises
+        ------
+        MeshError
+            They do not.
+        """
+        if self._point is None:
+            super().check(mesh)
+        else:
+            _around(mesh, self._point)
 
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
         """Return the nodal forces (n, 3) in N.
 
         Raises
         ------
+        MeshError
+            The point lies outside the mesh, or there is no such part or node.
         ModelError
             No node is chosen.
         """
         total = np.zeros_like(mesh.points)
+        if self._point is not None:
+            nodes, N = _around(mesh, self._point)
+            total[nodes] = N[:, None] * self.force
+            return total
         rows = mesh.nodes(self.where)
         if not len(rows):
             raise ModelError(f"a point load finds no node in {self.where!r}")
@@ -48,8 +76,21 @@ class PointLoad(Load):
         return total
 
     def refined(self, finer: Finer) -> Load:
-        """Return the load on a finer mesh: on the same nodes."""
-        return PointLoad(finer.coarse.nodes(self.where), self.force)
+        """Return the load on a finer mesh: on the same nodes or point."""
+        same = finer.coarse.nodes(self.where) if self._point is None else self.where
+        return PointLoad(same, self.force)
+
+
+def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
+    """Return the nodes (k,) on which a force on a point acts, and its share (k,) on each."""
+    rows, nearby = nodes_at(point, mesh.points)
+    rows = rows[mesh.used_nodes()[rows]][:1] if len(rows) else rows
+    if len(rows):
+        return rows, np.ones(1)
+    found = mesh.locate(point)
+    if not found.inside:
+        raise MeshError(f"a point load at {point.tolist()} m acts outside the mesh; {nearby}")
+    return found.nodes_and_weights()
 
 
 class NodalForces(Load):

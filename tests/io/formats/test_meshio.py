@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kratos_lite.errors import InputError
+from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.meshio import CELLS, read_meshio, write_meshio
 from kratos_lite.io.formats.vtu import write_vtu
 from kratos_lite.mesh import Block, Mesh
@@ -156,7 +157,7 @@ def test_abaqus_sets_become_parts(tmp_path):
 
 def test_what_is_not_used_is_noted(tmp_path):
     cells = [("tetra", [[0, 1, 2, 3]]), ("line", [[0, 1], [1, 2]]), ("quad", [[0, 1, 2, 3]])]
-    cells.append(("wedge18", [list(range(18))]))
+    cells.append(("polygon", [list(range(5))]))
     meshio.Mesh(np.random.default_rng(1).normal(size=(18, 3)), cells, {"T": np.zeros(18)}).write(
         tmp_path / "a.vtk", file_format="vtk"
     )
@@ -164,16 +165,77 @@ def test_what_is_not_used_is_noted(tmp_path):
     assert [str(note) for note in document.notes] == [
         "nodes are numbered 1 … 18 in the order of the file",
         "2 cells 'line' are in no named group and are not used",
-        "1 cells 'wedge18' are of no known type and are not used",
+        "1 cells 'polygon' are of no known type and are not used",
         "data not used: T",
     ]
     assert [block.name for block in document.mesh.conditions] == ["SurfaceCondition3D4N"]
     assert [block.properties.tolist() for block in document.mesh.conditions] == [[1]]
 
 
-def test_a_mesh_of_faces_alone_is_noted(tmp_path):
-    meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])]).write(tmp_path / "a.vtk")
-    assert "no solid cells" in str(read_meshio(tmp_path / "a.vtk").notes[0])
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+FACE = [("triangle", [[0, 1, 2]])]
+COMMAND = "'gmsh -3 -order 2 {0}.geo -o {0}.msh'"
+
+
+def refused(path):
+    """Return what is wrong with a file, less the name of its folder."""
+    with pytest.raises(InputError) as error:
+        read_document(path)
+    return str(error.value).replace(f"{path.parent}/", "")
+
+
+def test_a_mesh_of_faces_alone_is_refused(tmp_path):
+    meshio.Mesh(SQUARE, FACE).write(tmp_path / "a.vtk")
+    said = refused(tmp_path / "a.vtk")
+    assert "a.vtk: there are no solid cells" in said
+    assert "but 1 triangle; mesh the volume, too" in said
+
+
+@pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
+@pytest.mark.parametrize("named", [{}, {"top": np.array([3, 2])}, {"body": np.array([1, 3])}])
+def test_gmsh_files_without_volumes_are_answered_with_the_line_or_the_command(tmp_path, form, named):
+    """Gmsh saves physical groups alone where there are some; a mesh of surfaces needs -3."""
+    tags = {"gmsh:physical": [np.array([3])], "gmsh:geometrical": [np.array([3])]} if named else {}
+    meshio.Mesh(SQUARE, FACE, cell_data=tags, field_data=named).write(tmp_path / "a.msh", file_format=form)
+    said = refused(tmp_path / "a.msh")
+    assert "there are no solid cells" in said
+    assert said.endswith(COMMAND.format("a"))
+    assert ('add the line Physical Volume("body") = {1};' in said) == ("top" in named)
+    assert ("mesh volumes, not surfaces alone" in said) == ("top" not in named)
+
+
+@pytest.mark.parametrize(
+    ("kind", "nodes", "cure"),
+    [
+        ("tetra20", 20, "set Mesh.ElementOrder = 2; in the .geo file, or mesh with " + COMMAND.format("a")),
+        ("hexahedron64", 64, "set Mesh.ElementOrder = 2; in the .geo file"),
+        ("wedge18", 18, "add the line Mesh.SecondOrderIncomplete = 1; to the .geo file, or mesh with"),
+        ("pyramid14", 14, "-setnumber Mesh.SecondOrderIncomplete 1 a.geo -o a.msh'"),
+    ],
+)
+def test_solids_of_gmsh_that_no_element_has_are_answered_with_line_and_option(tmp_path, kind, nodes, cure):
+    points = np.random.default_rng(2).normal(size=(nodes, 3))
+    cells = [("tetra", [[0, 1, 2, 3]]), (kind, [list(range(nodes))])]
+    meshio.Mesh(points, cells).write(tmp_path / "a.msh", file_format="gmsh22")
+    said = refused(tmp_path / "a.msh")
+    assert f"a.msh: there are no elements for 1 cells {kind!r}; " in said
+    assert cure in said
+
+
+def test_solids_of_other_formats_that_no_element_has_are_refused_too(tmp_path):
+    points = np.random.default_rng(2).normal(size=(18, 3))
+    meshio.Mesh(points, [("wedge18", [list(range(18))])]).write(tmp_path / "a.vtk")
+    assert "1 cells 'wedge18'; save linear or quadratic ones" in refused(tmp_path / "a.vtk")
+
+
+@pytest.mark.parametrize("ending", ["geo", "GEO", "step", "brep"])
+def test_a_geometry_is_answered_with_the_command_that_meshes_it(tmp_path, ending):
+    (tmp_path / f"part.{ending}").write_text("Box(1) = {0, 0, 0, 1, 1, 2};")
+    said = refused(tmp_path / f"part.{ending}")
+    assert said == (
+        f"part.{ending}: is a geometry, not a mesh; mesh it with "
+        f"'gmsh -3 -order 2 part.{ending} -o part.msh' and give the .msh"
+    )
 
 
 @pytest.mark.parametrize(

@@ -139,14 +139,14 @@ def test_bad_targets_are_refused_at_once(tmp_path):
     with pytest.raises(kl.ModelError, match="has no mesh to be shown"):
         kl.SeriesWriter(tmp_path / "a.pvd", top)
     with pytest.raises(kl.ModelError, match="has no mesh to be drawn"):
-        kl.draw_trajectory(tmp_path / "a.png", top, [kl.State.of(top)])
+        kl.plot(top, tmp_path / "a.png", states=[kl.State.of(top)])
 
 
 @kinds
 def test_a_picture_shows_path_and_energies(tmp_path, kind):
     pytest.importorskip("matplotlib")
     body = thrown(kind)
-    kl.draw_trajectory(tmp_path / "a.svg", body, kl.integrate(body, 0.01, 20, every=2), title="a throw")
+    kl.plot(body, tmp_path / "a.svg", states=kl.integrate(body, 0.01, 20, every=2), title="a throw")
     words = words_of(tmp_path / "a.svg")
     assert {"a throw", "kinetic", "potential", "sum", "time in s", "energy in J"} <= set(words)
     assert ("internal" in words) == (kind is not kl.RigidBody)
@@ -160,7 +160,7 @@ def words_of(path):
 def test_a_picture_of_one_state_has_no_curves(tmp_path):
     pytest.importorskip("matplotlib")
     body = thrown(kl.RigidBody)
-    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body)], title="at rest")
+    kl.plot(body, tmp_path / "a.svg", states=[kl.State.of(body)], title="at rest")
     words = words_of(tmp_path / "a.svg")
     assert {"at rest", "0 s", "0.2 m", "x", "y", "z"} <= set(words)
     assert not {"time in s", "sum"} & set(words)
@@ -169,30 +169,30 @@ def test_a_picture_of_one_state_has_no_curves(tmp_path):
 def test_a_picture_says_when_a_body_starts_and_ends(tmp_path):
     pytest.importorskip("matplotlib")
     body = thrown(kl.RigidBody)
-    kl.draw_trajectory(tmp_path / "a.svg", body, [kl.State.of(body), *kl.integrate(body, 0.01, 20)])
+    kl.plot(body, tmp_path / "a.svg", states=[kl.State.of(body), *kl.integrate(body, 0.01, 20)])
     assert {"0 s", "0.2 s"} <= set(words_of(tmp_path / "a.svg"))
     body = kl.RigidBody(kl.box(), RUBBER)
     body.set_velocity(angular=(0, 0, 2 * np.pi))
     states = [kl.State.of(body), *kl.integrate(body, 0.01, 100)]  # once around
-    kl.draw_trajectory(tmp_path / "b.svg", body, states)
+    kl.plot(body, tmp_path / "b.svg", states=states)
     assert "0 s and 1 s" in words_of(tmp_path / "b.svg")
 
 
 def test_turning_points_are_among_the_positions_drawn():
-    from kratos_lite.io.writers.trajectory import _telling
+    from kratos_lite.analysis.path_picture import telling
 
     body = kl.RigidBody(kl.box((0.1, 0.1, 0.1)), RUBBER)
     body.constrain(kl.PrescribedDisplacement(body.center, (1, 0, 0), lambda t: np.sin(2 * np.pi * t)))
     q = [kl.State.of(body).q, *(state.q for state in kl.integrate(body, 0.01, 100))]
-    assert _telling(body, q, 4) == [0, 25, 75, 100]
-    assert _telling(body, q[:1], 6) == [0]
-    assert _telling(body, q, 1) == [100]
-    assert _telling(body, [q[0]] * 5, 6) == [0, 4]
+    assert telling(body, q, 4) == [0, 25, 75, 100]
+    assert telling(body, q[:1], 6) == [0]
+    assert telling(body, q, 1) == [100]
+    assert telling(body, [q[0]] * 5, 6) == [0, 4]
 
 
 def test_a_picture_without_states_is_refused(tmp_path):
-    with pytest.raises(kl.InputError, match=r"a\.png: there is no state to draw"):
-        kl.draw_trajectory(tmp_path / "a.png", thrown(kl.RigidBody), [])
+    with pytest.raises(kl.InputError, match="there is no state to draw"):
+        kl.plot(thrown(kl.RigidBody), tmp_path / "a.png", states=[])
     assert list(tmp_path.iterdir()) == []
 
 

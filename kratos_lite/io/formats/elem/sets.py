@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.atomic import replacing
 from kratos_lite.errors import InputError, Problems
-from kratos_lite.io.atomic import replacing
 from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.formats.elem.data import read_nodal_data, read_properties, use_properties
 from kratos_lite.io.formats.elem.files import ElemFiles, stem

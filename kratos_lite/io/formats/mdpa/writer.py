@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kratos_lite.atomic import write_whole
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import write_whole
 from kratos_lite.io.formats.document import Constraint, Data, Document, Note
 from kratos_lite.io.formats.mdpa.parts import PART_NAME
 from kratos_lite.io.formats.mdpa.scan import NAME

@@ -10,10 +10,8 @@ from numpy.typing import ArrayLike
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
+from kratos_lite.view.camera import OBLIQUE
 from kratos_lite.view.canvas import new_figure
-
-OBLIQUE: Array = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
-"""Rows: right, up and towards the viewer; no two corners of a cube fall on one another."""
 
 
 def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:

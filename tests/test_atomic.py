@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from kratos_lite.atomic import replacing, write_whole
 from kratos_lite.errors import InputError
-from kratos_lite.io.atomic import replacing, write_whole
 
 
 def _full(*_):

@@ -1,0 +1,83 @@
+"""The documentation site: ``python -m sphinx -W --keep-going docs build/site``; README.md is for code hosts.
+
+It works offline: fonts, search and formulas are in the site itself.
+"""
+
+import logging
+import sys
+from importlib.metadata import files
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS.parent), str(DOCS / "extensions")]
+
+import kratos_lite  # noqa: E402
+
+project = "kratos_lite"
+author = "The kratos_lite developers"
+copyright = "The kratos_lite developers, BSD-3-Clause"
+version = release = kratos_lite.__version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["_static", "extensions", "images"]
+nitpicky = True
+
+# ---- pages and notebooks ---------------------------------------------------------------------------
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 60
+nb_execution_show_tb = True
+nb_merge_streams = True
+nb_ipywidgets_js = {}
+
+# ---- reference -------------------------------------------------------------------------------------
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
+
+# ---- look ------------------------------------------------------------------------------------------
+
+html_theme = "pydata_sphinx_theme"
+html_title = "kratos_lite"
+html_theme_options = {
+    "navbar_align": "left",
+    "header_links_before_dropdown": 7,
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_copy_source = False
+html_show_sourcelink = False
+templates_path = []
+mathjax_path = "tex-svg.js"
+_mathjax = next(file for file in files("sphinx-mathjax-offline") or [] if file.name == mathjax_path)
+html_static_path = ["_static", str(_mathjax.locate())]
+html_css_files = ["site.css"]
+
+# ---- links to other sites: python -m sphinx -b linkcheck docs build/links --------------------------
+
+linkcheck_timeout = 20
+linkcheck_retries = 2
+linkcheck_anchors = False
+
+# folders that wait for their first page
+logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob" not in record.msg)

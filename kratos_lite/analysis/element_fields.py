@@ -1,0 +1,340 @@
+"""Element fields: strains, stresses and energies that follow from the displacements of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
+from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
+from kratos_lite.validation import choice
+
+if TYPE_CHECKING:
+    from kratos_lite.assembly.recovery import Recovery
+    from kratos_lite.mesh.locate import Located
+
+PLACES = ("gauss", "element", "node", "averaged", "raw")
+
+
+class ElementFields:
+    """Strains and stresses of elements under displacements; they are made when asked for.
+
+    Parameters
+    ----------
+    mesh : of n nodes and m elements.
+    groups : the elements with their materials.
+    u : (n, 3) displacements in m.
+    u0 : (n, 3) displacements in m without stress; none if not given.
+    """
+
+    def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup], u: Array, u0: Array | None = None) -> None:
+        self.mesh = mesh
+        self.groups = list(groups)
+        self.u = u
+        u.setflags(write=False)  # strains and stresses are made of it later
+        self._strained = u if u0 is None else u - u0
+
+    # ---- strains and stresses ----------------------------------------------------------------------
+
+    def _field(self, at: str, stress: bool) -> Any:
+        if not isinstance(at, str):
+            raise InputError(
+                f"at says where by a word, one of {', '.join(PLACES)}; values at points are those of "
+                "result.at(points), such as result.at(points).stress"
+            )
+        place = choice(at, "at", PLACES)
+        points, u = self.mesh.points, self._strained
+        if place == "gauss":
+            return in_order(self.groups, [at_gauss(points, g, u, stress=stress) for g in self.groups])
+        if place == "raw":
+            from kratos_lite.assembly.nodal_values import extrapolated
+
+            return in_order(self.groups, [extrapolated(points, g, u, stress=stress) for g in self.groups])
+        if place == "node":
+            return self._recovery.nodal(u, stress=stress)
+        return self._averages(stress)[place == "averaged"]
+
+    def at_located(self, located: Located, *, stress: bool = True, recovered: bool = False) -> Array:
+        """Return stresses, or strains, at points of the mesh.
+
+        Parameters
+        ----------
+        located : points (...) of this mesh.
+        stress : stresses instead of strains.
+        recovered : between those recovered at nodes instead of B u.
+
+        Returns
+        -------
+        (..., 6) in Pa, strains without unit.
+
+        Raises
+        ------
+        InputError
+            An element class has a strain of its own, but no B-operator; or a stress of its own.
+        """
+        from kratos_lite.assembly.point_fields import at_located, recovered_at  # as for the recovery
+
+        if recovered:
+            return recovered_at(self._recovery, located, self._strained, stress=stress)
+        return at_located(self.groups, located, self._strained, stress=stress)
+
+    @cached_property
+    def _recovery(self) -> Recovery:
+        from kratos_lite.assembly.recovery import Recovery  # a quick start for results
+
+        return Recovery(self.mesh, self.groups)
+
+    def _averages(self, stress: bool) -> tuple[Array, Array]:
+        """Return the mean over the volume of each element (m, 6) and averaged nodal values (n, 6)."""
+        from kratos_lite.assembly.nodal_values import averages  # as for the recovery
+
+        m = self.mesh.n_elements
+        return averages(self.mesh.points, self.groups, self._strained, m, stress=stress)
+
+    def strain(self, at: str = "gauss") -> Any:
+        """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
+
+        Parameters
+        ----------
+        at : ``"gauss"`` for Gauss points; ``"element"`` for means over the volume; ``"node"`` for recovered
+            values, the most accurate at nodes; ``"averaged"`` for values extrapolated to the nodes of each
+            element and averaged there; ``"raw"`` for these of each element.
+
+        Returns
+        -------
+        (m, g, 6) at Gauss points, or a list of (g, 6) where elements have different rules; (m, 6) of
+        elements; (n, 6) of nodes; raw (m, k, 6) of k nodes each, or a list of (k, 6) where these differ.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
+        return self._field(at, stress=False)
+
+    def stress(self, at: str = "gauss") -> Any:
+        """Return stresses in Voigt order xx yy zz xy yz zx.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        In Pa, shaped as by `strain`.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+        >>> bar.solve().stress("element")[:, 2].round(9).tolist()
+        [5.0]
+        """
+        if isinstance(at, str) and at == "node":
+            return self._nodal_stress
+        return self._field(at, stress=True)
+
+    @cached_property
+    def _nodal_stress(self) -> Array:
+        return np.asarray(self._field("node", stress=True))
+
+    def stress_of_material(self, row: int) -> Array:
+        """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
+
+        Parameters
+        ----------
+        row : of an element of this material.
+
+        Returns
+        -------
+        (n, 6) in Pa, 0 at nodes that no element of this material has.
+        """
+        stress = np.zeros((self.mesh.n_nodes, 6))
+        for region, values in self._recovery.by_region(self._strained):
+            if any((group.rows == row).any() for group in region.groups):
+                stress[region.nodes] = values
+        return stress
+
+    def _derived(self, function: Callable[[Array], Array], at: str) -> Any:
+        """Return a function of the stresses at a place, of each element where these are a list."""
+        stress = self.stress(at)
+        return [function(s) for s in stress] if isinstance(stress, list) else function(stress)
+
+    def von_mises(self, at: str = "gauss") -> Any:
+        """Return von Mises stresses.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        (m, g), (m,), (n,) or (m, k) in Pa.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
+        return self._derived(voigt.von_mises, at)
+
+    def tresca(self, at: str = "gauss") -> Any:
+        """Return Tresca stresses σ1 - σ3, twice the largest shear stress.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        (m, g), (m,), (n,) or (m, k) in Pa.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
+        return self._derived(voigt.tresca, at)
+
+    def principal_stresses(self, at: str = "gauss") -> Any:
+        """Return principal stresses σ1 ≥ σ2 ≥ σ3.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        (m, g, 3), (m, 3), (n, 3) or (m, k, 3) in Pa.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, -5.0)))
+        >>> (bar.solve().principal_stresses("element").round(9) + 0.0).tolist()
+        [[0.0, 0.0, -5.0]]
+        """
+        return self._derived(voigt.principal_values, at)
+
+    def principal_directions(self, at: str = "gauss") -> Any:
+        """Return unit vectors along the principal axes of the stress.
+
+        They are right-handed; those of equal principal stresses are any that are orthogonal.
+
+        Parameters
+        ----------
+        at : as for `strain`.
+
+        Returns
+        -------
+        (..., 3, 3), rows in the order σ1 ≥ σ2 ≥ σ3.
+
+        Raises
+        ------
+        InputError
+            There is no such place.
+        """
+        return self._derived(voigt.principal_directions, at)
+
+    def at_integration_points(self, name: str, element: int | None = None) -> Any:
+        """Return a quantity at the integration points by its name in Kratos.
+
+        It is what ``CalculateOnIntegrationPoints`` of KinematicLinear or SmallDisplacementElement returns.
+        Strains are small: the Green-Lagrange strain is the linear one, and all stress measures agree.
+
+        Parameters
+        ----------
+        name : one of
+
+            - ``CAUCHY_STRESS_VECTOR``, ``PK2_STRESS_VECTOR``, ``STRESSES`` (6,), ``CAUCHY_STRESS_TENSOR``,
+              ``PK2_STRESS_TENSOR`` (3, 3), ``VON_MISES_STRESS``: Pa, with the prestress;
+            - ``GREEN_LAGRANGE_STRAIN_VECTOR``, ``STRAIN`` (6,), ``GREEN_LAGRANGE_STRAIN_TENSOR`` (3, 3);
+            - ``STRAIN_ENERGY``: ½ ε:C:ε in J/m³;
+            - ``CONSTITUTIVE_MATRIX``: C (6, 6) in Pa;
+            - ``STRAIN_INTERPOLATION_OPERATOR``: B (6, 3k) in 1/m of k nodes;
+            - ``JACOBIAN``, ``JACOBIAN_0``: det J in m³, ``INTEGRATION_WEIGHT``: weight times det J in m³;
+            - ``INTEGRATION_COORDINATES``, ``INTEGRATION_POINT_GLOBAL``: X (3,) in m,
+              ``INTEGRATION_POINT_LOCAL``: ξ (3,), ``DISPLACEMENT``: (3,) in m.
+
+            Vectors have the order xx yy zz xy yz xz of Kratos, strains engineering shear; strain tensors
+            hold half of it.
+        element : id of an element; all elements if not given.
+
+        Returns
+        -------
+        (g, ...) of one element with g points, points in the order of its rule; or (m, g, ...) of all, in the
+        order of the mesh; or a list of (g, ...) where elements have different rules.
+
+        Raises
+        ------
+        InputError
+            There is no such name.
+        MeshError
+            There is no such element, or several have this id.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> bar = kl.Model(kl.box((1, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e6, nu=0.0))
+        >>> bar.fix("z-")
+        >>> bar.add(kl.Traction("z+", (0, 0, 5.0)))
+        >>> result = bar.solve()
+        >>> result.at_integration_points("CAUCHY_STRESS_VECTOR", element=2)[:, 2].round(9).tolist()
+        [5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0]
+        >>> weight = result.at_integration_points("INTEGRATION_WEIGHT")
+        >>> energy = (result.at_integration_points("STRAIN_ENERGY") * weight).sum()
+        >>> bool(abs(energy / result.energy() - 1) < 1e-12)
+        True
+        """
+        from kratos_lite.analysis.integration_point_values import QUANTITIES, GaussPoints  # rarely needed
+
+        quantity = QUANTITIES[choice(name, "a quantity at integration points", QUANTITIES)]
+        groups = self.groups if element is None else [group_of_element(self.mesh, self.groups, element)]
+        made = [quantity(GaussPoints(self.mesh.points, g, self.u, self._strained)) for g in groups]
+        return in_order(groups, made) if element is None else made[0][0]
+
+    # ---- totals --------------------------------------------------------------------------------
+
+    @cached_property
+    def _totals(self) -> tuple[float, float, int]:
+        """Strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
+        return totals(self.mesh.points, self.groups, self._strained)
+
+    def totals(self) -> tuple[float, float, int]:
+        """Return what one pass over the elements gives.
+
+        Returns
+        -------
+        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element.
+        """
+        return self._totals
+
+    def energy(self) -> float:
+        """Return the strain energy ½ ∫ ε:C:ε dV.
+
+        Returns
+        -------
+        In J.
+        """
+        return self._totals[0]

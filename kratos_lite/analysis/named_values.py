@@ -1,0 +1,87 @@
+"""Named values: what a result holds, by the short names with which pictures are asked for."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from kratos_lite import voigt
+from kratos_lite.errors import InputError, nearest
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array
+from kratos_lite.view.figure import Values
+
+NAMES = {
+    "displacement": "displacement",
+    **{f"u{axis}": f"displacement along {axis}" for axis in "xyz"},
+    "reaction": "reaction",
+    "von_mises": "von Mises stress",
+    "tresca": "Tresca stress",
+    **{f"s{i}": f"principal stress {i}" for i in (1, 2, 3)},
+    **{f"s{name.lower()}": f"stress {name.lower()}" for name in voigt.NAMES},
+    **{f"e{i}": f"principal strain {i}" for i in (1, 2, 3)},
+    **{
+        f"e{name.lower()}": f"{'shear ' if name[0] != name[1] else ''}strain {name.lower()}"
+        for name in voigt.NAMES
+    },
+    "error": "estimated error of each element in the energy norm",
+}
+"""What each name means."""
+
+
+@runtime_checkable
+class Fields(Protocol):
+    """What a result offers."""
+
+    mesh: Mesh
+    u: Array
+    reactions: Array
+
+    def stress(self, at: str) -> Any:
+        """Return stresses (n, 6) in Pa."""
+
+    def strain(self, at: str) -> Any:
+        """Return strains (n, 6)."""
+
+    def error(self) -> Any:
+        """Return the estimate of the error."""
+
+
+def named_values(result: Fields, name: str) -> Values:
+    """Return the values of a result by a name of `NAMES`; InputError for another."""
+    if name not in NAMES:
+        known = ", ".join(NAMES)
+        raise InputError(f"there are no values {name!r}; there are {known}.{nearest(name, list(NAMES), 1)}")
+    title = NAMES[name]
+    if name == "error":
+        return Values(result.error().per_element, title, "√J", log=True)
+    if name in ("displacement", "reaction"):
+        vectors = result.u if name == "displacement" else result.reactions
+        return Values(np.linalg.norm(vectors, axis=1), title, "m" if name == "displacement" else "N")
+    if name[0] == "u":
+        return Values(result.u[:, "xyz".index(name[1])], title, "m")
+    if name[0] == "e":
+        return Values(
+            _component(
+                _halved(result.strain("node")) if name[1].isdigit() else result.strain("node"), name[1:]
+            ),
+            title,
+        )
+    return Values(_component(result.stress("node"), name if len(name) > 3 else name[1:]), title, "Pa")
+
+
+def _component(tensor: Array, name: str) -> Array:
+    """Return a component, principal value or equivalent of (n, 6)."""
+    if name == "von_mises":
+        return voigt.von_mises(tensor)
+    if name == "tresca":
+        return voigt.tresca(tensor)
+    if name.isdigit():
+        return voigt.principal_values(tensor)[:, int(name) - 1]
+    return tensor[:, voigt.NAMES.index(name.upper())]
+
+
+def _halved(strain: Array) -> Array:
+    """Return strains with tensor shear in place of engineering shear."""
+    return strain * np.array([1, 1, 1, 0.5, 0.5, 0.5])

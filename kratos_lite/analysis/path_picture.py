@@ -1,0 +1,91 @@
+"""Bodies along their paths: which positions tell most, and energies against time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.analysis.state import State, at
+from kratos_lite.bodies import Body
+from kratos_lite.errors import InputError, ModelError
+from kratos_lite.typing import Array
+from kratos_lite.validation import short, whole_number
+from kratos_lite.view.trajectory import trajectory_figure
+
+SHOWN = 6
+"""Positions in a picture."""
+CANDIDATES = 400
+"""States, evenly spread, among which they are chosen."""
+ALIKE = 0.02
+"""Share of its size that a body moves between positions that are worth drawing."""
+ENERGIES = ("kinetic", "internal", "potential", "sum")
+
+
+def path_figure(body: Body, given: dict[str, Any]) -> Any:
+    """Return the figure of a body along its path, with its energies if there is more than one state."""
+    states = states_of(body, given["states"])
+    shown = whole_number(SHOWN if given["shown"] is None else given["shown"], "shown")
+    rows = np.array([_row(body, state) for state in states])
+    assert body.mesh is not None
+    X, kept = body.mesh.points, [state.q for state in states]
+    positions = [body.position(X, kept[i]) for i in telling(body, kept, shown)]
+    curves = {name: rows[:, i] for i, name in enumerate(ENERGIES, 1) if rows[:, i].any()}
+    return trajectory_figure(
+        body.mesh,
+        positions,
+        rows[:, 5:],
+        rows[:, 0],
+        curves,
+        view=given["view"],
+        title=given["title"] or "",
+        unit="energy in J",
+        size=given["size"] or (8, 8),
+    )
+
+
+def states_of(body: Body, states: Any) -> list[State]:
+    """Return the states of a single body with a mesh in a list, that of now if none are given."""
+    if body.q.ndim > 1:
+        raise ModelError("only a single body can be drawn, not a batch of bodies")
+    if body.mesh is None:
+        raise ModelError("this body has no mesh to be drawn")
+    if states is None or isinstance(states, State):
+        return [State.of(body) if states is None else states]
+    if not isinstance(states, Iterable):
+        raise InputError(f"states in the order of time are needed; got {short(states)}")
+    found = list(states)
+    if not found:
+        raise InputError("there is no state to draw")
+    return found
+
+
+def _row(body: Body, state: State) -> Array:
+    """Return time, energies and mass center (8,)."""
+    with at(body, state):
+        energies = [
+            float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
+        ]
+        return np.concatenate([[state.time, *energies, sum(energies)], body.mass_center()])
+
+
+def telling(body: Body, kept: list[Array], shown: int) -> list[int]:
+    """Return the states to draw: first and last, then again and again the one farthest from those chosen."""
+    assert body.mesh is not None
+    X = body.mesh.points
+    corners = np.unique([np.argmax(X @ side) for side in product((-1, 1), repeat=3)])
+    rows = np.unique(np.linspace(0, len(kept) - 1, CANDIDATES).round().astype(int))
+    places = np.array([body.position(X, kept[row])[corners] for row in rows])
+
+    def away(i: int) -> Array:
+        return np.asarray(((places - places[i]) ** 2).sum(axis=(1, 2)))
+
+    chosen = [len(rows) - 1, 0][: max(shown, 1)]
+    distance = np.min([away(i) for i in chosen], axis=0)
+    alike = (ALIKE * np.ptp(X, axis=0).max()) ** 2 * len(corners)
+    while len(chosen) < shown and distance.max() > alike:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, away(chosen[-1]))
+    return sorted({int(rows[i]) for i in chosen})

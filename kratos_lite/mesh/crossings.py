@@ -1,0 +1,60 @@
+"""Crossings: where a straight line passes from one element to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.mesh.blocks import NO_ROWS, select, with_rows
+from kratos_lite.mesh.boxes import cell_boxes, is_solid
+from kratos_lite.mesh.cells import Cells
+from kratos_lite.mesh.locate import locate
+from kratos_lite.typing import Array, Ints
+
+SHORT = 1e-10
+"""Share of the line that a crossing is known to; points are located no closer."""
+
+
+def crossings(mesh: Cells, a: Array, b: Array) -> Array:
+    """Return where on the line from a to b elements begin and end: 0 = t_0 < t_1 < … < t_k = 1.
+
+    Between two of them the line lies in one element, if no face curves out of it and back.
+
+    Raises
+    ------
+    MeshError
+        A part of the line lies outside the mesh.
+
+    Examples
+    --------
+    >>> from kratos_lite import box
+    >>> crossings(box(cells=(4, 1, 1)), np.array([0, 0.5, 0.5]), np.array([1.0, 0.5, 0.5])).round(8).tolist()
+    [0.0, 0.25, 0.5, 0.75, 1.0]
+    """
+    near = Cells(mesh.points, select(mesh.blocks, _near(mesh, a, b)), mesh.node_ids, mesh.source)
+
+    def element(t: Array) -> Ints:
+        return locate(near if len(near.blocks) else mesh, a + t[:, None] * (b - a)).require().rows
+
+    t = np.linspace(0, 1, 2 * near.n_elements + 2)
+    rows = element(t)
+    while len(gaps := np.flatnonzero((np.diff(rows) != 0) & (np.diff(t) > SHORT))):
+        middle = (t[gaps] + t[gaps + 1]) / 2
+        rows = np.insert(rows, gaps + 1, element(middle))
+        t = np.insert(t, gaps + 1, middle)
+    changes = np.flatnonzero(np.diff(rows))
+    return np.concatenate([[0.0], (t[changes] + t[changes + 1]) / 2, [1.0]])
+
+
+def _near(mesh: Cells, a: Array, b: Array) -> Ints:
+    """Return the rows of the elements whose boxes, as spheres, reach the line."""
+    length = np.linalg.norm(b - a)
+    found = [NO_ROWS]
+    for block, at in with_rows(mesh.blocks):
+        if not is_solid(block):
+            continue
+        low, high = cell_boxes(mesh.points, block)
+        middle, radius = (low + high) / 2 - a, np.linalg.norm(high - low, axis=1) / 2
+        along = np.clip(middle @ (b - a) / length, 0, length)
+        apart = np.linalg.norm(middle - along[:, None] * (b - a) / length, axis=1)
+        found.append(at.start + np.flatnonzero(apart <= radius))
+    return np.concatenate(found)

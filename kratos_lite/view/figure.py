@@ -1,0 +1,287 @@
+"""Figures of bodies: one or several side by side, with one camera and one scale of colors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.records import record
+from kratos_lite.typing import Array
+from kratos_lite.view import canvas
+from kratos_lite.view.camera import View, box_corners, rows_of, window_of
+from kratos_lite.view.facets import colored, draw_facets, facets_of, outline
+from kratos_lite.view.plane import Plane, plane_of
+from kratos_lite.view.rulers import draw_rulers, draw_triad, rounded
+
+DECADES = 4
+"""Powers of ten that a logarithmic scale of colors shows."""
+WIDE = 2.2
+"""Width over height of a picture from which its color bar lies beneath."""
+LINE = 0.2
+"""Height of a line of a title, in inches."""
+
+
+@record(frozen=True, eq=False)
+class Values:
+    """Numbers that color a body.
+
+    Attributes
+    ----------
+    numbers : (n,) of nodes or (m,) of elements.
+    title : what they are.
+    unit : at the color bar.
+    log : whether their powers of ten matter.
+    """
+
+    numbers: Array
+    title: str = ""
+    unit: str = ""
+    log: bool = False
+
+
+@record(frozen=True, eq=False)
+class Subject:
+    """What is drawn of a body.
+
+    Attributes
+    ----------
+    mesh : the undeformed body.
+    u : (n, 3) m, displacement; None of what has none.
+    values : what colors it.
+    title : above the picture.
+    """
+
+    mesh: Mesh
+    u: Array | None = None
+    values: Values | None = None
+    title: str = ""
+
+
+@record(eq=False)
+class Options:
+    """How it is drawn; see `kratos_lite.plot`."""
+
+    view: View | None = None
+    clim: tuple[float, float] | None = None
+    scale: float | None = None
+    zoom: Any = None
+    clip: Any = None
+    size: tuple[float, float] = (8, 6)
+    title: str = ""
+
+
+@record(eq=False)
+class Scene:
+    """Subjects with what they share.
+
+    Attributes
+    ----------
+    subjects : side by side.
+    rows : of the camera.
+    scale : factor on displacements.
+    window : lower left and upper right of what is shown, in m in the picture.
+    colors : scale of colors, or None.
+    plane : that cuts the bodies, or None.
+    """
+
+    subjects: Sequence[Subject]
+    rows: Array
+    scale: float
+    window: tuple[Array, Array]
+    colors: Any
+    plane: Plane | None
+    zoomed: bool
+
+    def place(self, subject: Subject) -> Array:
+        """Return where the nodes of a subject are drawn, (n, 3) m."""
+        return subject.mesh.points if subject.u is None else subject.mesh.points + self.scale * subject.u
+
+
+def figure_of(subjects: Sequence[Subject], options: Options) -> Any:
+    """Return the figure of some subjects, side by side."""
+    scene = scene_of(subjects, options)
+    figure, panels = compose(scene, options)
+    for axes, subject in zip(panels, subjects, strict=True):
+        draw_body(axes, scene, subject)
+    return figure
+
+
+def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
+    """Return subjects with one camera, one factor on displacements, one window and one scale of colors."""
+    for subject in subjects:
+        if not subject.mesh.boundary:
+            raise InputError("there is nothing to draw: the mesh has no element of a known shape")
+    points = np.concatenate([subject.mesh.points for subject in subjects])
+    rows = rows_of(options.view, points)
+    plane = plane_of(options.clip, rows[2])
+    scale = factor_of(subjects, options.scale)
+    scene = Scene(
+        subjects,
+        rows,
+        scale,
+        window_of(points[:, :2]),
+        colors_of(subjects, options.clim),
+        plane,
+        options.zoom is not None,
+    )
+    scene.window = window_of(np.concatenate([_drawn(scene, subject) for subject in subjects]))
+    if options.zoom is not None:
+        scene.window = _zoomed(scene, options.zoom)
+    if plane is not None and not any((plane.distance(s.mesh.points) < 0).any() for s in subjects):
+        d = plane.distance(points)
+        raise InputError(
+            f"clip leaves nothing to draw: along its normal the body spans {d.min() + plane.offset:g} … "
+            f"{d.max() + plane.offset:g} m"
+        )
+    return scene
+
+
+def _drawn(scene: Scene, subject: Subject) -> Array:
+    """Return the nodes of a subject in the picture, (k, 2), deformed and not."""
+    points = [subject.mesh.points, scene.place(subject)]
+    return np.concatenate(points) @ scene.rows[:2].T
+
+
+def factor_of(subjects: Sequence[Subject], wanted: float | None) -> float:
+    """Return the factor on displacements: by default at least 1, the largest being a tenth of the body."""
+    if wanted is not None:
+        return wanted
+    return min(
+        (exaggeration(s.mesh.points, s.u) for s in subjects if s.u is not None and s.u.any()), default=1.0
+    )
+
+
+def exaggeration(X: Array, u: Array) -> float:
+    """Return 1, 2 or 5 times a power of ten, at least 1, that makes the displacement a tenth of the body."""
+    wanted = 0.1 * np.linalg.norm(np.ptp(X, axis=0)) / np.linalg.norm(u, axis=1).max()
+    return max(1.0, rounded(float(wanted)))
+
+
+def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> Any:
+    """Return the scale of colors of all subjects, or None."""
+    values = [subject.values for subject in subjects if subject.values is not None]
+    if not values:
+        return None
+    log = all(v.log for v in values)
+    if clim is None:
+        numbers = np.concatenate([v.numbers for v in values])
+        low, high = float(numbers.min()), float(numbers.max())
+        if log:
+            low = max(low, high * 10.0**-DECADES)
+            log = high > 0
+    else:
+        low, high = clim
+        log = log and low > 0
+    return canvas.color_scale(low, high, log=log)
+
+
+def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
+    """Return the window around the middle for a factor, or that of a part or a box."""
+    low, high = scene.window
+    if isinstance(zoom, (float, int)):
+        middle, half = (low + high) / 2, (high - low) / 2 / zoom
+        return middle - half, middle + half
+    found = []
+    for subject in scene.subjects:
+        if isinstance(zoom, str):
+            chosen = scene.place(subject)[subject.mesh.nodes(zoom)]
+        else:
+            chosen = box_corners(*np.asarray(zoom, dtype=float))
+        found.append(chosen @ scene.rows[:2].T)
+    low, high = window_of(np.concatenate(found))
+    margin = 0.05 * (high - low).max()
+    return low - margin, high + margin
+
+
+# ---- layout ----------------------------------------------------------------------------------------
+
+
+def compose(scene: Scene, options: Options) -> tuple[Any, list[Any]]:
+    """Return the figure with its axes, titles, rulers and color bar, all but the bodies, and the axes.
+
+    Texts keep their size, so that what they leave for the body is found by laying it out twice.
+    """
+    low, high = scene.window
+    extent = high - low
+    columns = _columns(len(scene.subjects), extent, options.size)
+    lines = -(-len(scene.subjects) // columns)
+    counts, inside = np.array([columns, lines]), np.array(options.size, dtype=float)
+    for _ in range(2):
+        per_metre = float((np.maximum(inside, 0.2 * np.array(options.size)) / (extent * counts)).min())
+        figure, panels = _laid_out(scene, options, columns, 1 / per_metre)
+        inside = np.array(options.size) - (figure.get_size_inches() - per_metre * extent * counts)
+    return figure, panels
+
+
+def _columns(count: int, extent: Array, size: tuple[float, float]) -> int:
+    """Return the number of columns in which so many panels become largest."""
+
+    def scale(columns: int) -> float:
+        lines = -(-count // columns)
+        return min((size[0] - 1) / columns / extent[0], (size[1] - 0.6 * lines) / lines / extent[1])
+
+    return max(range(1, count + 1), key=scale)
+
+
+def _laid_out(scene: Scene, options: Options, columns: int, inch: float) -> tuple[Any, list[Any]]:
+    """Return figure and axes; `inch` is that many m in the picture."""
+    low, high = scene.window
+    size = (high - low) / inch
+    figure = canvas.empty((20, 20), layout=None)
+    panels: list[Any] = []
+    step = np.array([size[0] + 0.5, size[1] + 0.5])
+    for number, subject in enumerate(scene.subjects):
+        line, column = divmod(number, columns)
+        axes = canvas.without_frame(canvas.axes_in_inches(figure, (column * step[0], -line * step[1]), size))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_title(subject.title, fontsize=11, pad=8)
+        if scene.zoomed:
+            draw_triad(axes, scene.rows, scene.window)
+        elif not number:
+            draw_rulers(axes, scene.rows, subject.mesh.points, _drawn(scene, subject), inch)
+        panels.append(axes)
+    if scene.colors is not None:
+        values = next(s.values for s in scene.subjects if s.values is not None)
+        _place_bar(figure, scene.colors, values.unit)
+    _place_title(figure, options.title)
+    canvas.fit(figure)
+    return figure, panels
+
+
+def _place_bar(figure: Any, colors: Any, unit: str) -> None:
+    """Draw the color bar right of what is there, or beneath if that is wide."""
+    (x0, y0), (x1, y1) = canvas.bounds(figure)
+    upright = x1 - x0 < WIDE * (y1 - y0)
+    if upright:
+        length = min(max(0.7 * (y1 - y0), 1.8), 4.0)
+        place, size = (x1 + 0.2, (y0 + y1 - length) / 2), (0.14, length)
+    else:
+        length = min(max(0.5 * (x1 - x0), 2.0), 4.0)
+        place, size = ((x0 + x1 - length) / 2, y0 - 0.35), (length, 0.14)
+    canvas.color_bar(canvas.axes_in_inches(figure, place, size), colors, unit, upright=upright)
+
+
+def _place_title(figure: Any, title: str) -> None:
+    """Write the title above what is there."""
+    if title:
+        (x0, _), (x1, y1) = canvas.bounds(figure)
+        canvas.text_in_inches(figure, ((x0 + x1) / 2, y1 + 0.12), title)
+
+
+def draw_body(axes: Any, scene: Scene, subject: Subject) -> list[Any]:
+    """Draw one subject; return what was drawn."""
+    drawn = []
+    if (subject.u is not None and subject.u.any()) or scene.plane is not None:
+        ends = outline(subject.mesh)
+        drawn.append(canvas.lines(axes, ends @ scene.rows[:2].T))
+    values = None if subject.values is None else subject.values.numbers
+    facets = facets_of(subject.mesh, scene.place(subject), values, scene.rows, scene.plane)
+    colors = colored(facets, None if values is None else scene.colors)
+    drawn.append(draw_facets(axes, scene.rows, facets, colors))
+    for artist in drawn:
+        artist.set_clip_on(scene.zoomed)
+    return drawn

@@ -1,0 +1,210 @@
+"""Planes that cut a body open: clipped facets and edges, and the section through the cells."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Block
+from kratos_lite.records import record
+from kratos_lite.registry import remembered
+from kratos_lite.shapes.hexahedra import Hexahedron8
+from kratos_lite.typing import Array, Ints
+from kratos_lite.validation import finite, number, short
+
+COLLAPSED = {
+    "hexahedron": (0, 1, 2, 3, 4, 5, 6, 7),
+    "wedge": (0, 1, 2, 2, 3, 4, 5, 5),
+    "pyramid": (0, 1, 2, 3, 4, 4, 4, 4),
+    "tetrahedron": (0, 1, 2, 2, 3, 3, 3, 3),
+}
+"""Corners of each cell that the corners of a cube are moved to, so that one lattice serves all cells."""
+POLYGONS = 6000
+"""Cells of lattices to aim at in a section."""
+FINEST = 8
+
+
+@record(frozen=True, eq=False)
+class Plane:
+    """The plane n·X = offset of the undeformed body; what has n·X > offset is taken away.
+
+    Attributes
+    ----------
+    normal : (3,) unit vector.
+    offset : m.
+    """
+
+    normal: Array
+    offset: float
+
+    def distance(self, X: Array) -> Array:
+        """Return how far points (n, 3) lie beyond the plane, (n,) m."""
+        return X @ self.normal - self.offset
+
+
+def plane_of(clip: Any, towards: Array) -> Plane | None:
+    """Return the plane of ("x", 0.5) or (normal, offset) that opens the body to a viewer in a direction."""
+    if clip is None:
+        return None
+    if isinstance(clip, (str, float, int)) or not hasattr(clip, "__len__") or len(clip) != 2:
+        raise InputError(
+            "clip is a plane, such as ('x', 0.5) or ((1, 1, 0), 0.5), a normal and an offset in m; "
+            f"got {short(clip)}"
+        )
+    axis, offset = clip
+    if isinstance(axis, str):
+        if axis not in ("x", "y", "z"):
+            raise InputError(f"clip: an axis is x, y or z; got {axis!r}")
+        normal = np.eye(3)["xyz".index(axis)]
+    else:
+        normal = finite(axis, "the normal of clip", (3,))
+    length = float(np.linalg.norm(normal))
+    if length == 0:
+        raise InputError("the normal of clip must not be zero")
+    sign = -1.0 if normal @ towards < -1e-9 * length else 1.0
+    return Plane(sign * normal / length, sign * number(offset, "the offset of clip", unit="m") / length)
+
+
+def clip_facets(P: Array, d: Array) -> tuple[Array, Ints]:
+    """Return the parts of facets (m, 4, 3) with d ≤ 0, d (m, 4) linear, and the facet of each part."""
+    inside = d <= 0
+    whole, mixed = (
+        np.flatnonzero(inside.all(axis=1)),
+        np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1)),
+    )
+    # Triangles of the mixed ones; the corner that is alone on its side goes first.
+    two = [mixed[:, None], mixed[:, None]], [np.array([[0, 1, 2]]), np.array([[0, 2, 3]])]
+    T, e = (
+        np.concatenate([array[row, column] for row, column in zip(*two, strict=True)]) for array in (P, d)
+    )
+    owner = np.concatenate([mixed, mixed])
+    inner = e <= 0
+    count = inner.sum(axis=1)
+    parts, owners = [P[whole], _as_quads(T[count == 3])], [whole, owner[count == 3]]
+    for number_inside in (1, 2):
+        at = count == number_inside
+        alone = (inner[at] if number_inside == 1 else ~inner[at]).argmax(axis=1)
+        turn = (alone[:, None] + np.arange(3)) % 3
+        t, f = np.take_along_axis(T[at], turn[..., None], axis=1), np.take_along_axis(e[at], turn, axis=1)
+        p, q = (_between(t[:, 0], t[:, k], f[:, 0], f[:, k]) for k in (1, 2))
+        corners = [t[:, 0], p, q, q] if number_inside == 1 else [p, t[:, 1], t[:, 2], q]
+        parts.append(np.stack(corners, axis=1))
+        owners.append(owner[at])
+    return np.concatenate(parts), np.concatenate(owners)
+
+
+def _as_quads(T: Array) -> Array:
+    return T[:, [0, 1, 2, 2]]
+
+
+def _between(a: Array, b: Array, d: Array, e: Array) -> Array:
+    """Return where d, linear from a to b, is 0."""
+    change = d - e
+    t = np.where(change == 0, 0.5, d / np.where(change == 0, 1.0, change))
+    return a + t[:, None] * (b - a)
+
+
+def clip_lines(E: Array, d: Array) -> Array:
+    """Return the parts of segments (m, 2, 3) with d ≤ 0, d (m, 2) linear."""
+    inside = d <= 0
+    cut = inside[:, 0] != inside[:, 1]
+    ends, e = E[cut], d[cut]
+    at = _between(ends[:, 0], ends[:, 1], e[:, 0], e[:, 1])
+    kept = np.where(inside[cut][:, :1], ends[:, 0], ends[:, 1])
+    return np.concatenate([E[inside.all(axis=1)], np.stack([kept, at], axis=1)])
+
+
+# ---- sections --------------------------------------------------------------------------------------
+
+
+@remembered
+def _lattice(n: int) -> tuple[Array, Ints, Ints]:
+    """Return points of the cube -1 … 1, the tetrahedra of n³ cubes, and the triangles on its sides."""
+    steps = np.linspace(-1, 1, n + 1)
+    points = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    stride = np.array([(n + 1) ** 2, n + 1, 1])
+    first = np.array([i @ stride for i in product(range(n), repeat=3)])
+    paths = [np.cumsum([0, *(stride[k] for k in order)]) for order in permutations(range(3))]
+    tetrahedra = np.concatenate([first[:, None] + path for path in paths])
+    faces = np.concatenate([np.delete(tetrahedra, k, axis=1) for k in range(4)])
+    place = points[faces]
+    side = ((place == place[:, :1]).all(axis=1) & (np.abs(place[:, 0]) == 1)).any(axis=1)
+    return points, tetrahedra, faces[side]
+
+
+def cut_cells(block: Block, distance: Array, x: Array, values: Array) -> tuple[Ints, Array, Array, Array]:
+    """Return the section through the cells of a block where the distance of its nodes is 0.
+
+    Parameters
+    ----------
+    block : cells with a shape of three dimensions.
+    distance : (n,) m, of nodes from the plane, in the undeformed body.
+    x : (n, 3) m, where the nodes are.
+    values : (n,) of nodes.
+
+    Returns
+    -------
+    cells : (p,) the cell of each polygon.
+    corners : (p, 4, 3) m.
+    values : (p,).
+    edges : (k, 2, 3) m, of the cells in the section.
+    """
+    assert block.shape is not None
+    shape, d = block.shape, distance[block.nodes]
+    # A curved cell reaches beyond its nodes by less than its size.
+    reach = 0.25 * np.ptp(d, axis=1) if len(shape.nodes) > shape.corners else 0.0
+    crossed = np.flatnonzero((d.min(axis=1) - reach <= 0) & (d.max(axis=1) + reach > 0))
+    nodes = block.nodes[crossed]
+    points, tetrahedra, sides = _lattice(int(np.clip(np.sqrt(POLYGONS / max(len(crossed), 1)), 1, FINEST)))
+    xi = Hexahedron8.N(points) @ shape.nodes[list(COLLAPSED[shape.cell])]
+    N = shape.N(xi)
+    d = d[crossed] @ N.T
+    field = np.concatenate([np.einsum("pa,mad->mpd", N, x[nodes]), (values[nodes] @ N.T)[..., None]], axis=-1)
+    cells, corners = _sections(d, field, tetrahedra)
+    edges = _traces(d, field[..., :3], sides)
+    return crossed[cells], corners[..., :3], corners[..., 3].mean(axis=1), edges
+
+
+def _crossing(d: Array, simplices: Ints) -> tuple[Ints, Ints, Array]:
+    """Return of simplices that d = 0 crosses: cell, points, those inside first, and how many these are."""
+    e = d[:, simplices]
+    inside = e <= 0
+    cell, which = np.nonzero(inside.any(axis=2) & ~inside.all(axis=2))
+    inside = inside[cell, which]
+    order = np.argsort(~inside, axis=1, kind="stable")
+    return cell, np.take_along_axis(simplices[which], order, axis=1), inside.sum(axis=1)
+
+
+def _sections(d: Array, field: Array, tetrahedra: Ints) -> tuple[Ints, Array]:
+    """Return cells and corners (p, 4, *) of the polygons in which d = 0 cuts tetrahedra."""
+    cell, point, count = _crossing(d, tetrahedra)
+    pairs = {
+        1: [(0, 1), (0, 2), (0, 3), (0, 3)],
+        2: [(0, 2), (0, 3), (1, 3), (1, 2)],
+        3: [(0, 3), (1, 3), (2, 3), (2, 3)],
+    }
+    cells, corners = [cell[:0]], [np.zeros((0, 4, field.shape[-1]))]
+    for inside, ends in pairs.items():
+        at = count == inside
+        cells.append(cell[at])
+        corners.append(np.stack([_on_edge(d, field, cell[at], point[at], *end) for end in ends], axis=1))
+    return np.concatenate(cells), np.concatenate(corners)
+
+
+def _traces(d: Array, place: Array, triangles: Ints) -> Array:
+    """Return the segments (k, 2, 3) in which d = 0 cuts triangles."""
+    cell, point, count = _crossing(d, triangles)
+    found = [np.zeros((0, 2, 3))]
+    for inside, ends in {1: [(0, 1), (0, 2)], 2: [(0, 2), (1, 2)]}.items():
+        at = count == inside
+        found.append(np.stack([_on_edge(d, place, cell[at], point[at], *end) for end in ends], axis=1))
+    segments = np.concatenate(found)
+    return segments[np.abs(segments[:, 0] - segments[:, 1]).max(axis=1, initial=0.0) > 0]
+
+
+def _on_edge(d: Array, field: Array, cell: Ints, point: Ints, i: int, j: int) -> Array:
+    a, b = point[:, i], point[:, j]
+    return _between(field[cell, a], field[cell, b], d[cell, a], d[cell, b])

@@ -1,0 +1,118 @@
+"""Rulers: the extent of a body along x, y and z beside it; or three axes and their length."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.typing import Array
+from kratos_lite.view.camera import box_corners
+
+GAP = 0.1
+"""Inches between the body and a ruler, and between a ruler and its text."""
+INK, TEXT = "0.35", "0.25"
+SHORTEST = 0.15
+"""Share of its length that an axis must have in the picture for a ruler."""
+
+
+def draw_rulers(axes: Any, rows: Array, X: Array, drawn: Array, inch: float) -> None:
+    """Draw the extent of the body along x, y and z at its outer edges, below and left if possible.
+
+    Parameters
+    ----------
+    axes : in which a metre is a metre.
+    rows : of the camera.
+    X : (n, 3) m, nodes of the undeformed body.
+    drawn : (k, 2) m in the picture: all that the rulers must keep clear of.
+    inch : metres of an inch in the picture.
+    """
+    low, high = X.min(axis=0), X.max(axis=0)
+    corners, texts = box_corners(low, high), []
+    factor, unit = _unit(float((high - low).max()))
+    for i in range(3):
+        along = rows[:2, i]
+        if np.linalg.norm(along) < SHORTEST:
+            continue
+        side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        side *= 1.0 if 2 * side[1] + side[0] < 0 else -1.0
+        starts = corners[np.abs(corners[:, i] - low[i]) <= 0]
+        start = starts[(starts @ rows[:2].T @ side).argmax()]
+        end = start.copy()
+        end[i] = high[i]
+        line = np.array([start, end]) @ rows[:2].T
+        beyond = max(0.0, float(((drawn - line[0]) @ side).max()))
+        line += (beyond + GAP * inch) * side
+        axes.plot(*line.T, color=INK, lw=0.8, marker=".", ms=4, clip_on=False)
+        text = f"{'xyz'[i]}  {extent(low[i] * factor, high[i] * factor)} {unit}"
+        texts.append((_label(axes, line.mean(axis=0) + GAP * inch * side, side, text), side))
+    _separate(axes, texts, inch)
+
+
+def _unit(size: float) -> tuple[float, str]:
+    """Return the factor from m, and the unit, for a body of a size."""
+    for least, factor, unit in ((1e4, 1e-3, "km"), (1e-2, 1.0, "m"), (1e-5, 1e3, "mm"), (1e-8, 1e6, "µm")):
+        if size >= least:
+            return factor, unit
+    return 1.0, "m"
+
+
+def extent(low: float, high: float) -> str:
+    """Return an interval to four digits of its length: no rounding shows.
+
+    >>> extent(-1.2e-17, 0.5), extent(1000.0, 1000.25)
+    ('0 … 0.5', '1000 … 1000.25')
+    """
+    size = high - low
+    digits = 3 - int(np.floor(np.log10(size))) if size > 0 else 6
+    return " … ".join(f"{round(float(end), digits) + 0.0:.12g}" for end in (low, high))
+
+
+def _label(axes: Any, place: Array, side: Array, text: str) -> Any:
+    ha = "right" if side[0] < -0.1 else "left" if side[0] > 0.1 else "center"
+    va = "top" if side[1] < -0.1 else "bottom" if side[1] > 0.1 else "center"
+    return axes.text(*place, text, ha=ha, va=va, size=9, color=TEXT)
+
+
+def _separate(axes: Any, texts: list[tuple[Any, Array]], inch: float) -> None:
+    """Move texts outwards until none lies on another."""
+    renderer = axes.figure.canvas.get_renderer()
+    placed: list[Any] = []
+    for text, side in texts:
+        for _ in range(40):
+            box = text.get_window_extent(renderer).padded(4)
+            if not any(box.overlaps(other) for other in placed):
+                break
+            text.set_position(np.array(text.get_position()) + 0.05 * inch * side)
+        placed.append(box)
+
+
+def draw_triad(axes: Any, rows: Array, drawn: tuple[Array, Array]) -> None:
+    """Draw the three axes, of one length that is written to them, at the lower left of a window."""
+    low, high = drawn
+    longest = float((high - low).max())
+    length = rounded(0.16 * longest)
+    start = low + 0.1 * length
+    for along in rows[:2].T:
+        if np.linalg.norm(along) < SHORTEST:
+            continue
+        start = np.maximum(start, low + length * np.maximum(-along, 0) * 1.3)
+    for name, along in zip("xyz", rows[:2].T, strict=True):
+        if np.linalg.norm(along) >= SHORTEST:
+            axes.plot(*np.array([start, start + length * along]).T, color=INK, lw=1.0, zorder=5)
+            axes.text(
+                *(start + 1.2 * length * along), name, ha="center", va="center", size=9, color=TEXT, zorder=5
+            )
+    factor, unit = _unit(length)
+    below = start - (0, length * max(0.25, 0.25 - float(rows[1].min())))
+    axes.text(*below, f"{length * factor:g} {unit}", ha="center", va="top", size=9, color=TEXT, zorder=5)
+
+
+def rounded(length: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a length.
+
+    >>> rounded(0.3), rounded(5.0)
+    (0.2, 5.0)
+    """
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= length * (1 + 1e-9)))

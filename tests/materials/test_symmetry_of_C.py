@@ -1,0 +1,42 @@
+"""C must be symmetric, but for the rounding of its own computation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from kratos_lite import LinearMaterial, MaterialError
+from kratos_lite.materials import MATERIALS
+
+
+def law(C):
+    """Return a material with this C; it is not registered."""
+
+    @dataclass(frozen=True)
+    class Given3D(LinearMaterial):
+        density: float = 0.0
+
+        def elasticity(self):
+            return C
+
+    return Given3D()
+
+
+@pytest.fixture(autouse=True)
+def _registry(monkeypatch):
+    monkeypatch.setattr(MATERIALS, "add", lambda *args: None)
+
+
+def test_round_off_in_place_of_zeros_is_symmetric_enough():
+    C = np.diag([3.0, 3.0, 3.0, 1.0, 1.0, 1.0]) * 1e11
+    C[:3, :3] += 1e11
+    C[0, 3], C[3, 0] = 3e-6, -2e-6  # Pa: as products of rotations leave it
+    assert law(C).C is not None
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 1), (2, 5), (3, 4)])
+def test_more_than_round_off_is_refused(row, column):
+    C = np.diag([3.0, 3.0, 3.0, 1.0, 1.0, 1.0]) * 1e11
+    C[row, column] = 1e4
+    with pytest.raises(MaterialError, match="not symmetric"):
+        law(C)
