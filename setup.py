@@ -20,7 +20,7 @@ LONGEST = ("multigrid", "gauss", "stiffness")
 """What takes longest to compile comes first, so that no processor waits for it at the end."""
 # -fwrapv keeps operands of multiply-adds in registers: stiffness takes a fifth less time.
 # -g0 because Python's own flags may ask for debug symbols, which double the time to compile.
-GCC = ["-std=c++17", "-O3", "-g0", "-fvisibility=hidden", "-fwrapv", "-pthread", "-fno-math-errno", "-Wall", "-Wextra"]
+GCC = ["-std=c++17", "-O3", "-g0", "-fwrapv", "-pthread", "-fno-math-errno", "-fvisibility=hidden"]
 CLANG_CL = ["/std:c++17", "/EHsc", "/DNOMINMAX", "/clang:-O3", "/clang:-fwrapv", "/clang:-fno-math-errno"]
 WISHES = ("", "compiled", "pure")
 
@@ -41,7 +41,7 @@ class Build(build_ext):
             self.compiler.initialize()
             self.compiler.cc = shutil.which("clang-cl") or self.compiler.cc
         for extension in self.extensions:
-            extension.extra_compile_args = CLANG_CL if windows else GCC
+            extension.extra_compile_args = CLANG_CL if windows else [*GCC, "-Wall", "-Wextra"]
             extension.extra_link_args = [] if windows else ["-pthread"]
         super().build_extensions()
 

@@ -88,7 +88,8 @@ def _cure() -> str:
     elsewhere = [Path(folder) for folder in sys.path if folder and Path(folder).resolve() != here.resolve()]
     found = [folder for folder in elsewhere if any((folder / "kratos_lite" / "native").glob("_gauss.*"))]
     installed = f"run elsewhere to use what is installed in {found[0]}, or " if found else ""
-    return f". This is the source tree of kratos_lite in {here}: {installed}build them here by pip install -e ."
+    tree = f"This is the source tree of kratos_lite in {here}"
+    return f". {tree}: {installed}build them here by pip install -e ."
 
 
 def threads() -> int:

@@ -130,7 +130,8 @@ def test_a_missing_kernel_is_said_once():
 def test_a_source_tree_without_kernels_names_the_cure(tmp_path, installed):
     tree, site = tmp_path / "tree", tmp_path / "site"
     package = Path(native.__file__).parents[1]
-    shutil.copytree(package, tree / "kratos_lite", ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__"))
+    ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__")
+    shutil.copytree(package, tree / "kratos_lite", ignore=ignored)
     (tree / "setup.py").touch()
     (site / "kratos_lite" / "native").mkdir(parents=True)
     if installed:
