@@ -67,8 +67,8 @@ html_theme_options = {
 }
 html_copy_source = False
 html_show_sourcelink = False
-templates_path = []
-mathjax_path = "tex-svg.js"
+html_context = {"default_mode": "auto"}
+mathjax_path = "tex-svg-full.js"
 _mathjax = next(file for file in files("sphinx-mathjax-offline") or [] if file.name == mathjax_path)
 html_static_path = ["_static", str(_mathjax.locate())]
 html_css_files = ["site.css"]

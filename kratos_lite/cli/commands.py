@@ -31,9 +31,12 @@ def solve(options: Namespace) -> int:
 
 
 def _within_numbers(action: Callable[..., int], options: Namespace, *more: Any) -> int:
-    """Do something; an overflow, or what is no number, becomes an error in words."""
+    """Do something with an input; an overflow, or what is no number, becomes an error in words."""
     import numpy as np
 
+    from kratos_lite.io.formats import input_file
+
+    options.input = str(input_file(options.input))
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
             return action(options, *more)

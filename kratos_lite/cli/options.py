@@ -15,11 +15,14 @@ EXIT_CODES = """exit codes:
   2    bad input, or an output that cannot be written
   3    solved, but an expected value of the run file, or the error asked for, is missed
   130  interrupted with Ctrl-C; 143 by SIGTERM"""
-MODEL = ".mdpa, any file of an .elem set or its stem, ProjectParameters.json, or any mesh that meshio reads"
+MODEL = (
+    ".mdpa, any file of an .elem set or its stem, ProjectParameters.json or its folder, or any mesh that "
+    "meshio reads"
+)
 BODY = "a .json file with a body, or a .py script with body, dt and steps"
 EXAMPLES = {
     "solve": """kratos-lite solve cube.mdpa -o cube.vtu
-  kratos-lite solve ProjectParameters.json --json result.json
+  kratos-lite solve examples/cantilever --json result.json
   kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
   kratos-lite solve bridge.mdpa --modes 10
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
@@ -149,8 +152,8 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         default=[],
-        help="static: .vtu for ParaView, .vtk or .json; in time: .pvd for ParaView, .csv or .npz; may be "
-        "given several times",
+        help="static: .vtu for ParaView, .html for the browser, .vtk or .json; in time: .pvd for ParaView, "
+        ".html, .csv or .npz; may be given several times",
     )
     _add_options(
         out,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
-from kratos_lite.io.formats import ending, read_document, write_document
+from kratos_lite.io.formats import ending, input_file, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.validation import path_of
 
@@ -25,8 +25,8 @@ def read(
 
     Parameters
     ----------
-    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, or
-        any format of meshio.
+    path : .mdpa or any file of an .elem set or its stem (both also gzipped), a .json run file, a folder
+        with a ``ProjectParameters.json``, or any format of meshio.
     materials : take the materials from the file; False leaves them to the caller (but for run files).
     strict : refuse `.mdpa` rows that do not stand on lines of their own (but in run files).
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress,
@@ -59,8 +59,8 @@ def read_case(
 
     Parameters
     ----------
-    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; or a Python
-        script that defines `body`, `dt` and `steps`.
+    path : a model file, as for `read`; a .json file with a model, with a body, or of Kratos; a folder with
+        a ``ProjectParameters.json``; or a Python script that defines `body`, `dt` and `steps`.
     materials : take the materials from a model file; False leaves them to the caller.
     strict : refuse `.mdpa` rows that do not stand on lines of their own.
     allow_outside : let a .json file name files outside its folder.
@@ -77,7 +77,7 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
-    path = path_of(path)
+    path = input_file(path_of(path))
     if ending(path) == ".json":
         from kratos_lite.io.settings import read_settings
 
@@ -114,8 +114,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk or .json; a state to .npz, from which `read_state` reads it; a model or
-        a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
+    path : a result goes to .vtu, .vtk, .json or .html, a page for the browser; a state to .npz, from which
+        `read_state` reads it; a model or a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
     thing : a `Result`, `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
@@ -128,6 +128,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     ------
     InputError
         The thing is not one of these, or the format cannot hold it.
+    KratosLiteError
+        three.js is missing, which a page needs.
     """
     from kratos_lite.analysis.model import Model
     from kratos_lite.analysis.result import Result

@@ -107,5 +107,6 @@ def describe_case(case: Case) -> str:
     name = case.files[0].name
     if not case.is_of_model:
         return f"{'file':<22}{name}\n{runner_of(case).describe(case)}"
-    time = f"\n{'time':<12}{case.time}" if case.time else ""
-    return f"{'file':<12}{name}\n{case.model}{time}"
+    rows = [("file", name), *case.model.table(), *([("time", str(case.time))] if case.time else [])]
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)

@@ -280,10 +280,10 @@ def test_run_file_says_the_same_as_options(run, box):
     assert same(displacement("by_file.json"), displacement("by_options.json"), 1e-14)
     told = run("info", "run.json")
     assert told.code == 0
-    assert told.out.startswith("file        run.json\nnodes       27\n")
-    assert "material    Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
-    assert "fixed       27 components" in told.out
-    assert "load        Gravity" in told.out
+    assert told.out.startswith("file         run.json\nnodes        27\n")
+    assert "material     Isotropic3D(E=210000000000.0, nu=0.3, density=7850.0)" in told.out
+    assert "fixed        27 components" in told.out
+    assert "load         Gravity" in told.out
     assert run("check", "run.json").out.startswith("run.json: 27 nodes, 8 elements, no errors")
     assert run("convert", "run.json", "run.mdpa").code == 0
     assert run("solve", "run.mdpa", "--json", "again.json").code == 0
@@ -618,6 +618,28 @@ def test_an_input_that_is_not_there_or_a_folder_is_refused(run, folder, command)
     for name in (".", "sub", ".."):
         assert run(command, name, *rest).refuses("folder")
     assert not Path("out.mdpa").exists()
+
+
+def test_a_folder_is_its_run_file_of_kratos(run, folder):
+    shutil.copytree(EXAMPLES / "cantilever", "beam")
+    by_folder, by_file = (
+        run("solve", name, "--json", "a.json") for name in ("beam", "beam/ProjectParameters.json")
+    )
+    assert (by_folder.code, by_file.code) == (0, 0)
+    assert by_folder.rows["largest displacement"] == by_file.rows["largest displacement"]
+    for command in ("check", "info"):
+        assert run(command, "beam").out == run(command, "beam/ProjectParameters.json").out != ""
+    assert run("convert", "beam", "beam.vtu").code == 0
+    assert kl.read("beam").mesh.n_nodes == kl.read("beam/cantilever.mdpa").mesh.n_nodes
+    Path("beam/ProjectParameters.json").unlink()
+    assert run("solve", "beam").refuses("beam: is a folder without ProjectParameters.json; name a file in it")
+
+
+def test_a_folder_beside_a_set_of_its_name_is_the_stem(run, folder):
+    kl.write("cube.elem", kl.read(GRAVITY_CUBE))
+    Path("cube").mkdir()
+    Path("cube/ProjectParameters.json").write_text("{}")
+    assert run("solve", "cube").code == 0
 
 
 def fingerprints():

@@ -222,7 +222,7 @@ def test_frames_table_and_picture(run, folder):
 
 def test_info_and_check_know_the_steps(run, folder):
     write(time={**TIME, "integrator": "bossak"})
-    assert "time        20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out
+    assert "20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out
     done = run("check", "run.json")
     assert done.code == 0
     assert "run.json: 28 nodes, 6 elements, 20 steps of 0.001 s by bossak(-0.3), no errors" in done.out

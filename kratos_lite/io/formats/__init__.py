@@ -10,6 +10,8 @@ from pathlib import Path
 from kratos_lite.errors import InputError, naming
 from kratos_lite.io.formats.document import Document
 
+PROJECT = "ProjectParameters.json"
+"""The run file of Kratos, which stands for its folder."""
 ELEM_SET = (".node", ".elem", ".cond", ".prop", ".init")
 
 
@@ -23,6 +25,19 @@ def ending(path: str | Path) -> str:
     if suffixes and suffixes[-1] == ".gz":
         suffixes.pop()
     return suffixes[-1] if suffixes else ""
+
+
+def input_file(path: str | Path) -> Path:
+    """Return the file that an input means: of a folder that is no stem of a set, its run file of Kratos."""
+    path = Path(path)
+    run_file = path / PROJECT
+    return run_file if path.is_dir() and not _is_stem(path) and run_file.is_file() else path
+
+
+def _is_stem(path: Path) -> bool:
+    """Return whether a path is the common stem of an .elem set."""
+    name = path.name  # "." has no name to put an ending to
+    return bool(name) and any(path.with_name(name + ending).is_file() for ending in (".elem", ".node"))
 
 
 def read_document(path: str | Path, *, strict: bool = True) -> Document:
@@ -43,16 +58,14 @@ def _read(path: Path, strict: bool) -> Document:
         from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
         return read_mdpa(path, strict=strict)
-    stem = "" if path.is_file() else path.name  # "." has no name to put an ending to
-    is_stem = stem and any(path.with_name(stem + s).is_file() for s in (".elem", ".node"))
-    if kind in ELEM_SET or is_stem:
+    if kind in ELEM_SET or (not path.is_file() and _is_stem(path)):
         from kratos_lite.io.formats.elem import read_elem
 
         return read_elem(path)
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
+        raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
     from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
 
     if kind in GEOMETRY:

@@ -75,7 +75,7 @@ def check_room(case: Case, subject: Any, start: Any) -> None:
     kept = -(-time.steps // time.every) + 1
     cure = "keep fewer of them, with every or --time STEP:STEPS:EVERY"
     size = float(sum(np.asarray(values).nbytes for values in start.values.values()) + STATE)
-    of_memory = sum(path.lower().endswith(".npz") for path in outputs.results)
+    of_memory = sum(path.lower().endswith((".npz", ".html")) for path in outputs.results)
     of_memory += outputs.picture is not None and not case.is_of_model
     fits_memory(kept * (of_memory * size + STATE), f"a series of {kept} states", cure)
     for path in outputs.results:

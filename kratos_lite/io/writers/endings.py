@@ -6,10 +6,10 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".vtk", ".json")
+RESULTS = (".vtu", ".vtk", ".json", ".html")
 """Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
-SERIES = (".pvd", ".csv", ".npz")
-"""Formats of states in time: for ParaView, a table, arrays."""
+SERIES = (".pvd", ".html", ".csv", ".npz")
+"""Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
 
 
 def check_result(path: str | Path, mode: str | None = None) -> None:
@@ -17,12 +17,13 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
     ending = Path(path).suffix.lower()
     if not ending:
         raise InputError(f"{path}: give the file an ending that says its format, such as .vtu")
-    if ending in SERIES:
+    if ending in SERIES and ending not in RESULTS:
         raise InputError(f"{path}: {ending} holds states in time; add --time STEP:STEPS, or write .vtu")
     if ending not in RESULTS:
         raise InputError(
             f"{path}: results cannot be written as {ending!r}; {' '.join(RESULTS)} hold all fields"
         )
+    _check_page(ending)
     if mode is not None:
         from kratos_lite.io.formats.vtu import check_mode  # rarely needed
 
@@ -35,8 +36,18 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
 
 def check_series(path: str | Path) -> None:
     """Raise InputError for a format that cannot hold states in time."""
-    if Path(path).suffix.lower() not in SERIES:
-        raise InputError(f"{path}: states in time are written as .pvd (for ParaView), .csv or .npz")
+    ending = Path(path).suffix.lower()
+    if ending not in SERIES:
+        raise InputError(f"{path}: states in time are written as .pvd (for ParaView), .html, .csv or .npz")
+    _check_page(ending)
+
+
+def _check_page(ending: str) -> None:
+    """Raise KratosLiteError, before any work is done, where a page lacks its library."""
+    if ending == ".html":
+        from kratos_lite.io.writers.page.library import library  # rarely needed
+
+        library()
 
 
 def check_ending(path: str | Path, wanted: str) -> None:

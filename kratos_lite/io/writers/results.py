@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.vtk`, and `.json`."""
+"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, and `.html` for the browser."""
 
 from __future__ import annotations
 
@@ -49,11 +49,16 @@ def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk or .json."""
+    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json or .html."""
     check_result(path, mode)
     ending = Path(path).suffix.lower()
     if ending == ".json":
         write_json(path, result)
+        return
+    if ending == ".html":
+        from kratos_lite.io.writers.page.write import write_result_page  # rarely needed
+
+        write_result_page(path, result)
         return
     points, cells = fields(result)
     if ending == ".vtu":

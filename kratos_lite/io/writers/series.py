@@ -90,7 +90,21 @@ class Arrays(Writer):
         write_arrays(self.path, arrays_of(self.subject, self.states))
 
 
-KINDS: dict[str, type[Writer]] = {".pvd": Frames, ".csv": Table, ".npz": Arrays}
+class Page(Arrays):
+    """A page for the browser."""
+
+    def __init__(self, path: Path, subject: Recorded, mode: str) -> None:
+        super().__init__(path, subject, mode)
+        subject.mesh()  # refuses a body without one before the first step
+
+    def write(self) -> None:
+        """Write the page."""
+        from kratos_lite.io.writers.page.states import write_states_page  # rarely needed
+
+        write_states_page(self.path, self.subject, self.states)
+
+
+KINDS: dict[str, type[Writer]] = {".pvd": Frames, ".html": Page, ".csv": Table, ".npz": Arrays}
 
 
 class SeriesWriter:
@@ -99,13 +113,15 @@ class SeriesWriter:
     - ``.pvd``: for ParaView; an index, and beside it ``NAME_00000.vtu`` … with the undeformed mesh, and
       DISPLACEMENT (m) and VELOCITY (m/s) on its nodes; of a transient also ACCELERATION (m/s²), REACTION (N)
       and stresses (Pa).
+    - ``.html``: a page for the browser that plays the states, in color; some of them, evenly spread, where
+      there are very many.
     - ``.csv``: a table with a line for each state: time, energies, mass center, momenta; of a transient time,
       energy, largest displacement, total reaction.
     - ``.npz``: arrays with a row for each state: ``time``, ``step``, and ``q``, ``u``, ``external_work`` of a
       body, or ``u``, ``v``, ``a``, ``reactions`` of a transient.
 
-    The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, table and
-    arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
+    The folder is made if it is missing.  Every file is written as a whole or not at all.  Index, page, table
+    and arrays come at the end, also when the loop ends early or by an error: then they hold the states up to
     there.
 
     Parameters
@@ -120,6 +136,8 @@ class SeriesWriter:
         The extension is not one of these, or a file cannot be written.
     ModelError
         The body has no mesh, or is a batch of bodies.
+    KratosLiteError
+        three.js is missing, which a page needs.
 
     Examples
     --------

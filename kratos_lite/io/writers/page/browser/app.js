@@ -1,0 +1,276 @@
+// The page: what the controls mean.
+
+const $ = (id) => document.getElementById(id);
+const FRAMES_PER_SECOND = 20, SECONDS_PER_CYCLE = 3;
+
+class Page {
+  constructor(data) {
+    this.data = data;
+    this.frame = 0;
+    this.phase = 1;
+    this.surface = surfaceOf(data.faces);
+    this.positions = new Float32Array(data.points.length);
+    const stage = this.stage = new Stage($("view"), data.radius);
+    this.body = stage.triangles(this.surface.positions, this.surface.values, this.surface.corners, true);
+    this.edges = stage.lines(this.body.geometry.attributes.position, this.surface.edges, 0x10141c, 0.45, true);
+    this.outline = stage.lines(new THREE.BufferAttribute(data.points, 3), Uint32Array.from(data.outline), 0x8a8f98, 1, true);
+    this.mark = stage.add(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: 0xd2342a, size: 8, sizeAttenuation: false, depthTest: false })));
+    this.mark.visible = false;
+    this.section = null;
+    this.setUp();
+    this.choose();
+  }
+
+  // ---- controls ----------------------------------------------------------------------------------
+
+  setUp() {
+    const { data } = this;
+    document.querySelector("h1").textContent = data.title;
+    for (const [name, text] of data.about) $("about").append(element("dt", name), element("dd", text));
+    data.fields.forEach((field, i) => {
+      const group = Object.assign(document.createElement("optgroup"), { label: field.name });
+      for (const name of Object.keys(COMPONENTS[field.kind]))
+        group.append(Object.assign(element("option", [field.name, name].filter(Boolean).join(", ")), { value: `${i}:${name}` }));
+      $("field").append(group);
+    });
+    $("field").value = data.shown;
+    $("frame").max = data.frames.length - 1;
+    $("of-frame").hidden = data.frames.length < 2;
+    $("edges").checked = this.edges.visible = data.edged;
+    this.on("field", "change", () => this.choose());
+    this.on("refit", "click", () => this.fit());
+    for (const id of ["low", "high"]) this.on(id, "change", () => this.setRange());
+    this.on("frame", "input", () => this.show(Number($("frame").value)));
+    this.on("scale", "input", () => this.update());
+    this.on("play", "click", () => this.play());
+    for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
+    for (const [id, thing] of [["edges", "edges"], ["outline", "outline"]])
+      this.on(id, "change", () => { this[thing].visible = $(id).checked; this.update(); });
+    for (const button of document.querySelectorAll("[data-view]"))
+      button.addEventListener("click", () => this.stage.look(button.dataset.view.split(",").map(Number)));
+    this.on("picture", "click", () => this.save());
+    this.on("view", "pointermove", (event) => this.point(event));
+    this.on("view", "pointerleave", () => this.unpoint());
+    this.on("view", "pointerdown", () => this.unpoint());
+    this.stage.onDrawn = () => this.drawTriad();
+  }
+
+  on(id, event, action) {
+    $(id).addEventListener(event, action);
+  }
+
+  // ---- values ------------------------------------------------------------------------------------
+
+  // Return one number for each node, or for each element, of the chosen field in a frame.
+  valuesOf(frame) {
+    const [index, name] = this.chosen;
+    return component(this.data.read(this.data.frames[frame].values[index]), this.data.fields[index].kind, name);
+  }
+
+  choose() {
+    const [index, name] = $("field").value.split(/:(.*)/s);
+    this.chosen = [Number(index), name];
+    this.field = this.data.fields[this.chosen[0]];
+    this.show(this.frame, false);
+    this.fit();
+  }
+
+  show(frame, draw = true) {
+    this.frame = frame;
+    $("frame").value = frame;
+    $("frame-name").textContent = this.data.frames[frame].name;
+    this.displacement = this.data.read(this.data.frames[frame].values[0]);
+    this.values = this.valuesOf(frame);
+    if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
+    else spread(this.surface, this.values, 1, this.surface.values);
+    if (draw) this.update();
+  }
+
+  fit() {
+    let [low, high] = extent(this.values);
+    if (this.data.kind === "states")
+      for (let frame = 0; frame < this.data.frames.length; frame++) {
+        const [least, most] = extent(this.valuesOf(frame));
+        [low, high] = [Math.min(low, least), Math.max(high, most)];
+      }
+    if (high - low <= 1e-6 * Math.max(Math.abs(low), Math.abs(high))) {
+      const half = 0.5 * Math.max(Math.abs(low), Math.abs(high)) || 1;
+      [low, high] = [low - half, high + half];
+    }
+    this.range = [low, high];
+    this.update();
+  }
+
+  setRange() {
+    const [low, high] = ["low", "high"].map((id) => Number($(id).value.replace(",", ".")) * 10 ** this.power);
+    if (Number.isFinite(low) && Number.isFinite(high) && low < high) this.range = [low, high];
+    this.update();
+  }
+
+  // ---- drawing -----------------------------------------------------------------------------------
+
+  update() {
+    const { data, surface } = this, scale = Number($("scale").value) * data.scale;
+    for (let i = 0; i < this.positions.length; i++)
+      this.positions[i] = data.points[i] + scale * this.phase * this.displacement[i];
+    spread(surface, this.positions, 3, surface.positions);
+    this.body.geometry.attributes.position.needsUpdate = true;
+    colored(this.body, surface.values, this.range);
+    $("scale-name").textContent = data.kind === "modes" ? `${Number($("scale").value)}` : `× ${Number(scale.toPrecision(3))}`;
+    this.cut();
+    this.drawLegend();
+    this.unpoint();
+    this.stage.draw();
+  }
+
+  cut() {
+    for (const mesh of [this.cap, this.capLines]) if (mesh) { this.stage.scene.remove(mesh); mesh.geometry.dispose(); mesh.material.map?.dispose(); mesh.material.dispose(); }
+    this.cap = this.capLines = this.section = null;
+    const axis = "xyz".indexOf($("axis").value || " "), sign = $("flip").checked ? -1 : 1;
+    $("depth").disabled = $("flip").disabled = axis < 0;
+    this.normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
+    this.offset = axis < 0 ? 1e30 : sign * (2 * Number($("depth").value) - 1) * this.data.reach[axis];
+    this.stage.plane.set(new THREE.Vector3(...this.normal).negate(), this.offset);
+    if (axis < 0 || !this.data.cells.length) return;
+    const ofElements = this.field.at === "element" ? this.values : null;
+    this.section = cut(this.data.cells, this.positions, ofElements ? null : this.values, ofElements, this.normal, this.offset);
+    const positions = Float32Array.from(this.section.positions), values = Float32Array.from(this.section.values);
+    this.section.positions = positions;
+    this.section.values = values;
+    this.cap = this.stage.triangles(positions, values, null, false);
+    colored(this.cap, values, this.range);
+    this.capLines = this.stage.lines(new THREE.BufferAttribute(Float32Array.from(this.section.lines), 3), null, 0x10141c, 0.45, false);
+    this.capLines.visible = this.edges.visible;
+  }
+
+  drawLegend() {
+    const [low, high] = this.range, largest = Math.max(Math.abs(low), Math.abs(high));
+    this.power = this.field.unit ? prefixOf(largest) : 0;
+    const [index, name] = this.chosen, shown = (value) => `${Number((value / 10 ** this.power).toPrecision(4))}`;
+    $("quantity").textContent = [this.data.fields[index].name, name].filter(Boolean).join(", ");
+    $("unit").textContent = PREFIXES[this.power] + this.field.unit;
+    $("ramp").style.background = `linear-gradient(to top, ${RAMP.join(", ")})`;
+    $("ticks").replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((share) => {
+      const tick = element("span", shown(low + share * (high - low)));
+      tick.style.top = `${100 * (1 - share)}%`;
+      return tick;
+    }));
+    $("low").value = shown(low);
+    $("high").value = shown(high);
+    $("legend").hidden = false;
+  }
+
+  drawTriad() {
+    const { camera } = this.stage;
+    const ends = [..."xyz"].map((name, i) => {
+      const axis = new THREE.Vector3().setComponent(i, 1).transformDirection(camera.matrixWorldInverse);
+      return [axis, name, ["#c33", "#293", "#24c"][i]];
+    }).sort(([one], [other]) => one.z - other.z);
+    $("triad").innerHTML = ends.map(([{ x, y }, name, color]) =>
+      `<line x2="${34 * x}" y2="${-34 * y}" stroke="${color}" stroke-width="3"/><text x="${44 * x}" y="${-44 * y}" fill="${color}">${name}</text>`).join("");
+  }
+
+  // ---- animation ---------------------------------------------------------------------------------
+
+  play(on = !this.playing) {
+    this.playing = on;
+    $("play").setAttribute("aria-pressed", on);
+    $("play").textContent = on ? "■ stop" : "▶ animate";
+    if (!on) {
+      this.phase = 1;
+      this.update();
+      return;
+    }
+    const start = performance.now(), first = this.frame;
+    const turn = (now) => {
+      if (!this.playing) return;
+      const seconds = (now - start) / 1000, circle = 2 * Math.PI * seconds / SECONDS_PER_CYCLE;
+      if (this.data.kind === "states") {
+        const frame = (first + Math.floor(seconds * FRAMES_PER_SECOND)) % this.data.frames.length;
+        if (frame !== this.frame) this.show(frame);
+      } else {
+        this.phase = this.data.kind === "modes" ? Math.cos(circle) : (1 - Math.cos(circle)) / 2;
+        this.update();
+      }
+      requestAnimationFrame(turn);
+    };
+    requestAnimationFrame(turn);
+  }
+
+  // ---- values under the pointer ------------------------------------------------------------------
+
+  point(event) {
+    if (event.buttons || this.playing) return;
+    this.unpoint();
+    const found = this.find(...this.stage.ray(event.clientX, event.clientY));
+    if (!found) return;
+    const box = $("view").getBoundingClientRect(), label = $("pointer");
+    label.textContent = this.described(found);
+    label.hidden = false;
+    const [x, y] = [event.clientX - box.left + 14, event.clientY - box.top + 14];
+    label.style.left = `${Math.max(0, Math.min(x, box.width - label.offsetWidth - 4))}px`;
+    label.style.top = `${Math.max(0, Math.min(y, box.height - label.offsetHeight - 4))}px`;
+    this.mark.geometry.setAttribute("position", new THREE.BufferAttribute(this.positions.slice(3 * found.node, 3 * found.node + 3), 3));
+    this.mark.visible = true;
+    this.stage.draw();
+  }
+
+  unpoint() {
+    if ($("pointer").hidden) return;
+    $("pointer").hidden = true;
+    this.mark.visible = false;
+    this.stage.draw();
+  }
+
+  // What a ray hits first: value there, element, and the nearest of the nodes of the face or cell.
+  find(origin, direction) {
+    const { normal, offset, surface } = this, slack = 1e-5 * this.data.radius;
+    const isCut = ([x, y, z]) => normal[0] * x + normal[1] * y + normal[2] * z > offset + slack;
+    const outer = hit(surface.positions, surface.corners, origin, direction, isCut);
+    const inner = this.section && hit(this.section.positions, null, origin, direction, () => false);
+    const found = inner && (!outer || inner.along < outer.along) ? inner : outer;
+    if (!found) return null;
+    const values = found === inner ? this.section.values : surface.values;
+    found.value = found.shares.reduce((sum, share, i) => sum + share * values[found.at[i]], 0);
+    let block, row;
+    if (found === inner) {
+      [block, row] = this.section.cells[found.triangle];
+      found.element = this.section.elements[found.triangle];
+    } else {
+      [block, row] = faceOf(surface, found.triangle);
+      found.element = block.element[row];
+    }
+    const k = widthOf(block);
+    found.node = nearestNode(block.nodes.subarray(row * k, (row + 1) * k), this.positions, found.point);
+    return found;
+  }
+
+  described({ value, node, element }) {
+    const { data, field } = this, place = [0, 1, 2].map((i) => Number((data.points[3 * node + i] + data.center[i]).toPrecision(5)));
+    const lines = [written(value, field.unit, 5)];
+    lines.push(`node ${data.node_ids[node]} at (${place.join(", ")}) m`);
+    if (field.at !== "element") lines[1] += `: ${written(this.values[node], field.unit, 5)}`;
+    lines.push(`element ${data.element_ids[element]}`);
+    return lines.join("\n");
+  }
+
+  save() {
+    this.stage.renderer.domElement.toBlob((blob) => {
+      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "picture.png" });
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  }
+}
+
+function element(name, text) {
+  return Object.assign(document.createElement(name), { textContent: text });
+}
+
+try {
+  globalThis.page = new Page(await unpacked());
+} catch (error) {
+  $("message").textContent = `This page needs WebGL and a browser of 2023 or later: ${error.message}`;
+  $("message").hidden = false;
+  throw error;
+}

@@ -1,0 +1,210 @@
+"""What a page for the browser shows, as numbers: mesh, fields and frames, packed into one text."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+import zlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face, sharp_edges
+from kratos_lite.mesh.blocks import with_rows
+from kratos_lite.records import record
+from kratos_lite.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from kratos_lite.mesh import Mesh
+
+MOST_CELLS = 250_000
+"""Elements up to which the page knows the inside, for cuts."""
+MOST_EDGED = 20_000
+"""Faces up to which their edges are shown at the start."""
+QUANTUM = 30_000
+"""Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""
+
+
+@record(frozen=True)
+class Field:
+    """A field of a page.
+
+    Attributes
+    ----------
+    name : as people say it.
+    unit : in SI.
+    kind : ``scalar``, ``vector``, or ``stress`` in Voigt order.
+    at : ``node`` or ``element``.
+    """
+
+    name: str
+    unit: str
+    kind: str
+    at: str = "node"
+
+
+@record(frozen=True, eq=False)
+class Frame:
+    """One state or mode of a page.
+
+    Attributes
+    ----------
+    name : such as ``t = 0.1 s``.
+    values : of each field, displacements first: (n,), (n, 3), (n, 6), or those of elements.
+    """
+
+    name: str
+    values: Sequence[Array]
+
+
+@record(frozen=True, eq=False)
+class Content:
+    """All that a page shows.
+
+    Attributes
+    ----------
+    title : heading.
+    kind : ``result``, ``modes`` or ``states``; animated are the deformation, its oscillation, the states.
+    mesh : with a surface.
+    fields : the first is the displacement.
+    frames : states or modes; one of a result.
+    shown : number of the field and component at the start, as ``1:von Mises``.
+    about : labels and texts of the summary.
+    """
+
+    title: str
+    kind: str
+    mesh: Mesh
+    fields: Sequence[Field]
+    frames: Sequence[Frame]
+    shown: str = "0:magnitude"
+    about: Sequence[tuple[str, str]] = ()
+
+    def packed(self) -> str:
+        """Return all of it as one text."""
+        data = _Packer(is_short=len(self.frames) > 1)
+        kept = self._kept()
+        head = {
+            "title": self.title,
+            "kind": self.kind,
+            "shown": self.shown,
+            "about": list(self.about),
+            "fields": [vars(field) for field in self.fields],
+            **self._frame(),
+            **_mesh(data, self.mesh, kept, self._center()),
+            "frames": [self._packed_frame(data, frame, kept) for frame in self.frames],
+        }
+        return data.text(head)
+
+    def _kept(self) -> Ints:
+        """Return the rows of the nodes that the page knows: of a large mesh those of the surface."""
+        if self.mesh.n_elements <= MOST_CELLS:
+            return np.arange(self.mesh.n_nodes)
+        return np.unique(np.concatenate([block.nodes.ravel() for block in self.mesh.boundary]))
+
+    def _packed_frame(self, data: _Packer, frame: Frame, kept: Ints) -> dict[str, Any]:
+        both = zip(self.fields, frame.values, strict=True)
+        values = [data.field(v[kept] if field.at == "node" else v) for field, v in both]
+        return {"name": frame.name, "values": values}
+
+    def scale(self) -> float:
+        """Return the factor on displacements at the start."""
+        displacements = [frame.values[0] for frame in self.frames]
+        return exaggeration(self.mesh.points, displacements, least=0.0 if self.kind == "modes" else 1.0)
+
+    def _ends(self) -> tuple[Array, Array]:
+        """Return the corners of the box that holds the body in all frames."""
+        X, scale = self.mesh.points, self.scale()
+        sides = (0.0, 1.0, -1.0) if self.kind == "modes" else (0.0, 1.0)
+        moved = [X + side * scale * frame.values[0] for frame in self.frames for side in sides]
+        return np.min([x.min(axis=0) for x in moved], axis=0), np.max([x.max(axis=0) for x in moved], axis=0)
+
+    def _center(self) -> Array:
+        return np.asarray(sum(self._ends()) / 2)
+
+    def _frame(self) -> dict[str, Any]:
+        """Return where the camera looks, and how far the body reaches there."""
+        low, high = self._ends()
+        return {
+            "center": ((low + high) / 2).tolist(),
+            "radius": float(np.linalg.norm(high - low) / 2) or 1.0,
+            "reach": ((high - low) / 2).tolist(),
+            "scale": self.scale(),
+        }
+
+
+def exaggeration(X: Array, displacements: Sequence[Array], least: float) -> float:
+    """Return 1, 2 or 5 times a power of ten that makes the largest displacement a tenth of the body."""
+    largest = max(float(np.linalg.norm(u, axis=1).max(initial=0.0)) for u in displacements)
+    wanted = 0.1 * float(np.linalg.norm(np.ptp(X, axis=0))) / largest if largest else 0.0
+    if wanted == 0 or wanted < least:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+
+def _mesh(data: _Packer, mesh: Mesh, kept: Ints, center: Array) -> dict[str, Any]:
+    """Return the nodes that are kept, the surface, and the cells unless only the surface is kept."""
+    row = np.zeros(mesh.n_nodes, dtype=np.int32)
+    row[kept] = np.arange(len(kept))
+    faces, cells, n = [], [], fineness(mesh.boundary)
+    for block in mesh.boundary:
+        assert block.shape is not None
+        nodes, element = data.whole(row[block.nodes]), data.whole(block.ids)
+        faces.append({**lattice_of_face(block.shape, n), "nodes": nodes, "element": element})
+    for block, at in with_rows(mesh.blocks if len(kept) == mesh.n_nodes else []):
+        if block.shape is not None and block.shape.faces:
+            lattice = lattice_of_cell(block.shape)
+            cells.append({**lattice, "nodes": data.whole(block.nodes), "first": at.start})
+    return {
+        "points": data.real(mesh.points[kept] - center),
+        "node_ids": data.whole(mesh.node_ids[kept]),
+        "element_ids": data.whole(mesh.element_ids),
+        "faces": faces,
+        "cells": cells,
+        "outline": data.whole(row[sharp_edges(mesh)]),
+        "edged": sum(map(len, mesh.boundary)) < MOST_EDGED,
+    }
+
+
+class _Packer:
+    """Arrays of a page, one after the other: bytes sorted by significance, which compress better."""
+
+    def __init__(self, *, is_short: bool) -> None:
+        self.parts: list[bytes] = []
+        self.size, self.is_short = 0, is_short
+
+    def whole(self, array: NDArray[Any]) -> dict[str, Any]:
+        """Take whole numbers, as differences from row to row."""
+        return self._take("i4", array.astype(np.int32))
+
+    def real(self, array: Array) -> dict[str, Any]:
+        """Take real numbers in single precision."""
+        return self._take("f4", array.astype(np.float32))
+
+    def field(self, array: Array) -> dict[str, Any]:
+        """Take values of a field; those of many frames as whole numbers of 16 bits."""
+        if not self.is_short:
+            return self.real(array)
+        step = float(np.abs(array).max(initial=0.0)) / QUANTUM or 1.0
+        return {**self._take("i2", np.round(array / step).astype(np.int16)), "step": step}
+
+    def _take(self, kind: str, array: NDArray[Any]) -> dict[str, Any]:
+        flat = np.ascontiguousarray(array).reshape(len(array), -1)
+        if kind != "f4":
+            flat = np.diff(flat, axis=0, prepend=np.zeros_like(flat[:1]))
+        raw = flat.astype(flat.dtype.newbyteorder("<")).view(np.uint8).reshape(-1, flat.itemsize)
+        described = {"type": kind, "start": self.size, "count": flat.size, "width": flat.shape[1]}
+        self.parts.append(np.ascontiguousarray(raw.T).tobytes())
+        self.size += len(self.parts[-1])
+        return described
+
+    def text(self, head: dict[str, Any]) -> str:
+        """Return the length of the head, the head and all arrays, compressed, as text."""
+        first = json.dumps(head, separators=(",", ":"), allow_nan=False).encode()
+        whole = b"".join([struct.pack("<I", len(first)), first, *self.parts])
+        return base64.b64encode(zlib.compress(whole, 9)).decode()

@@ -1,0 +1,104 @@
+"""Lattices on faces and in cells for pages, and the triangles and tetrahedra between their points."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh.subdivision import Piece, pieces, unchanged
+from kratos_lite.shapes import LINEAR, Shape
+from kratos_lite.typing import Array, Ints, Mask
+
+TETRAHEDRA = {
+    "tetrahedron": ((0, 1, 2, 3),),
+    "pyramid": ((0, 1, 2, 4), (0, 2, 3, 4)),
+    "wedge": ((0, 1, 2, 5), (0, 1, 5, 4), (0, 4, 5, 3)),
+    "hexahedron": ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)),
+}
+"""Corners of tetrahedra that fill a cell."""
+FINE = 20000
+"""Facets of the surface to aim at where faces are subdivided."""
+
+
+def fineness(faces: list[Block]) -> int:
+    """Return into how many parts an edge of each face is cut: curved ones into two or more."""
+    count = sum(map(len, faces))
+    curved = any(block.shape is not None and block.shape.degree > 1 for block in faces)
+    most = int(np.clip(np.sqrt(FINE / max(count, 1)), 1, 6 if curved else 4))
+    return max(most, 2) if curved else most
+
+
+def lattice_of_face(shape: type[Shape], n: int) -> dict[str, Any]:
+    """Return N at the points of a lattice on a face, its triangles, and the pieces of the edges."""
+    steps = np.linspace(0, 1, n + 1)
+    places = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    a = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    lower = np.stack([a[:-1, :-1], a[1:, :-1], a[:-1, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([a[1:, :-1], a[1:, 1:], a[:-1, 1:]], axis=-1).reshape(-1, 3)
+    triangles = np.vstack([lower, upper])
+    if shape.cell == "quadrilateral":
+        places = 2 * places - 1
+    else:
+        inside = places.sum(axis=1) < 1 + 1e-9
+        triangles = (np.cumsum(inside) - 1)[triangles[inside[triangles].all(axis=1)]]
+        places = places[inside]
+    X = shape.nodes
+    rims = [[(1 - t) * X[a] + t * X[b] for t in steps] for a, b in shape.edges]
+    edges = [pair for rim in rims for pair in pairwise(_nearest(places, point) for point in rim)]
+    return {"N": _rounded(shape.N(places)), "triangles": triangles.tolist(), "edges": edges}
+
+
+def _nearest(places: Array, point: Array) -> int:
+    return int(((places - point) ** 2).sum(axis=1).argmin())
+
+
+def _rounded(N: Array) -> list[list[float]]:
+    """Return weights without the rounding errors of zeros."""
+    rounded: list[list[float]] = (np.round(N, 12) + 0.0).tolist()
+    return rounded
+
+
+def lattice_of_cell(shape: type[Shape]) -> dict[str, Any]:
+    """Return N at the points of a lattice in a cell, and the tetrahedra between them.
+
+    A tetrahedron is its four points and, for each of them, whether the face opposite lies on the cell's own
+    faces or inside.
+    """
+    parts: tuple[Piece, ...] = (unchanged(shape.cell),) if shape.degree == 1 else pieces(shape.cell)
+    corners = [part.corners[list(four)] for part in parts for four in TETRAHEDRA[part.cell]]
+    places, rows = np.unique(np.concatenate(corners).round(12), axis=0, return_inverse=True)
+    on = _on_faces(shape, places)
+    tetrahedra = []
+    for four in rows.reshape(-1, 4):
+        outer = [bool(on[np.delete(four, i)].all(axis=0).any()) for i in range(4)]
+        tetrahedra.append([four.tolist(), outer])
+    return {"N": _rounded(shape.N(places)), "tetrahedra": tetrahedra}
+
+
+def _on_faces(shape: type[Shape], places: Array) -> Mask:
+    """Return which reference places (p, 3) lie on which faces of a cell, (p, f)."""
+    X = LINEAR[shape.cell].nodes
+    planes = [X[list(face[:3])] for face in LINEAR[shape.cell].faces]
+    away = [(places - a) @ np.cross(b - a, c - a) for a, b, c in planes]
+    return np.asarray(np.abs(away).T < 1e-9)
+
+
+def sharp_edges(mesh: Mesh) -> Ints:
+    """Return the sharp edges of the surface as rows of nodes, (e, 2)."""
+    pairs, normals = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3))]
+    for block in mesh.boundary:
+        assert block.shape is not None
+        X = mesh.points[block.nodes]
+        normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        for edge in block.shape.edges:
+            pairs.append(np.sort(block.nodes[:, list(edge)], axis=1))
+            normals.append(normal)
+    unique, which = np.unique(np.vstack(pairs), axis=0, return_inverse=True)
+    total = np.zeros((len(unique), 3))
+    np.add.at(total, which.ravel(), np.vstack(normals))
+    # Two unit normals at an angle a add up to a length of 2 cos(a/2).
+    return np.asarray(unique[np.linalg.norm(total, axis=1) < 2 * np.cos(np.radians(15))])

@@ -1,0 +1,62 @@
+"""Pages for the browser: one file that shows results in three dimensions, without a network."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kratos_lite.atomic import refuse_nan, write_whole
+from kratos_lite.errors import InputError
+from kratos_lite.io.writers.page.content import Content, Field, Frame
+from kratos_lite.io.writers.page.library import library
+from kratos_lite.typing import Array
+
+if TYPE_CHECKING:
+    from kratos_lite.analysis.result import Result
+    from kratos_lite.mesh import Mesh
+
+OURS = Path(__file__).with_name("browser")
+SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "app.js")
+
+
+def write_page(path: str | Path, content: Content) -> None:
+    """Write a page, as a whole or not at all; InputError for a mesh without a surface."""
+    parts = {"library": library(), "title": html.escape(content.title)}
+    if not content.mesh.boundary:
+        raise InputError(f"{path}: there is nothing to show: the mesh has no element of a known shape")
+    for frame in content.frames:
+        for field, values in zip(content.fields, frame.values, strict=True):
+            refuse_nan(path, field.name, values)
+    parts["data"] = content.packed()
+    parts["style"] = (OURS / "page.css").read_text(encoding="utf-8")
+    parts["script"] = "\n".join((OURS / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    pieces = re.split(r"\{(\w+)\}", (OURS / "page.html").read_text(encoding="utf-8"))
+    pieces[1::2] = [parts[name] for name in pieces[1::2]]
+    write_whole(path, "".join(pieces).encode())
+
+
+def write_result_page(path: str | Path, result: Result) -> None:
+    """Write the page of a result: displacements, nodal stresses, reactions and estimated errors."""
+    fields = (
+        Field("displacement", "m", "vector"),
+        Field("stress", "Pa", "stress"),
+        Field("reaction", "N", "vector"),
+        Field("estimated error", "√J", "scalar", "element"),
+    )
+    values = (result.displacement(), result.stress("node"), result.reaction(), result.error().per_element)
+    frame, title = Frame("", values), Path(path).stem
+    write_page(path, Content(title, "result", result.mesh, fields, [frame], "1:von Mises", result.table()))
+
+
+def write_modes_page(path: str | Path, mesh: Mesh, omega: Array, shapes: Array) -> None:
+    """Write the page of natural modes: frequencies (k,) in rad/s and shapes (k, n, 3)."""
+    largest = np.linalg.norm(shapes, axis=2).max(axis=1)
+    frames = [
+        Frame(f"{i}: {w / (2 * np.pi):.5g} Hz", [shape / size])
+        for i, (w, shape, size) in enumerate(zip(omega, shapes, largest, strict=True), 1)
+    ]
+    write_page(path, Content(Path(path).stem, "modes", mesh, [Field("displacement", "", "vector")], frames))

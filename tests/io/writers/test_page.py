@@ -1,0 +1,197 @@
+"""Pages for the browser: what they hold, and in test_page_in_browser what they do."""
+
+import base64
+import json
+import re
+import struct
+import sys
+import zlib
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.io.writers.page.content import exaggeration
+from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face, sharp_edges
+from kratos_lite.shapes import LINEAR, SHAPES
+
+CELLS = [
+    *("Tetrahedron4", "Tetrahedron10", "Hexahedron8", "Hexahedron20", "Hexahedron27"),
+    *("Wedge6", "Wedge15", "Pyramid5", "Pyramid13"),
+]
+FACES = ["Triangle3", "Triangle6", "Quadrilateral4", "Quadrilateral8", "Quadrilateral9"]
+VOLUME = {"tetrahedron": 1 / 6, "hexahedron": 8.0, "wedge": 1.0, "pyramid": 4 / 3}
+
+
+@pytest.fixture
+def result():
+    model = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1e5)))
+    return model.solve()
+
+
+def content_of(path):
+    """What the page's script unpacks, in plain NumPy."""
+    text = re.search(r'id="data">([^<]*)<', path.read_text(encoding="utf-8"))[1]
+    raw = zlib.decompress(base64.b64decode(text))
+    (size,) = struct.unpack("<I", raw[:4])
+    return unpacked(json.loads(raw[4 : 4 + size]), raw[4 + size :])
+
+
+def unpacked(value, raw):
+    if isinstance(value, list):
+        return [unpacked(item, raw) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if value.get("type") not in ("f4", "i4", "i2"):
+        return {name: unpacked(item, raw) for name, item in value.items()}
+    kind = np.dtype("<" + value["type"])
+    part = raw[value["start"] : value["start"] + value["count"] * kind.itemsize]
+    sorted_ = np.frombuffer(part, np.uint8).reshape(kind.itemsize, -1)
+    array = np.ascontiguousarray(sorted_.T).view(kind).reshape(-1, value["width"])
+    if kind.kind == "i":
+        array = np.cumsum(array, axis=0, dtype=kind)
+    return array * value["step"] if "step" in value else array
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_tetrahedra_fill_a_cell(name):
+    shape = SHAPES[name]
+    lattice = lattice_of_cell(shape)
+    places = np.array(lattice["N"]) @ shape.nodes
+    corners = np.array([places[four] for four, _ in lattice["tetrahedra"]])
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    assert volumes.min() > 1e-3
+    assert abs(volumes.sum() - VOLUME[shape.cell]) < 1e-12
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_outer_faces_of_tetrahedra_cover_the_faces_of_their_cell(name):
+    shape = SHAPES[name]
+    lattice = lattice_of_cell(shape)
+    places = np.array(lattice["N"]) @ shape.nodes
+    area = sum(
+        triangle_area(places[[corner for j, corner in enumerate(four) if j != i]])
+        for four, outer in lattice["tetrahedra"]
+        for i in range(4)
+        if outer[i]
+    )
+    wanted = 0.0
+    for face in LINEAR[shape.cell].faces:
+        X = LINEAR[shape.cell].nodes[list(face)]
+        wanted += triangle_area(X[[0, 1, 2]]) + (triangle_area(X[[0, 2, 3]]) if len(face) == 4 else 0)
+    assert abs(area - wanted) < 1e-12
+
+
+def triangle_area(X):
+    return np.linalg.norm(np.cross(X[1] - X[0], X[2] - X[0])) / 2
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("name", FACES)
+def test_triangles_and_edges_cover_a_face(name, n):
+    shape = SHAPES[name]
+    lattice = lattice_of_face(shape, n)
+    places = np.array(lattice["N"]) @ shape.nodes
+    corners = places[lattice["triangles"]]
+    one, other = (corners[:, i] - corners[:, 0] for i in (1, 2))
+    areas = (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / 2
+    assert areas.min() > 0
+    assert abs(areas.sum() - (0.5 if shape.cell == "triangle" else 4.0)) < 1e-12
+    ends = places[lattice["edges"]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    assert abs(length - (2 + np.sqrt(2) if shape.cell == "triangle" else 8.0)) < 1e-12
+
+
+def test_tetrahedra_are_known_for_every_cell_with_a_volume():
+    assert set(TETRAHEDRA) == set(VOLUME)
+
+
+def test_sharp_edges_of_a_box_are_its_twelve():
+    mesh = kl.box((3, 2, 1), (3, 2, 1))
+    ends = mesh.points[sharp_edges(mesh)]
+    assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 4 * (3 + 2 + 1)) < 1e-12
+
+
+def test_exaggeration_is_a_round_number():
+    X, u = np.array([[0.0, 0, 0], [3, 4, 0]]), np.array([[0.0, 0, 0], [0, 0, 1e-3]])
+    assert exaggeration(X, [u], least=1.0) == 500
+    assert exaggeration(X, [1e4 * u], least=1.0) == 1
+    assert exaggeration(X, [1e4 * u], least=0.0) == 0.05
+    assert exaggeration(X, [0 * u], least=1.0) == 1
+
+
+def test_a_page_holds_mesh_and_fields(result, tmp_path):
+    pytest.importorskip("trimesh")
+    kl.write(tmp_path / "a.html", result)
+    content = content_of(tmp_path / "a.html")
+    mesh = result.mesh
+    assert abs(content["points"] + content["center"] - mesh.points).max() < 1e-6
+    assert content["node_ids"].ravel().tolist() == mesh.node_ids.tolist()
+    assert content["element_ids"].ravel().tolist() == mesh.element_ids.tolist()
+    assert content["cells"][0]["nodes"].tolist() == mesh.blocks[0].nodes.tolist()
+    assert content["faces"][0]["element"].ravel().tolist() == mesh.boundary[0].ids.tolist()
+    u, stress, reaction, error = content["frames"][0]["values"]
+    for found, wanted in (
+        (u, result.u),
+        (stress, result.stress("node")),
+        (reaction, result.reaction()),
+        (error[:, 0], result.error().per_element),
+    ):
+        assert abs(found - wanted).max() <= 1e-7 * abs(wanted).max()
+
+
+def test_a_page_asks_nothing_of_a_network(result, tmp_path):
+    pytest.importorskip("trimesh")
+    kl.write(tmp_path / "a.html", result)
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert not re.findall(r"<(?:script|img|iframe)[^>]* src|<link|@import|url\(", text)
+    assert len(text) < 1e6
+
+
+def test_a_series_becomes_a_page_of_its_states(tmp_path):
+    pytest.importorskip("trimesh")
+    body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
+    moved = []
+    with kl.SeriesWriter(tmp_path / "new" / "spin.html", body) as series:
+        for state in kl.integrate(body, dt=0.01, steps=20, every=10):
+            series.add(state)
+            moved.append(body.position(body.mesh.points, state.q) - body.mesh.points)
+    content = content_of(tmp_path / "new" / "spin.html")
+    assert [frame["name"] for frame in content["frames"]] == ["t = 0.1 s", "t = 0.2 s"]
+    assert content["scale"] == 1
+    for frame, wanted in zip(content["frames"], moved, strict=True):
+        assert abs(frame["values"][0] - wanted).max() <= 2e-5 * abs(wanted).max()
+
+
+def test_a_title_is_no_markup(result, tmp_path):
+    pytest.importorskip("trimesh")
+    kl.write(tmp_path / "a<b>&amp{data}.html", result)
+    text = (tmp_path / "a<b>&amp{data}.html").read_text(encoding="utf-8")
+    assert "<title>a&lt;b&gt;&amp;amp{data}</title>" in text
+
+
+def test_without_three_js_the_cure_is_named_and_nothing_written(result, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(KratosLiteError, match=r"pip install kratos-lite\[page\]"):
+        kl.write(tmp_path / "a.html", result)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_trimesh_without_three_js_is_named(result, tmp_path, monkeypatch):
+    (tmp_path / "trimesh").mkdir()
+    (tmp_path / "trimesh" / "__init__.py").write_text("")
+    monkeypatch.delitem(sys.modules, "trimesh", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KratosLiteError, match=r"viewer.zip: no three.js is found there"):
+        kl.write(tmp_path / "a.html", result)
+
+
+def test_only_vtu_files_have_a_mode(result, tmp_path):
+    pytest.importorskip("trimesh")
+    with pytest.raises(InputError, match=r"only .vtu files are written as ascii"):
+        kl.write(tmp_path / "a.html", result, mode="ascii")

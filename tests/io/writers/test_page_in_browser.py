@@ -1,0 +1,347 @@
+"""Pages in a browser: they open without an error or a request, and their controls change the picture."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+
+webdriver = pytest.importorskip("selenium.webdriver")
+WebDriverWait = pytest.importorskip("selenium.webdriver.support.wait").WebDriverWait
+pytest.importorskip("trimesh")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+DRIVER = shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no chromium with its chromedriver")
+
+FLAGS = (
+    *("headless", "no-sandbox", "disable-gpu", "enable-unsafe-swiftshader", "disable-quic", "no-first-run"),
+    *("disable-background-networking", "disable-component-update", "disable-sync", "disable-extensions"),
+    *("hide-scrollbars", "window-size=700,500"),
+)
+STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
+
+PIXELS = """
+const done = arguments[0];
+page.stage.draw();
+requestAnimationFrame(() => requestAnimationFrame(() => {
+  const source = page.stage.renderer.domElement, canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [source.width, source.height];
+  const pen = canvas.getContext("2d");
+  pen.drawImage(source, 0, 0);
+  const pixels = new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer);
+  let sum = 0;
+  for (const pixel of pixels) sum = (31 * sum + pixel) % 4294967291;
+  done([new Set(pixels).size, sum]);
+}));
+"""
+SET = """
+const [id, value] = arguments, control = document.getElementById(id);
+if (control.type === "checkbox") control.checked = value; else control.value = value;
+for (const kind of ["input", "change"]) control.dispatchEvent(new Event(kind, { bubbles: true }));
+"""
+
+
+class Browser:
+    """A browser with one page open."""
+
+    def __init__(self, driver):
+        self.driver = driver
+
+    def open(self, path):
+        self.logged()
+        self.driver.get(path.as_uri())
+        wait = WebDriverWait(self.driver, 30, 0.05)
+        wait.until(lambda _: self("return Boolean(globalThis.page) || !message.hidden"))
+        assert self("return message.textContent") == ""
+
+    def __call__(self, script, *values):
+        return self.driver.execute_script(script, *values)
+
+    def pixels(self):
+        """Number of colors, and a number that differs from picture to picture."""
+        return tuple(self.driver.execute_async_script(PIXELS))
+
+    def set(self, name, value):
+        self(SET, name, value)
+
+    def click(self, name):
+        self("document.getElementById(arguments[0]).click()", name)
+
+    def array(self, what):
+        return np.array(self(f"return Array.from({what})"))
+
+    def logged(self):
+        """Messages of the console, and addresses asked for, since the last call."""
+        messages = [entry["message"] for entry in self.driver.get_log("browser")]
+        # the browser itself reads pixels where it has no screen
+        messages = [text for text in messages if "GL Driver Message" not in text]
+        events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
+        asked = [e["params"] for e in events if e["method"] == "Network.requestWillBeSent"]
+        # the first tab asks for parts of the browser
+        return messages, [a["request"]["url"] for a in asked if a["documentURL"].startswith("file:")]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS, f"user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    driver.set_script_timeout(30)
+    yield Browser(driver)
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def model():
+    model = kl.Model(kl.box((4, 1, 1), (4, 2, 2), element="KinematicLinear3D20N"), STEEL)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0, 0, -1e6)))
+    return model
+
+
+@pytest.fixture(scope="module")
+def result(model):
+    return model.solve()
+
+
+@pytest.fixture(scope="module")
+def written(result, tmp_path_factory):
+    path = tmp_path_factory.mktemp("pages") / "beam.html"
+    kl.write(path, result)
+    return path
+
+
+@pytest.fixture
+def page(browser, written):
+    browser.open(written)
+    return browser
+
+
+def test_a_page_opens_without_a_message_or_a_request(browser, written):
+    browser.open(written)
+    assert browser.logged() == ([], [written.as_uri()])
+    colors, _ = browser.pixels()
+    assert colors > 100
+
+
+def test_controls_change_the_picture(page):
+    seen = {page.pixels()}
+    for name, value in (
+        *(("field", "0:z"), ("scale", 2), ("low", "-1"), ("edges", False), ("outline", False)),
+        *(("axis", "x"), ("depth", 0.3), ("flip", True), ("field", "3:")),
+    ):
+        page.set(name, value)
+        before = len(seen)
+        seen.add(page.pixels())
+        assert len(seen) > before, f"{name} {value}"
+    page("document.querySelector('[data-view=\"1,0,0\"]').click()")
+    assert page.pixels() not in seen
+
+
+def test_dragging_turns_the_body(page):
+    before = page.pixels()
+    view = page.driver.find_element("id", "view")
+    actions = webdriver.ActionChains(page.driver)
+    actions.move_to_element(view).click_and_hold().move_by_offset(80, 30).release().perform()
+    assert page.pixels() != before
+
+
+def test_every_component_is_that_of_the_result(page, result):
+    stress = result.stress("node")
+    sigma = np.linalg.eigvalsh(stress[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]])[:, ::-1]
+    wanted = {
+        "0:magnitude": np.linalg.norm(result.u, axis=1),
+        "0:z": result.u[:, 2],
+        "1:von Mises": result.von_mises("node"),
+        "1:Tresca": sigma[:, 0] - sigma[:, 2],
+        **{f"1:principal {i + 1}": sigma[:, i] for i in range(3)},
+        **{f"1:{name}": stress[:, i] for i, name in enumerate(("xx", "yy", "zz", "xy", "yz", "zx"))},
+        "2:x": result.reaction()[:, 0],
+        "3:": result.error().per_element,
+    }
+    choices = page("return [...field.options].map((option) => option.value)")
+    assert set(wanted) <= set(choices)
+    assert len(choices) == 4 + 11 + 4 + 1
+    for choice, values in wanted.items():
+        page.set("field", choice)
+        assert (
+            abs(page.array("page.values") - values).max()
+            <= 1e-6 * abs(stress if choice[0] == "1" else values).max()
+        )
+        low, high = page("return page.range")
+        assert abs(low - values.min()) + abs(high - values.max()) <= 2e-6 * abs(values).max() + 1e-6 * abs(
+            stress
+        ).max() * (choice[0] == "1")
+
+
+def test_the_legend_has_unit_and_range(page, result):
+    page.set("field", "1:xx")
+    assert page("return [quantity.textContent, unit.textContent]") == ["stress, xx", "MPa"]
+    ticks = [float(text) for text in page("return [...ticks.children].map((tick) => tick.textContent)")]
+    xx = result.stress("node")[:, 0] / 1e6
+    wanted = np.linspace(xx.min(), xx.max(), 5)
+    assert abs(np.array(ticks) - wanted).max() < 1e-3 * abs(wanted).max()
+    page.set("low", "-5")
+    page.set("high", "7,5")
+    assert page("return page.range") == [-5e6, 7.5e6]
+    assert page("return ticks.children[2].textContent") == "1.25"
+    page.click("refit")
+    assert page("return page.range[1] > 7.6e6")
+
+
+def test_deformation_moves_the_surface(page, result):
+    base = page("return page.data.scale")
+    for share in (0, 0.5, 2):
+        page.set("scale", share)
+        moved = page.array("page.positions").reshape(-1, 3) + page("return page.data.center")
+        assert abs(moved - result.mesh.points - share * base * result.u).max() < 1e-5
+    assert page("return document.getElementById('scale-name').textContent") == f"× {2 * base:g}"
+
+
+@pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D10N", "KinematicLinear3D15N"])
+def test_a_cut_shows_the_section_and_its_values(browser, element, tmp_path):
+    model = kl.Model(kl.box((3, 2, 1), (3, 2, 2), element=element), kl.Isotropic3D(E=1e6, nu=0.0))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e3, 0, 0)))
+    kl.write(tmp_path / "bar.html", model.solve())
+    browser.open(tmp_path / "bar.html")
+    browser.set("scale", 0)
+    browser.set("field", "0:x")
+    browser.set("axis", "x")
+    for depth, flip in ((0.2, False), (0.7, True)):
+        browser.set("depth", depth)
+        browser.set("flip", flip)
+        x = (depth - 0.5) * 2 * browser("return page.data.reach[0]")
+        P = browser.array("page.section.positions").reshape(-1, 3, 3)
+        area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1).sum() / 2
+        assert abs(area - 2.0) < 1e-4
+        assert abs(P[..., 0] - x).max() < 1e-5
+        X = x + browser("return page.data.center[0]")
+        assert abs(browser.array("page.section.values") - 1e-3 * X).max() < 1e-7
+        lines = browser.array("page.section.lines").reshape(-1, 2, 3)
+        length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
+        # rectangles, each with all its sides; triangles of cells that are no bricks add diagonals
+        assert length > 2 * 2 * (2 + 1) - 1e-3
+
+
+def meters(text):
+    value, unit = text.split()
+    return float(value) * {"m": 1, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}[unit]
+
+
+def test_the_pointer_tells_node_element_and_value(page, result):
+    page.set("field", "0:magnitude")
+    page.set("scale", 0)
+    for direction in ("1,0,0", "0,0,1"):
+        page(f"document.querySelector('[data-view=\"{direction}\"]').click()")
+        page.pixels()
+        view = page.driver.find_element("id", "view")
+        webdriver.ActionChains(page.driver).move_to_element(view).move_by_offset(17, 11).perform()
+        text = page("return pointer.hidden ? '' : pointer.textContent")
+        value, node, place, nodal, element = re.fullmatch(
+            r"(\S+ .?m)\nnode (\d+) at \((.*)\) m: (\S+ .?m)\nelement (\d+)", text
+        ).groups()
+        row, mesh = result.mesh.node_ids.tolist().index(int(node)), result.mesh
+        cell = mesh.blocks[0].nodes[mesh.element_ids.tolist().index(int(element))]
+        assert row in cell
+        assert abs(np.array(place.split(", "), float) - mesh.points[row]).max() < 1e-4
+        size = np.linalg.norm(result.u, axis=1)
+        assert abs(meters(nodal) - size[row]) < 1e-4 * size.max()
+        assert size[cell].min() * 0.99 <= meters(value) <= size[cell].max() * 1.01
+    corner = view.size["width"] // 2 - 6, view.size["height"] // 2 - 6
+    webdriver.ActionChains(page.driver).move_to_element_with_offset(view, *corner).perform()
+    assert page("return pointer.hidden")
+
+
+def test_the_pointer_sees_the_section_behind_what_is_cut_away(page):
+    page.set("axis", "x")
+    page.set("depth", 0.4)
+    page("document.querySelector('[data-view=\"1,0,0\"]').click()")
+    page.pixels()
+    found = page("return page.find(...page.stage.ray(view.clientWidth / 2, view.clientHeight / 2))")
+    assert abs(found["point"][0] - page("return page.offset")) < 1e-4
+
+
+def test_animation_moves_the_body_and_stops(page):
+    page.click("play")
+    seen = {page.pixels() for _ in range(5)}
+    assert len(seen) > 1
+    page.click("play")
+    assert page("return page.phase") == 1
+    assert page.pixels() == page.pixels()
+
+
+def test_modes_swing_to_both_sides(browser, model, tmp_path):
+    from kratos_lite.io.writers.page.write import write_modes_page
+
+    omega, shapes = model.modes(3)
+    write_modes_page(tmp_path / "modes.html", model.mesh, omega, shapes)
+    browser.open(tmp_path / "modes.html")
+    names = [f"{i}: {w / (2 * np.pi):.5g} Hz" for i, w in enumerate(omega, 1)]
+    seen = set()
+    for i, name in enumerate(names):
+        browser.set("frame", i)
+        assert browser("return document.getElementById('frame-name').textContent") == name
+        seen.add(browser.pixels())
+    assert len(seen) == 3
+    browser.click("play")
+    wait = WebDriverWait(browser.driver, 10, 0.02)
+    for sign in (-1, 1):
+        wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
+
+
+def test_states_play_with_one_range_for_all(browser, model, tmp_path):
+    transient = model.transient()
+    with kl.SeriesWriter(tmp_path / "swing.html", transient) as series:
+        states = [transient.state(), *kl.integrate(transient, 2e-4, 6)]
+        for state in states:
+            series.add(state)
+    browser.open(tmp_path / "swing.html")
+    largest = max(np.linalg.norm(state.u, axis=1).max() for state in states)
+    assert abs(browser("return page.range[1]") - largest) < 1e-4 * largest
+    assert browser("return Number(frame.max)") == 6
+    first = browser.pixels()
+    browser.set("frame", 6)
+    assert browser("return document.getElementById('frame-name').textContent") == "t = 0.0012 s"
+    assert browser.pixels() != first
+    assert abs(browser.array("page.displacement") - states[6].u.ravel()).max() < 1e-4 * largest
+    browser.click("play")
+    wait = WebDriverWait(browser.driver, 10, 0.02)
+    wait.until(lambda _: browser("return page.frame") != 6)
+
+
+def test_a_narrow_window_keeps_body_and_controls_apart(page):
+    size = page.driver.get_window_size()
+    page.driver.set_window_size(500, 700)
+    try:
+        colors, _ = page.pixels()
+        assert colors > 100
+        view, aside = (
+            page(
+                "const box = document.querySelector(arguments[0]).getBoundingClientRect();"
+                "return [box.top, box.bottom, box.width]",
+                name,
+            )
+            for name in ("main", "aside")
+        )
+        assert view[1] <= aside[0] + 1
+        assert view[2] == aside[2]
+    finally:
+        page.driver.set_window_size(size["width"], size["height"])
+
+
+def test_without_webgl_a_page_says_so(browser, written, tmp_path):
+    text = written.read_text(encoding="utf-8").replace(
+        "<head>", "<head><script>HTMLCanvasElement.prototype.getContext = () => null</script>"
+    )
+    (tmp_path / "blind.html").write_text(text, encoding="utf-8")
+    browser.driver.get((tmp_path / "blind.html").as_uri())
+    wait = WebDriverWait(browser.driver, 30, 0.05)
+    wait.until(lambda _: browser("return !message.hidden"))
+    assert "needs WebGL" in browser("return message.textContent")
