@@ -17,11 +17,11 @@ struct View {
     }
 };
 
-std::vector<int64_t> offsets(const Object& text, const std::string& word) {
-    const View view(text);
-    require(!word.empty(), "the word must not be empty");
+std::vector<int64_t> offsets(const Object& text, const Object& word) {
+    const View view(text), letters(word);
+    require(letters.size > 0, "the word must not be empty");
     GilReleased release;
-    return find_word(view.data, view.size, word);
+    return find_word(view.data, view.size, std::string(letters.data, letters.size));
 }
 
 // The rows of text[begin:end] as (integers, reals, lines), or None if any line is not one plain row.
