@@ -12,9 +12,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.io.writers.page.content import exaggeration
-from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face, sharp_edges
+from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face
 from kratos_lite.shapes import LINEAR, SHAPES
+from kratos_lite.view.facets import sharp_edges
 
 CELLS = [
     *("Tetrahedron4", "Tetrahedron10", "Hexahedron8", "Hexahedron20", "Hexahedron27"),
@@ -115,14 +115,6 @@ def test_sharp_edges_of_a_box_are_its_twelve():
     assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 4 * (3 + 2 + 1)) < 1e-12
 
 
-def test_exaggeration_is_a_round_number():
-    X, u = np.array([[0.0, 0, 0], [3, 4, 0]]), np.array([[0.0, 0, 0], [0, 0, 1e-3]])
-    assert exaggeration(X, [u], least=1.0) == 500
-    assert exaggeration(X, [1e4 * u], least=1.0) == 1
-    assert exaggeration(X, [1e4 * u], least=0.0) == 0.05
-    assert exaggeration(X, [0 * u], least=1.0) == 1
-
-
 def test_a_page_holds_mesh_and_fields(result, tmp_path):
     pytest.importorskip("trimesh")
     kl.write(tmp_path / "a.html", result)
@@ -189,6 +181,27 @@ def test_a_trimesh_without_three_js_is_named(result, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(KratosLiteError, match=r"viewer.zip: no three.js is found there"):
         kl.write(tmp_path / "a.html", result)
+
+
+def test_modes_keep_their_shapes_and_have_names(tmp_path):
+    pytest.importorskip("trimesh")
+    mesh, shapes = kl.box(), np.random.default_rng(2).normal(size=(2, 8, 3))
+    kl.write_modes(tmp_path / "m.html", mesh, [2 * np.pi, 20 * np.pi], shapes)
+    content = content_of(tmp_path / "m.html")
+    assert [frame["name"] for frame in content["frames"]] == ["1: 1 Hz", "2: 10 Hz"]
+    for frame, shape in zip(content["frames"], shapes, strict=True):
+        assert abs(frame["values"][0] - shape / np.linalg.norm(shape, axis=1).max()).max() < 2e-5
+
+
+def test_modes_of_another_mesh_are_refused(tmp_path):
+    pytest.importorskip("trimesh")
+    with pytest.raises(InputError, match=r"\(k,\) and \(k, 8, 3\); got \(1,\) and \(1, 7, 3\)"):
+        kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.zeros((1, 7, 3)))
+    with pytest.raises(InputError, match=r"not finite"):
+        kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.full((1, 8, 3), np.nan))
+    with pytest.raises(InputError, match=r"the ending must be .html"):
+        kl.write_modes(tmp_path / "m.txt", kl.box(), [1.0], np.zeros((1, 8, 3)))
+    assert not list(tmp_path.iterdir())
 
 
 def test_only_vtu_files_have_a_mode(result, tmp_path):
