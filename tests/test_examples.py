@@ -61,23 +61,12 @@ def test_python_of_each_page_runs_from_top_to_bottom(page, tmp_path):
     blocks = python_blocks((DOCS / page).read_text())
     script = tmp_path / "page.py"
     script.write_text("\n".join(blocks))
-    out = run(sys.executable, "-W", "error", script, cwd=tmp_path)
+    run(sys.executable, "-W", "error", script, cwd=tmp_path)
     if page == "howto/moving-material.md":
         lines = re.findall(r"^kratos-lite (.*)$", (DOCS / page).read_text(), re.M)
         assert len(lines) == 6
         for line in lines:
             run(sys.executable, "-m", "kratos_lite", *line.split(), cwd=tmp_path)
-    if page == "exercises.md":
-        shares = [float(share) for share in re.findall(r"(\S+) of the beam", out)]
-        assert len(shares) == 4
-        assert shares[0] < shares[1] < 1  # linear elements are too stiff
-        assert all(abs(share - 1) < 0.01 for share in shares[2:])
-        flips = float(re.search(r"time between flips: (\S+) s", out).group(1))
-        assert flips == pytest.approx(14.965995, abs=1e-3)  # half a period of W, by elliptic functions
-        orders = [float(order) for order in re.findall(r"order (\S+)", out)]
-        assert orders == pytest.approx([2.0, 2.0, 2.0], abs=0.05)
-        shares = [float(share) for share in re.findall(r"lumped (\S+) of the inertia", out)]
-        assert shares == pytest.approx([1 + 2 / n**2 for n in (1, 2, 4)], abs=1e-3)
 
 
 @pytest.mark.parametrize("page", ["run-bodies.md", "models-in-time.md", "modes.md"])
