@@ -21,10 +21,14 @@ version = release = kratos_lite.__version__
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
+    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_design",
+    "command_line",
+    "docstrings",
+    "known_words",
+    "public_names",
 ]
 exclude_patterns = ["_static", "extensions", "images"]
 nitpicky = True
@@ -45,10 +49,9 @@ nb_ipywidgets_js = {}
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-napoleon_google_docstring = False
-napoleon_use_param = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
+autosummary_generate = False
+default_role = "py:obj"
+nitpick_ignore_regex = [("py:obj", ".*")]
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
 
@@ -67,8 +70,8 @@ html_theme_options = {
 }
 html_copy_source = False
 html_show_sourcelink = False
-templates_path = []
-mathjax_path = "tex-svg.js"
+html_context = {"default_mode": "auto"}
+mathjax_path = "tex-svg-full.js"
 _mathjax = next(file for file in files("sphinx-mathjax-offline") or [] if file.name == mathjax_path)
 html_static_path = ["_static", str(_mathjax.locate())]
 html_css_files = ["site.css"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Tabular", "field", "names_of", "record", "replace"]
+__all__ = ["Tabular", "aligned", "field", "names_of", "record", "replace"]
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as record
@@ -59,6 +59,17 @@ REQUIRED = object()
 """In place of the default of a field that has none."""
 
 
+def aligned(rows: list[tuple[str, str]]) -> str:
+    """Return labels and values as lines of two columns.
+
+    >>> print(aligned([("E", "210e9 Pa"), ("nu", "0.3")]))
+    E   210e9 Pa
+    nu  0.3
+    """
+    width = max((len(label) for label, _ in rows), default=0)
+    return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+
 class Tabular:
     """What is shown as a table of labels and values, printed or in a notebook."""
 
@@ -72,9 +83,7 @@ class Tabular:
         return []
 
     def __str__(self) -> str:
-        rows = self.table()
-        width = max((len(label) for label, _ in rows), default=0)
-        return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+        return aligned(self.table())
 
     def _repr_html_(self) -> str:
         from html import escape  # notebooks alone need it

@@ -27,7 +27,7 @@ class Rotation(Motion):
     The center may travel by Z(t).  A material point that starts at Y in the undeformed body has turned to
     X = R(t) Y, measured from the center, and is at x(t) = X + u(t, X) + Z(t).  So u and the mesh are given in
     axes that travel with the center, but keep their directions, those of x, y and z in space.  With
-    X' = rate A X along the way of the material point
+    X' = rate A X along the way of the material point::
 
         x'  = u'  + rate (c·grad) u + rate A X + Ż
         x'' = u'' + 2 rate (c·grad) u' + acceleration (c·grad) u + rate² (c·grad)² u

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.columns import AXES, COMPONENTS
+from kratos_lite.analysis.columns import COMPONENTS
 from kratos_lite.analysis.element_fields import ElementFields
 from kratos_lite.analysis.point_values import PointValues
 from kratos_lite.mesh.crossings import crossings
@@ -16,6 +18,8 @@ from kratos_lite.validation import choice
 
 GAUSS_POINTS = 5
 """On the part of a line in one element: exact to degree 9 of x σ."""
+ZERO = 1e-10
+"""Share of the largest stress that is drawn as 0: rounding."""
 
 
 class LineValues(PointValues):
@@ -93,27 +97,67 @@ class LineValues(PointValues):
         """
         return {"distance [m]": self.distance, **super().columns()}
 
-    def curve(self, values: str = "von_mises") -> tuple[Array, str]:
-        """Return one number for each point, with its name and unit.
+    def plot(
+        self,
+        path: str | Path | None = None,
+        values: str = "von_mises",
+        *,
+        title: str = "",
+        size: tuple[float, float] = (6, 4),
+    ) -> Any:
+        """Draw values along the line; of a stress component also its membrane and bending part.
 
         Parameters
         ----------
-        values : ``"von_mises"``, ``"tresca"``, a component ``xx yy zz xy yz zx`` of the stress, or an axis
-            ``x y z`` of the displacement.
+        path : picture to write; .png, .pdf or .svg.
+        values : ``von_mises``, ``tresca``, ``s1``, ``s2``, ``s3``, ``sxx`` … ``szx``, ``displacement``,
+            ``ux``, ``uy``, ``uz``, or strains ``e1`` … ``ezx``.
+        title : above the picture.
+        size : width and height in inches, at 150 dots per inch.
 
         Returns
         -------
-        (n,) and str
+        matplotlib.figure.Figure
 
         Raises
         ------
         InputError
-            There are no such values.
+            There are no such values, or the file cannot be written.
+        KratosLiteError
+            matplotlib is missing.
         """
-        choice(values, "values", ("von_mises", "tresca", *COMPONENTS, *AXES))
-        if values in COMPONENTS:
-            return self.stress[:, COMPONENTS.index(values)], f"stress {values} [Pa]"
-        if values in AXES:
-            return self.displacement[:, AXES.index(values)], f"displacement {values} [m]"
-        name = "von Mises stress [Pa]" if values == "von_mises" else "Tresca stress [Pa]"
-        return getattr(self, values), name
+        from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
+        from kratos_lite.view.canvas import save
+        from kratos_lite.view.curves import curves_figure
+
+        choice(values, "values", [name for name in NAMES if name not in ("reaction", "error")])
+        shown = named_values(_AsNodes(self), values)
+        curves = {shown.title: shown.numbers}
+        if shown.unit == "Pa":
+            seen = np.abs(shown.numbers) > ZERO * np.abs(self.stress).max()
+            curves[shown.title] = np.where(seen, shown.numbers, 0.0)
+        if values[1:] in COMPONENTS and shown.unit == "Pa":
+            i = COMPONENTS.index(values[1:])
+            curves["membrane and bending"] = self.linear[:, i]
+            curves["membrane"] = np.full(len(self.distance), self.membrane[i])
+        figure = curves_figure(self.distance, curves, unit=shown.unit, title=title, size=size)
+        if path is not None:
+            save(figure, path)
+        return figure
+
+
+class _AsNodes:
+    """Points in place of nodes, for what takes values by their names."""
+
+    def __init__(self, points: PointValues) -> None:
+        self._points = points
+        self.u, self.reactions, self.mesh = points.displacement, np.zeros((0, 3)), points._fields.mesh
+
+    def stress(self, at: str) -> Array:
+        return self._points.stress
+
+    def strain(self, at: str) -> Array:
+        return self._points.strain
+
+    def error(self) -> Any:
+        raise NotImplementedError

@@ -14,7 +14,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.records import Tabular
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import choice, finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
@@ -277,6 +277,54 @@ class Result(ElementFields, Tabular):
         if report.error is None:
             return str(self._error)
         return f"{report.error:.2%} of {report.error_of}, from {len(report.history)} meshes"
+
+    # ---- for other programs ----------------------------------------------------------------------
+
+    def columns(self) -> dict[str, Numbers]:
+        """Return ids, places, displacements, reactions and recovered stresses of the nodes.
+
+        Returns
+        -------
+        dict of str to (n,) array
+            By headers with units; ``kl.write("nodes.csv", result)`` writes them.
+        """
+        from kratos_lite.analysis.fields import nodal_columns  # a quick start for results
+
+        return nodal_columns(self)
+
+    def to_dataframe(self) -> Any:
+        """Return the columns as a data frame of pandas, one row for each node.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        KratosLiteError
+            pandas is not installed.
+        """
+        from kratos_lite.analysis.columns import data_frame
+
+        return data_frame(self.columns())
+
+    def to_pyvista(self) -> Any:
+        """Return the mesh with all fields of nodes and elements as a grid of PyVista.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            With DISPLACEMENT, REACTION, CAUCHY_STRESS_VECTOR (xx yy zz xy yz xz), VON_MISES_STRESS, …
+
+        Raises
+        ------
+        KratosLiteError
+            PyVista is not installed.
+        """
+        from kratos_lite.analysis.fields import fields
+        from kratos_lite.mesh.vtk import pyvista_grid
+
+        return pyvista_grid(self.mesh, *fields(self))
 
     def plot(
         self, path: str | Path | None = None, values: ArrayLike | str | None = None, **options: Any

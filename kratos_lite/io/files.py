@@ -114,9 +114,10 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
 
     Parameters
     ----------
-    path : a result goes to .vtu, .vtk, .json or .html, a page for the browser; a state to .npz, from which
-        `read_state` reads it; a model or a mesh to .mdpa, an .elem set, .vtu or a format of meshio.
-    thing : a `Result`, `State`, `Model` or `Mesh`.
+    path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
+        values at points to .csv; a state to .npz, from which `read_state` reads; a model or a mesh to .mdpa,
+        an .elem set, .vtu or a format of meshio.
+    thing : a `Result`, what its `at` or `along` returns, a `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 
     Returns
@@ -132,11 +133,13 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         three.js is missing, which a page needs.
     """
     from kratos_lite.analysis.model import Model
+    from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.result import Result
     from kratos_lite.analysis.state import State
     from kratos_lite.io.formats.document import Document
     from kratos_lite.io.writers.results import write_result
     from kratos_lite.io.writers.state import write_state
+    from kratos_lite.io.writers.table import write_table
     from kratos_lite.mesh import Mesh
 
     path = path_of(path)
@@ -145,6 +148,9 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return []
     if mode is not None:
         raise InputError(f"{path}: only .vtu files of results have a mode; leave the mode out")
+    if isinstance(thing, PointValues):
+        write_table(path, thing.columns())
+        return []
     if isinstance(thing, State):
         write_state(path, thing)
         return []
@@ -155,7 +161,8 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
         return [str(note) for note in document.notes] + write_document(path, document)
     if isinstance(thing, (Mesh, Document)):
         return write_document(path, _document_of(thing) if isinstance(thing, Mesh) else thing)
-    raise InputError(f"a Result, State, Model or Mesh can be written; got {type(thing).__name__}")
+    known = "a Result, PointValues, State, Model or Mesh"
+    raise InputError(f"{known} can be written; got {type(thing).__name__}")
 
 
 def _document_of(mesh: Mesh) -> Document:

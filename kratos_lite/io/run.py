@@ -11,6 +11,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.model.structure import Structure
+from kratos_lite.records import aligned
 from kratos_lite.typing import Progress
 
 ANALYSES = {
@@ -107,6 +108,5 @@ def describe_case(case: Case) -> str:
     name = case.files[0].name
     if not case.is_of_model:
         return f"{'file':<22}{name}\n{runner_of(case).describe(case)}"
-    rows = [("file", name), *case.model.table(), *([("time", str(case.time))] if case.time else [])]
-    width = max(len(label) for label, _ in rows)
-    return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+    time = [("time", str(case.time))] if case.time else []
+    return aligned([("file", name), *case.model.table(), *time])

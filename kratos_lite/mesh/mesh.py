@@ -282,6 +282,26 @@ class Mesh(Cells, Tabular):
         found = locate(self, points)
         return found.require() if required else found
 
+    # ---- for other programs ------------------------------------------------------------------
+
+    def to_pyvista(self) -> Any:
+        """Return the mesh as a grid of PyVista, with the ids of nodes, elements and properties.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+
+        Raises
+        ------
+        InputError
+            VTK has no number for the shape of an element.
+        KratosLiteError
+            PyVista is not installed.
+        """
+        from kratos_lite.mesh.vtk import mesh_fields, pyvista_grid  # rarely needed
+
+        return pyvista_grid(self, *mesh_fields(self))
+
     # ---- summary ---------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:

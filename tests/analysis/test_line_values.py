@@ -116,5 +116,22 @@ def test_unsound_lines_are_refused():
         result.along((0, 0, 0), (1, 1, 1), n=1)
     with pytest.raises(kl.MeshError, match=r"point 5 .* lies outside the mesh"):
         result.along((0, 0, 0), (2, 0, 0), n=9)
-    with pytest.raises(kl.InputError, match="values must be one of von_mises"):
-        result.along((0, 0, 0), (1, 0, 0)).curve("mises")
+    with pytest.raises(kl.InputError, match=r"values must be one of displacement, .*Did you mean von_mises"):
+        result.along((0, 0, 0), (1, 0, 0)).plot(values="von_misses")
+
+
+def test_plot_draws_the_stress_with_its_parts(tmp_path):
+    pytest.importorskip("matplotlib")
+    mesh = kl.box((2, 1, 1), cells=(2, 2, 2), element="KinematicLinear3D20N")
+    x, y, _ = mesh.points.T
+    result = held(mesh, 1e-3 * np.array([x * y, 0 * x, 0 * x]).T, kl.Isotropic3D(E=E, nu=0.0))
+    line = result.along((1, 0, 0.5), (1, 1, 0.5), n=11)
+    axes = line.plot(tmp_path / "line.png", "sxx").axes[0]
+    drawn = {curve.get_label(): curve.get_xydata() for curve in axes.lines}
+    assert list(drawn) == ["stress xx", "membrane and bending", "membrane"]
+    assert np.abs(drawn["stress xx"].T - [line.distance, 200 * line.distance]).max() < 1e-9
+    assert np.abs(drawn["membrane"][:, 1] - 100).max() < 1e-9
+    assert (tmp_path / "line.png").stat().st_size > 10_000
+    for values in ("von_mises", "s1", "ux", "exx", "displacement"):
+        assert len(line.plot(values=values).axes[0].lines) == 1
+    assert (line.plot(values="szz").axes[0].lines[0].get_ydata() == 0).all()  # not its rounding

@@ -347,7 +347,7 @@ def test_wrong_tables_and_outputs_are_told_with_their_place(run, folder, changes
         (("--time", "1:3", "-o", "tower.mdpa"), ("is an input or another output",)),
         (("--time", "1:3", "-o", "a.npz", "--state", "a.npz"), ("is an input or another output",)),
         (("-o", "a.pvd"), ("a.pvd: .pvd holds states in time; add --time STEP:STEPS, or write .vtu",)),
-        (("-o", "a.csv"), ("a.csv: .csv holds states in time",)),
+        (("-o", "a.npz"), ("a.npz: .npz holds states in time",)),
         *(
             ((f"--{name}", *value), (f"--{name} belongs to a time integration; add --time STEP:STEPS",))
             for name, value in (

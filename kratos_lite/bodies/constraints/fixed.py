@@ -73,12 +73,12 @@ class FixDirection(AlongDirection):
 class RigidLink(Constraint):
     """A rod without mass from a material point to a fixed point in space.
 
+    The length is the distance at the time when the constraint is made.
+
     Parameters
     ----------
     point : (3,) m, in the undeformed body.
     anchor : (3,) m, in space.
-
-    The length is the distance at the time when the constraint is made.
     """
 
     turning = True

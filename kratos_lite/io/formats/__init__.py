@@ -94,7 +94,7 @@ def _write(path: str | Path, document: Document) -> list[str]:
         return [str(note) for note in write_elem(path, document)]
     if kind in ("", ".json"):
         raise InputError(f"{path}: a model cannot be written as {kind or 'a file without ending'}; try .mdpa")
-    from kratos_lite.io.writers.results import mesh_fields
+    from kratos_lite.mesh.vtk import mesh_fields
 
     points, cells = mesh_fields(document.mesh)
     if kind == ".vtu":

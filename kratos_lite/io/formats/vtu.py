@@ -15,7 +15,8 @@ import numpy as np
 from kratos_lite import voigt
 from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.vtk import vtk_cells, with_shape
 from kratos_lite.native import threads
 from kratos_lite.typing import Numbers
 
@@ -25,6 +26,7 @@ _HEAD = """<?xml version="1.0"?>
 _TYPES = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "|u1": "UInt8"}
 _COMPONENTS = {3: tuple("XYZ"), 6: voigt.NAMES}
 
+CELLS = ("connectivity", "offsets", "types")
 MODES = ("binary", "compressed", "ascii")
 """How the numbers of a file are stored."""
 BLOCK = 1 << 20
@@ -73,11 +75,8 @@ def write_vtu(
     if Path(path).suffix.lower() == ".gz":
         raise InputError(f"{path}: ParaView reads no gzipped file; write it as .vtu")
     check_mode(mode)
-    blocks = [block for block in mesh.blocks if block.shape is not None]
-    cells = _checked(cell_data or {}, mesh.n_elements, "element")
-    if len(blocks) < len(mesh.blocks):
-        keep = np.repeat([block.shape is not None for block in mesh.blocks], [len(b) for b in mesh.blocks])
-        cells = [(name, array[keep]) for name, array in cells]
+    blocks, keep = with_shape(mesh)
+    cells = [(name, array[keep]) for name, array in _checked(cell_data or {}, mesh.n_elements, "element")]
     refuse_nan(path, "a coordinate", mesh.points)
     for name, values in (*(point_data or {}).items(), *cells):
         refuse_nan(path, name, values)
@@ -85,7 +84,7 @@ def write_vtu(
         "PointData": _checked(point_data or {}, mesh.n_nodes, "node"),
         "CellData": cells,
         "Points": [("Points", mesh.points.astype("<f8", copy=False))],
-        "Cells": _cells(blocks, mesh.n_nodes),
+        "Cells": list(zip(CELLS, vtk_cells(blocks, mesh.n_nodes), strict=True)),
     }
     arrays = [np.ascontiguousarray(array) for group in groups.values() for _, array in group]
     stored = [[] if mode == "ascii" else _compressed(a) if mode == "compressed" else _raw(a) for a in arrays]
@@ -178,28 +177,6 @@ def _checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
         kind = "<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8"
         checked.append((name, array.astype(kind, copy=False)))
     return checked
-
-
-def _cells(blocks: list[Block], n_nodes: int) -> Named:
-    """Return the three arrays that describe the cells, in the node order of VTK."""
-    size = sum(block.nodes.size for block in blocks)
-    index = "<i4" if max(size, n_nodes) < 2**31 else "<i8"
-    nodes = np.empty(size, dtype=index)
-    at = 0
-    for block in blocks:
-        assert block.shape is not None
-        if not block.shape.vtk:
-            raise InputError(f"{block.name}: {block.shape.__name__} has no VTK number; set its `vtk`")
-        nodes[at : at + block.nodes.size] = block.nodes[:, list(block.shape.to_vtk)].ravel()
-        at += block.nodes.size
-    counts = [len(block) for block in blocks]
-    sizes = np.repeat([block.nodes.shape[1] for block in blocks], counts)
-    types = np.repeat([block.shape.vtk for block in blocks if block.shape is not None], counts)
-    return [
-        ("connectivity", nodes),
-        ("offsets", np.cumsum(sizes, dtype=index)),
-        ("types", types.astype("|u1")),
-    ]
 
 
 def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, places: Iterator[str]) -> str:

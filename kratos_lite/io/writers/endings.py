@@ -6,8 +6,8 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".vtk", ".json", ".html")
-"""Formats that keep every field on nodes and elements; most others of meshio drop them unsaid."""
+RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv")
+"""Formats that keep fields on nodes; most others of meshio drop them unsaid."""
 SERIES = (".pvd", ".html", ".csv", ".npz")
 """Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
 

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.state import State, at, check_state_of_body
 from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.bodies import Body
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.io.writers.results import fields
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 

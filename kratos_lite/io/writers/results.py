@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, and `.html` for the browser."""
+"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, `.html` for the browser, `.csv` of nodes."""
 
 from __future__ import annotations
 
@@ -6,54 +6,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kratos_lite import voigt
+from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
 from kratos_lite.io.writers.endings import check_result
+from kratos_lite.io.writers.table import write_table
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
-    from kratos_lite.mesh import Mesh
-
-Array = NDArray[Any]
-
-
-def mesh_fields(mesh: Mesh) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return the point and cell data that every file carries: ids of nodes, elements and properties."""
-    none = np.zeros(0, dtype=np.int64)
-    properties = np.concatenate([none, *(block.properties for block in mesh.blocks)])
-    return {"NODE_ID": mesh.node_ids}, {"ELEMENT_ID": mesh.element_ids, "PROPERTIES_ID": properties}
-
-
-def fields(result: Result) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return point data and cell data of a result under their Kratos names."""
-    points, cells = mesh_fields(result.mesh)
-    nodal, mean = result.stress("node"), result.stress("element")
-    points = {
-        "DISPLACEMENT": result.displacement(),
-        "REACTION": result.reaction(),
-        "CAUCHY_STRESS_VECTOR": nodal,
-        "VON_MISES_STRESS": voigt.von_mises(nodal),
-        **points,
-    }
-    cells = {
-        "CAUCHY_STRESS_VECTOR": mean,
-        "VON_MISES_STRESS": voigt.von_mises(mean),
-        "ENERGY_NORM_ERROR": result.error().per_element,
-        **cells,
-    }
-    return points, cells
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json or .html."""
+    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json, .html or .csv."""
     check_result(path, mode)
     ending = Path(path).suffix.lower()
     if ending == ".json":
         write_json(path, result)
+        return
+    if ending == ".csv":
+        write_table(path, result.columns())
         return
     if ending == ".html":
         from kratos_lite.io.writers.page.write import write_result_page  # rarely needed

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face, sharp_edges
+from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face
 from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
+from kratos_lite.view.facets import sharp_edges
+from kratos_lite.view.rulers import rounded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_CELLS = 250_000
 """Elements up to which the page knows the inside, for cuts."""
-MOST_EDGED = 20_000
+MOST_EDGED = 5_000
 """Faces up to which their edges are shown at the start."""
 QUANTUM = 30_000
 """Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""
@@ -92,7 +94,7 @@ class Content:
             "title": self.title,
             "kind": self.kind,
             "shown": self.shown,
-            "about": list(self.about),
+            "about": [("size", " × ".join(f"{side:.5g}" for side in self._size()) + " m"), *self.about],
             "fields": [vars(field) for field in self.fields],
             **self._frame(),
             **_mesh(data, self.mesh, kept, self._center()),
@@ -113,8 +115,14 @@ class Content:
 
     def scale(self) -> float:
         """Return the factor on displacements at the start."""
-        displacements = [frame.values[0] for frame in self.frames]
-        return exaggeration(self.mesh.points, displacements, least=0.0 if self.kind == "modes" else 1.0)
+        largest = max(float(np.linalg.norm(frame.values[0], axis=1).max()) for frame in self.frames)
+        if not largest:
+            return 1.0
+        wanted = rounded(0.1 * float(np.linalg.norm(self._size())) / max(largest, 1e-100))
+        return wanted if self.kind == "modes" else max(1.0, wanted)
+
+    def _size(self) -> Array:
+        return np.asarray(np.ptp(self.mesh.points, axis=0))
 
     def _ends(self) -> tuple[Array, Array]:
         """Return the corners of the box that holds the body in all frames."""
@@ -135,16 +143,6 @@ class Content:
             "reach": ((high - low) / 2).tolist(),
             "scale": self.scale(),
         }
-
-
-def exaggeration(X: Array, displacements: Sequence[Array], least: float) -> float:
-    """Return 1, 2 or 5 times a power of ten that makes the largest displacement a tenth of the body."""
-    largest = max(float(np.linalg.norm(u, axis=1).max(initial=0.0)) for u in displacements)
-    wanted = 0.1 * float(np.linalg.norm(np.ptp(X, axis=0))) / largest if largest else 0.0
-    if wanted == 0 or wanted < least:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
 
 def _mesh(data: _Packer, mesh: Mesh, kept: Ints, center: Array) -> dict[str, Any]:
@@ -179,8 +177,9 @@ class _Packer:
         self.size, self.is_short = 0, is_short
 
     def whole(self, array: NDArray[Any]) -> dict[str, Any]:
-        """Take whole numbers, as differences from row to row."""
-        return self._take("i4", array.astype(np.int32))
+        """Take whole numbers, as differences from row to row; large ids keep all their digits."""
+        is_large = array.size > 0 and array.max() >= 2**31
+        return self._take("i8" if is_large else "i4", array.astype(np.int64 if is_large else np.int32))
 
     def real(self, array: Array) -> dict[str, Any]:
         """Take real numbers in single precision."""

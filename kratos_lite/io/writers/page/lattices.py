@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Block
 from kratos_lite.mesh.subdivision import Piece, pieces, unchanged
 from kratos_lite.shapes import LINEAR, Shape
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Mask
 
 TETRAHEDRA = {
     "tetrahedron": ((0, 1, 2, 3),),
@@ -84,21 +84,3 @@ def _on_faces(shape: type[Shape], places: Array) -> Mask:
     planes = [X[list(face[:3])] for face in LINEAR[shape.cell].faces]
     away = [(places - a) @ np.cross(b - a, c - a) for a, b, c in planes]
     return np.asarray(np.abs(away).T < 1e-9)
-
-
-def sharp_edges(mesh: Mesh) -> Ints:
-    """Return the sharp edges of the surface as rows of nodes, (e, 2)."""
-    pairs, normals = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3))]
-    for block in mesh.boundary:
-        assert block.shape is not None
-        X = mesh.points[block.nodes]
-        normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        for edge in block.shape.edges:
-            pairs.append(np.sort(block.nodes[:, list(edge)], axis=1))
-            normals.append(normal)
-    unique, which = np.unique(np.vstack(pairs), axis=0, return_inverse=True)
-    total = np.zeros((len(unique), 3))
-    np.add.at(total, which.ravel(), np.vstack(normals))
-    # Two unit normals at an angle a add up to a length of 2 cos(a/2).
-    return np.asarray(unique[np.linalg.norm(total, axis=1) < 2 * np.cos(np.radians(15))])

@@ -1,19 +1,26 @@
 // The page: what the controls mean.
 
 const $ = (id) => document.getElementById(id);
+const INK = 0x10141c;
 const FRAMES_PER_SECOND = 20, SECONDS_PER_CYCLE = 3;
 
 class Page {
   constructor(data) {
     this.data = data;
     this.frame = 0;
-    this.phase = 1;
+    [this.phase, this.quarter] = [1, 0];
     this.surface = surfaceOf(data.faces);
     this.positions = new Float32Array(data.points.length);
     const stage = this.stage = new Stage($("view"), data.radius);
-    this.body = stage.triangles(this.surface.positions, this.surface.values, this.surface.corners, true);
-    this.edges = stage.lines(this.body.geometry.attributes.position, this.surface.edges, 0x10141c, 0.45, true);
-    this.outline = stage.lines(new THREE.BufferAttribute(data.points, 3), Uint32Array.from(data.outline), 0x8a8f98, 1, true);
+    this.body = stage.triangles(true);
+    stage.reshape(this.body, this.surface.positions, this.surface.corners);
+    this.edges = stage.lines(INK, 0.45, true);
+    this.edges.geometry.setAttribute("position", this.body.geometry.attributes.position);
+    this.edges.geometry.setIndex(new THREE.BufferAttribute(this.surface.edges, 1));
+    this.outline = stage.lines(0x8a8f98, 1, true);
+    stage.reshape(this.outline, data.points, Uint32Array.from(data.outline));
+    this.cap = stage.triangles(false);
+    this.capLines = stage.lines(INK, 0.45, false);
     this.mark = stage.add(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: 0xd2342a, size: 8, sizeAttenuation: false, depthTest: false })));
     this.mark.visible = false;
     this.section = null;
@@ -36,11 +43,13 @@ class Page {
     $("field").value = data.shown;
     $("frame").max = data.frames.length - 1;
     $("of-frame").hidden = data.frames.length < 2;
+    $("of-frame").firstChild.data = data.kind === "modes" ? "Mode " : "State ";
+    $("hollow").hidden = data.cells.length > 0;
     $("edges").checked = this.edges.visible = data.edged;
     this.on("field", "change", () => this.choose());
     this.on("refit", "click", () => this.fit());
     for (const id of ["low", "high"]) this.on(id, "change", () => this.setRange());
-    this.on("frame", "input", () => this.show(Number($("frame").value)));
+    this.on("frame", "input", () => this.turnTo(Number($("frame").value)));
     this.on("scale", "input", () => this.update());
     this.on("play", "click", () => this.play());
     for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
@@ -50,6 +59,7 @@ class Page {
       button.addEventListener("click", () => this.stage.look(button.dataset.view.split(",").map(Number)));
     this.on("picture", "click", () => this.save());
     this.on("view", "pointermove", (event) => this.point(event));
+    this.on("view", "click", (event) => this.point(event));  // a finger has no other way
     this.on("view", "pointerleave", () => this.unpoint());
     this.on("view", "pointerdown", () => this.unpoint());
     this.stage.onDrawn = () => this.drawTriad();
@@ -79,11 +89,19 @@ class Page {
     this.frame = frame;
     $("frame").value = frame;
     $("frame-name").textContent = this.data.frames[frame].name;
-    this.displacement = this.data.read(this.data.frames[frame].values[0]);
+    const [first, second] = this.data.frames[frame].values.map((packed) => this.data.read(packed));
+    this.displacement = first;
+    this.later = this.data.kind === "modes" && second;  // of a complex mode, a quarter period later
     this.values = this.valuesOf(frame);
     if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
     else spread(this.surface, this.values, 1, this.surface.values);
     if (draw) this.update();
+  }
+
+  turnTo(frame) {
+    if (this.playing) this.play(false);
+    this.show(frame);
+    if (this.data.kind === "modes") this.fit();
   }
 
   fit() {
@@ -113,6 +131,8 @@ class Page {
     const { data, surface } = this, scale = Number($("scale").value) * data.scale;
     for (let i = 0; i < this.positions.length; i++)
       this.positions[i] = data.points[i] + scale * this.phase * this.displacement[i];
+    if (this.later)
+      for (let i = 0; i < this.positions.length; i++) this.positions[i] += scale * this.quarter * this.later[i];
     spread(surface, this.positions, 3, surface.positions);
     this.body.geometry.attributes.position.needsUpdate = true;
     colored(this.body, surface.values, this.range);
@@ -124,23 +144,24 @@ class Page {
   }
 
   cut() {
-    for (const mesh of [this.cap, this.capLines]) if (mesh) { this.stage.scene.remove(mesh); mesh.geometry.dispose(); mesh.material.map?.dispose(); mesh.material.dispose(); }
-    this.cap = this.capLines = this.section = null;
+    this.section = null;
     const axis = "xyz".indexOf($("axis").value || " "), sign = $("flip").checked ? -1 : 1;
     $("depth").disabled = $("flip").disabled = axis < 0;
     this.normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
     this.offset = axis < 0 ? 1e30 : sign * (2 * Number($("depth").value) - 1) * this.data.reach[axis];
     this.stage.plane.set(new THREE.Vector3(...this.normal).negate(), this.offset);
-    if (axis < 0 || !this.data.cells.length) return;
+    const hasSection = axis >= 0 && this.data.cells.length > 0;
+    this.cap.visible = hasSection;
+    this.capLines.visible = hasSection && this.edges.visible;
+    if (!hasSection) return;
     const ofElements = this.field.at === "element" ? this.values : null;
     this.section = cut(this.data.cells, this.positions, ofElements ? null : this.values, ofElements, this.normal, this.offset);
     const positions = Float32Array.from(this.section.positions), values = Float32Array.from(this.section.values);
     this.section.positions = positions;
     this.section.values = values;
-    this.cap = this.stage.triangles(positions, values, null, false);
+    this.stage.reshape(this.cap, positions);
     colored(this.cap, values, this.range);
-    this.capLines = this.stage.lines(new THREE.BufferAttribute(Float32Array.from(this.section.lines), 3), null, 0x10141c, 0.45, false);
-    this.capLines.visible = this.edges.visible;
+    this.stage.reshape(this.capLines, Float32Array.from(this.section.lines));
   }
 
   drawLegend() {
@@ -177,7 +198,7 @@ class Page {
     $("play").setAttribute("aria-pressed", on);
     $("play").textContent = on ? "■ stop" : "▶ animate";
     if (!on) {
-      this.phase = 1;
+      [this.phase, this.quarter] = [1, 0];
       this.update();
       return;
     }
@@ -190,6 +211,7 @@ class Page {
         if (frame !== this.frame) this.show(frame);
       } else {
         this.phase = this.data.kind === "modes" ? Math.cos(circle) : (1 - Math.cos(circle)) / 2;
+        this.quarter = Math.sin(circle);
         this.update();
       }
       requestAnimationFrame(turn);
@@ -246,7 +268,7 @@ class Page {
   }
 
   described({ value, node, element }) {
-    const { data, field } = this, place = [0, 1, 2].map((i) => Number((data.points[3 * node + i] + data.center[i]).toPrecision(5)));
+    const { data, field } = this, place = [0, 1, 2].map((i) => this.rounded(data.points[3 * node + i] + data.center[i]));
     const lines = [written(value, field.unit, 5)];
     lines.push(`node ${data.node_ids[node]} at (${place.join(", ")}) m`);
     if (field.at !== "element") lines[1] += `: ${written(this.values[node], field.unit, 5)}`;
@@ -254,8 +276,33 @@ class Page {
     return lines.join("\n");
   }
 
+  // Return a coordinate in the digits that single precision leaves of it.
+  rounded(x) {
+    const unit = 10 ** Math.floor(Math.log10(this.data.radius) - 5);
+    return Number((Math.round(x / unit) * unit).toPrecision(7));
+  }
+
+  // Return a canvas with the body and the legend.
+  picture() {
+    const { domElement: body } = this.stage.renderer, canvas = document.createElement("canvas");
+    const pen = canvas.getContext("2d"), size = body.height / body.clientHeight;
+    [canvas.width, canvas.height] = [body.width, body.height];
+    pen.drawImage(body, 0, 0);
+    pen.scale(size, size);
+    pen.fillStyle = getComputedStyle($("view")).color;
+    pen.font = getComputedStyle($("legend")).font;
+    const origin = $("view").getBoundingClientRect(), write = (text, box, down) => pen.fillText(text, box.left - origin.left, box.top - origin.top + down);
+    for (const line of [$("quantity"), $("unit"), ...$("ticks").children]) write(line.textContent, line.getBoundingClientRect(), 15);
+    const ramp = $("ramp").getBoundingClientRect(), [x, y] = [ramp.left - origin.left, ramp.top - origin.top];
+    const gradient = pen.createLinearGradient(0, y + ramp.height, 0, y);
+    RAMP.forEach((color, i) => gradient.addColorStop(i / (RAMP.length - 1), color));
+    pen.fillStyle = gradient;
+    pen.fillRect(x, y, ramp.width, ramp.height);
+    return canvas;
+  }
+
   save() {
-    this.stage.renderer.domElement.toBlob((blob) => {
+    this.picture().toBlob((blob) => {
       const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "picture.png" });
       link.click();
       URL.revokeObjectURL(link.href);

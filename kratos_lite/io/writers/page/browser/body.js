@@ -75,19 +75,21 @@ function cut(cells, positions, nodal, ofElements, normal, offset) {
   for (const block of cells) {
     const k = widthOf(block), weights = sparse(block.N), count = block.nodes.length / k;
     for (let cell = 0; cell < count; cell++) {
+      if (!isCut(block.nodes, cell * k, k, distances)) continue;
       const nodes = block.nodes.subarray(cell * k, (cell + 1) * k);
-      let low = Infinity, high = -Infinity;
-      for (const node of nodes) {
-        low = Math.min(low, distances[node]);
-        high = Math.max(high, distances[node]);
-      }
-      if (low > 0 || high <= 0) continue;
       const lattice = weights.map((pairs) => latticePoint(pairs, nodes, positions, nodal, distances));
       if (ofElements) for (const point of lattice) point[3] = ofElements[block.first + cell];
       for (const tetrahedron of block.tetrahedra) cutTetrahedron(section, lattice, tetrahedron, block, cell);
     }
   }
   return section;
+}
+
+// Whether there are nodes on both sides of the plane.
+function isCut(nodes, first, k, distances) {
+  const isInside = distances[nodes[first]] <= 0;
+  for (let i = first + 1; i < first + k; i++) if (distances[nodes[i]] <= 0 !== isInside) return true;
+  return false;
 }
 
 function latticePoint(pairs, nodes, positions, nodal, distances) {

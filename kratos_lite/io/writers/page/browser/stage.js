@@ -70,26 +70,29 @@ class Stage {
     return [near.toArray(), far.sub(near).normalize().toArray()];
   }
 
-  triangles(positions, values, corners, clipped) {
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
-    geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(2 * values.length), 2));
-    if (corners) geometry.setIndex(new THREE.BufferAttribute(corners, 1));
+  triangles(clipped) {
+    this.ramp ??= rampTexture();
     const material = new THREE.MeshPhongMaterial({
-      map: rampTexture(), side: THREE.DoubleSide, flatShading: true, specular: 0, polygonOffset: true,
+      map: this.ramp, side: THREE.DoubleSide, flatShading: true, specular: 0, polygonOffset: true,
       polygonOffsetFactor: 1, polygonOffsetUnits: 1, clippingPlanes: clipped ? [this.plane] : [],
     });
-    return this.add(new THREE.Mesh(geometry, material));
+    return this.add(new THREE.Mesh(new THREE.BufferGeometry(), material));
   }
 
-  lines(attribute, pairs, color, opacity, clipped) {
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", attribute);
-    if (pairs) geometry.setIndex(new THREE.BufferAttribute(pairs, 1));
+  lines(color, opacity, clipped) {
     const material = new THREE.LineBasicMaterial({
       color, opacity, transparent: opacity < 1, clippingPlanes: clipped ? [this.plane] : [],
     });
-    return this.add(new THREE.LineSegments(geometry, material));
+    return this.add(new THREE.LineSegments(new THREE.BufferGeometry(), material));
+  }
+
+  // Give triangles or lines their points, new ones in place of those they had.
+  reshape(thing, positions, corners = null) {
+    thing.geometry.dispose();
+    thing.geometry = new THREE.BufferGeometry();
+    thing.geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
+    if (thing.isMesh) thing.geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(positions.length / 3 * 2), 2));
+    if (corners) thing.geometry.setIndex(new THREE.BufferAttribute(corners, 1));
   }
 
   add(thing) {

@@ -1,0 +1,58 @@
+"""Every tutorial and every solution of an exercise runs without Jupyter, and ends by asserting its number."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+SOLUTIONS = DOCS / "exercises" / "solutions"
+NOTEBOOKS = sorted([*(DOCS / "tutorials").glob("[0-9]*.md"), *SOLUTIONS.glob("*.md")])
+
+
+def cells(page):
+    """Return the code of a notebook, cell by cell."""
+    return re.findall(r"(?ms)^```\{code-cell\}[^\n]*\n(.*?)^```$", page.read_text())
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda page: page.stem)
+def test_notebook_runs_and_reaches_its_number(page, tmp_path):
+    pytest.importorskip("matplotlib")
+    code = cells(page)
+    assert "assert " in code[-1]
+    for data in page.parent.iterdir():
+        if data.suffix in (".msh", ".mdpa"):
+            shutil.copy(data, tmp_path)
+    (tmp_path / "page.py").write_text("\n".join(code))
+    run = subprocess.run(
+        (sys.executable, "-W", "error", "page.py"),
+        cwd=tmp_path,
+        env={**os.environ, "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+
+
+def test_there_are_ten_tutorials_and_each_leads_to_the_next():
+    tutorials = [page for page in NOTEBOOKS if page.parent != SOLUTIONS]
+    assert len(tutorials) == 10
+    for page, following in pairwise(tutorials):
+        assert f"({following.name})" in page.read_text()
+
+
+def test_each_exercise_states_a_number_and_a_level_and_has_a_solution():
+    text = (DOCS / "exercises" / "index.md").read_text()
+    exercises = re.split(r"^### ", text, flags=re.MULTILINE)[1:]
+    linked = [re.findall(r"\(solutions/(.*?\.md)\)", exercise) for exercise in exercises]
+    assert linked == [[page.name] for page in sorted(SOLUTIONS.glob("*.md"))]
+    for number, exercise in enumerate(exercises, 1):
+        title, question = exercise.split("\n", 1)
+        assert re.fullmatch(rf"{number}\. .* \((beginner|intermediate|advanced)\)", title)
+        assert re.search(r"\*\*[^*]*\d[^*]*\*\*", question), title
