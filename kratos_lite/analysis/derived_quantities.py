@@ -11,6 +11,7 @@ from kratos_lite.ale.checks import critical_rate_estimate
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Where
@@ -130,8 +131,11 @@ def result_of(
         force_error=None,
         moment_error=None,
         seconds={},
-        warnings=list(e.warnings),
-        notes=list(model.notes),
+        warnings=[
+            *e.warnings,
+            *check_deformation(model.mesh, at.u, model.supports.values, model.initial_displacement),
+        ],
+        notes=model.remarks(),
         formulation=model.chosen(e.groups),
     )
     u0 = model.initial_displacement

@@ -9,9 +9,11 @@ import numpy as np
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
+from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
@@ -197,7 +199,8 @@ class StaticAnalysis:
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
-        return self.warnings + checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+        idle = checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+        return self.warnings + idle + equal_loads(case.loads)
 
     def _system_of(self, moving: Mask) -> ConstrainedSystem:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""
@@ -252,6 +255,7 @@ class StaticAnalysis:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
+            warnings += check_deformation(model.mesh, u, model.supports.values, model.initial_displacement)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = _Origin(self, case.loads, model.version)
@@ -314,7 +318,7 @@ class StaticAnalysis:
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
-            notes=list(self.model.notes),
+            notes=self.model.remarks(),
             skipped=self._skipped(case.moving),
             formulation=self.model.chosen(self.groups),
         )

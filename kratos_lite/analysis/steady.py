@@ -9,8 +9,10 @@ from kratos_lite.analysis.modal import critical_rates, critical_rates_beside
 from kratos_lite.analysis.nodal_loads import initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
+from kratos_lite.analysis.small_deformations import check_deformation
 from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
 from kratos_lite.model.checks import check_loads, equilibrium
+from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.direct import Factorization
 from kratos_lite.solvers.linear_solver import LinearSolver
@@ -35,6 +37,7 @@ def solve_steady(
     with phase("load"):
         forces, inertia = e.load(0.0), e.inertia_load(0.0)
         nodal = e.system.scatter(forces).copy()
+        warnings += equal_loads(model.loads)
         warnings += check_loads(model.loads, e.system.groups, nodal, model.supports)
     with phase("assemble"):
         A, symmetric = e.matrix(0.0, 0.0, 0.0, 1.0), e.is_symmetric(0.0, 0.0)
@@ -44,6 +47,8 @@ def solve_steady(
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
+        moved, rest = e.system.scatter(u), model.initial_displacement
+        warnings += check_deformation(model.mesh, moved, model.supports.values, rest)
         left = e.system.scatter(A @ u - forces)
         reactions = model.supports.supported(left)
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too
@@ -65,7 +70,7 @@ def solve_steady(
         **quality(solution, balance),
         seconds=phase.seconds,
         warnings=warnings,
-        notes=[*model.notes, *changing],
+        notes=[*model.remarks(), *changing],
         formulation=model.chosen(e.groups),
         skipped=["convective terms, as the rate is 0"] if not (e.rates(0.0)[0] or inertia.any()) else [],
     )

@@ -198,7 +198,7 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
         except ModelError as error:
             needs += [str(error)] if str(error) not in needs else []
             cure()
-    return needs, [*warnings, *model.notes]
+    return needs, [*warnings, *model.remarks()]
 
 
 def _check_python(path: Path) -> int:

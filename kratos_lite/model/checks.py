@@ -28,6 +28,12 @@ if TYPE_CHECKING:
 
 SLOWEST, QUICKEST = 1.0, 2e4
 """Speeds of waves in m/s: jelly is above the one, diamond below the other."""
+SOFTEST, STIFFEST = 1.0, 1.2e14
+"""Young's moduli in Pa: a hundredth of that of the softest gels, and a hundred times that of diamond."""
+LIGHTEST, HEAVIEST = 0.01, 2.26e6
+"""Densities in kg/m³: a hundredth of that of aerogel, and a hundred times that of osmium."""
+HEAVY, HARD = 2300.0, 1e7
+"""Above this density in kg/m³ there are concrete, rock and metals, all far stiffer than this E in Pa."""
 FOLD = 0.2
 """Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
 
@@ -189,7 +195,7 @@ def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
     for material in materials:
         if not material.density > 0:
             continue
-        E = 1 / float(np.linalg.inv(material.C).diagonal()[:3].min())
+        E = _moduli(material)[1]
         speed = float(np.sqrt(E) / np.sqrt(material.density))  # E/ρ may be too large
         if not SLOWEST <= speed <= QUICKEST:
             warnings.append(
@@ -197,6 +203,36 @@ def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
                 f"{SLOWEST:g} to {QUICKEST:g} m/s: are E in Pa and the density in kg/m³?"
             )
     return list(dict.fromkeys(warnings))
+
+
+def unusual_constants(materials: Iterable[LinearMaterial]) -> list[str]:
+    """Return notes of constants far from those of all engineering materials, so that units may be wrong."""
+    notes = []
+    for material in materials:
+        (low, high), density = _moduli(material), material.density
+        soft = high < SOFTEST * (1 - 1e-9)
+        if soft or low > STIFFEST:
+            notes.append(
+                f"E of {material} is far {'below' if soft else 'above'} that of any engineering "
+                "material, from 100 (gels) to 1.2e12 Pa (diamond): is it in Pa?"
+            )
+        elif density > HEAVY and high < HARD:
+            notes.append(
+                f"{material} is as heavy as concrete, rock or metal, whose E is 1e10 Pa and more, but soft "
+                "as rubber: is E in Pa (steel: 210e9)?"
+            )
+        if density > 0 and not LIGHTEST <= density <= HEAVIEST:
+            notes.append(
+                f"the density of {material} is far from that of any engineering material, 1 (aerogel) to "
+                "22,600 kg/m³ (osmium): is it in kg/m³ (steel: 7850)?"
+            )
+    return list(dict.fromkeys(notes))
+
+
+def _moduli(material: LinearMaterial) -> tuple[float, float]:
+    """Return the smallest and the largest of Young's moduli along the axes, in Pa."""
+    flexible = np.linalg.inv(material.C).diagonal()[:3]
+    return 1 / float(flexible.max()), 1 / float(flexible.min())
 
 
 def check_rounding(

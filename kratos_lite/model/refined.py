@@ -9,8 +9,8 @@ import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh.finer import Finer
+from kratos_lite.model.fixing import Fixing
 from kratos_lite.model.structure import Structure
-from kratos_lite.model.supports import Fixing
 from kratos_lite.quadrature import Rule
 from kratos_lite.records import replace
 
@@ -71,6 +71,8 @@ def refined(structure: S, finer: Finer) -> S:
         new.supports.apply(_refixed(fixing, finer))
     _carry_constraints(structure, new, finer)
     new.loads = [load.refined(finer) for load in structure.loads]
+    for name, load in structure.named_loads.items():
+        new._named[name] = new.loads[next(i for i, one in enumerate(structure.loads) if one is load)]
     new.notes = list(structure.notes)
     return new
 
@@ -97,7 +99,7 @@ def _refixed(fixing: Fixing, finer: Finer) -> Fixing:
     mesh, old = finer.mesh, finer.coarse.n_nodes
     rows = mesh.nodes(finer.grown(fixing.rows) if fixing.where is None else fixing.where)
     value = fixing.value
-    if fixing.field is not None or callable(value) or np.ndim(value) < 2:
+    if value is None or fixing.field is not None or callable(value) or np.ndim(value) < 2:
         return replace(fixing, rows=rows, override=True)
     nodal = np.full((old, np.shape(value)[1]), np.nan)
     nodal[fixing.rows] = value

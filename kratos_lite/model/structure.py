@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import PatternCache
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Mesh, Where
+from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
+from kratos_lite.model.equal import key_of
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
-from kratos_lite.model.solid import Solid
-from kratos_lite.model.supports import AXES, Fixing, Supports
+from kratos_lite.model.supported_solid import SupportedSolid
 from kratos_lite.records import Tabular
-from kratos_lite.solvers.constraint_map import MultiPointConstraint, rigid_modes
 from kratos_lite.time_series import Factor
-from kratos_lite.typing import Array
-from kratos_lite.validation import finite, function_or_none
+from kratos_lite.validation import instance
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 
 class Attachment(ABC):
@@ -47,7 +45,7 @@ class Attachment(ABC):
         """
 
 
-class Structure(Solid, Tabular):
+class Structure(SupportedSolid, Tabular):
     """What is analyzed: a solid with supports, loads and motion.
 
     Parameters
@@ -58,7 +56,7 @@ class Structure(Solid, Tabular):
 
     Attributes
     ----------
-    supports : what is prescribed; see `fix` and `constrain`.
+    supports : what is prescribed; see `fix`, `release` and `constrain`.
     loads : those added; the list may be changed.
     notes : what readers of files found, for the report.
 
@@ -77,16 +75,12 @@ class Structure(Solid, Tabular):
         formulation: str | None = None,
     ) -> None:
         super().__init__(mesh, material, formulation)
-        self.supports = Supports(mesh)
         self.loads: list[Load] = []
+        self._named: dict[str, Load] = {}
+        self._keys: dict[Hashable, Load] = {}
         self._motion: Attachment | None = None
         self.notes: list[str] = []
         self.patterns = PatternCache()
-
-    @property
-    def version(self) -> tuple[int, int]:
-        """Change counters of everything that affects the equations except prescribed values and loads."""
-        return self._changes, self.supports.version
 
     @property
     def motion(self) -> Attachment | None:
@@ -99,83 +93,16 @@ class Structure(Solid, Tabular):
             raise ModelError("a motion also ties or fixes boundaries: give it to model.add(...)")
         self._motion = None
 
-    # ---- supports and loads -------------------------------------------------------------------
+    # ---- loads --------------------------------------------------------------------------------
 
-    def fix(
+    def add(
         self,
-        where: Where,
-        axes: str = "xyz",
-        value: ArrayLike | Callable[[float], float] = 0.0,
+        load: Load | Attachment,
         *,
-        field: Callable[[Array], ArrayLike] | None = None,
+        amplitude: Factor | None = None,
+        name: str | None = None,
         override: bool = False,
     ) -> None:
-        """Prescribe the displacement of nodes.
-
-        Parameters
-        ----------
-        where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask or node rows.
-        axes : some of ``"x"``, ``"y"``, ``"z"``, such as ``"xz"``.
-        value : m; one number, one per axis, or one row per node; or a `TimeSeries` or function of time in s,
-            which statics take at the time 0.
-        field : in place of a value, a function of places (k, 3) in m that returns one row per node or one
-            number per axis in m.  A mesh that is made finer takes its values, others are interpolated.
-        override : let this value win over an earlier one for the same degree of freedom.
-
-        Raises
-        ------
-        ModelError
-            If no node is chosen, or a degree of freedom gets two different values.
-        InputError
-            The axes or the value make no sense.
-        MeshError
-            There is no such part or node.
-        """
-        rows = self.mesh.nodes(where)
-        if not len(rows):
-            what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
-            raise ModelError(f"cannot fix {axes}: {what}")
-        function_or_none(field, "field must be a function of places (k, 3)")
-        known = where if isinstance(where, str) or callable(where) else None
-        self.supports.apply(Fixing(known, rows, axes, value, field, override))
-
-    def constrain(
-        self,
-        slave: tuple[int, str],
-        masters: Mapping[tuple[int, str], float],
-        constant: float = 0.0,
-    ) -> None:
-        """Tie a degree of freedom to others: u[slave] = Σ weight · u[master] + constant.
-
-        Parameters
-        ----------
-        slave : (node row, axis letter).
-        masters : weights by (node row, axis letter).
-        constant : m.
-
-        Raises
-        ------
-        InputError
-            A degree of freedom, weight or constant is invalid.
-        """
-        if not isinstance(masters, Mapping):
-            raise InputError(f"masters must map (node row, axis letter) to a weight; got {masters!r}")
-        weights = finite(list(masters.values()), "weights of a constraint").tolist()
-        offset = float(finite(constant, "the constant of a constraint"))
-        constraint = MultiPointConstraint(
-            self._dof(slave), tuple(map(self._dof, masters)), tuple(weights), offset
-        )
-        self.supports.constraints = (*self.supports.constraints, constraint)
-
-    def _dof(self, where: tuple[int, str]) -> int:
-        """Return the number of a degree of freedom (node row, axis letter)."""
-        node, axis = where if isinstance(where, tuple) and len(where) == 2 else (None, None)
-        known = isinstance(node, (int, np.integer)) and 0 <= node < self.mesh.n_nodes
-        if not known or axis not in tuple(AXES):
-            raise InputError(f"a degree of freedom is (node row, axis letter); got {where!r}")
-        return 3 * int(where[0]) + AXES.index(where[1])
-
-    def add(self, load: Load | Attachment, *, amplitude: Factor | None = None) -> None:
         """Add a load (loads add up), or the motion of the material through the mesh (there is one).
 
         Parameters
@@ -183,6 +110,8 @@ class Structure(Solid, Tabular):
         load : such as `Gravity` or `Traction`; or a motion such as `kratos_lite.ale.Rotation`.
         amplitude : number, `TimeSeries` or function of time in s that multiplies the load; statics uses its
             value at t = 0.
+        name : by which `remove` and `named_loads` know the load.  An equal one of this name is added once.
+        override : let the load replace the one of its name.
 
         Raises
         ------
@@ -191,7 +120,7 @@ class Structure(Solid, Tabular):
         MeshError
             There is no such part or node, or the point of a load lies outside the mesh.
         ModelError
-            The motion does not fit the model, or there is one already.
+            The motion does not fit the model, there is one already, or another load has the name.
 
         Examples
         --------
@@ -202,8 +131,8 @@ class Structure(Solid, Tabular):
         1.0
         """
         if isinstance(load, Attachment):
-            if amplitude is not None:
-                raise InputError("a motion takes no amplitude; its rate may be a function of time")
+            if amplitude is not None or name is not None:
+                raise InputError("a motion takes no amplitude (its rate may be a function of time) nor name")
             load.attach(self)
             self._motion = load
             return
@@ -211,16 +140,73 @@ class Structure(Solid, Tabular):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
         load.check(self.mesh)
-        self.loads.append(load)
+        key, named = key_of(load), self.named_loads
+        if name is not None:
+            instance(name, "the name of a load", str, "'wind'")
+        if name in named:
+            if key_of(named[name]) == key:
+                return
+            if not override:
+                raise ModelError(
+                    f"there is another load {name!r} already, {named[name]!r}; replace it by override=True, "
+                    f"or take it away by model.remove({name!r})"
+                )
+            self.loads[:] = [load if other is named[name] else other for other in self.loads]
+        else:
+            self._tell_equal(load, key)
+            self.loads.append(load)
+        self._keys[key] = load
+        if name is not None:
+            self._named[name] = load
 
-    def rigid_modes(self) -> Array:
-        """Return the rigid-body modes of all nodes.
+    def _tell_equal(self, load: Load, key: Hashable) -> None:
+        """Log a warning if an equal load is there already; the report has it, too."""
+        if _place(self.loads, self._keys.get(key)) is not None:
+            import logging  # a quick start without it
 
-        Returns
-        -------
-        (3n, 6): translations in x, y and z, rotations about x, y and z.
+            logging.getLogger("kratos_lite").warning(
+                "an equal load %r is there already; both act.  If one alone is meant, as where a cell of a "
+                "notebook is run twice, give it a name: model.add(load, name=...)",
+                load,
+            )
+
+    @property
+    def named_loads(self) -> dict[str, Load]:
+        """The loads that have a name, by their names."""
+        there = set(map(id, self.loads))
+        return {name: load for name, load in self._named.items() if id(load) in there}
+
+    def remove(self, load: str | Load) -> None:
+        """Take a load away.
+
+        Parameters
+        ----------
+        load : its name, or the load itself; the last one if it was added several times.
+
+        Raises
+        ------
+        ModelError
+            There is no such load.
+
+        Examples
+        --------
+        >>> import kratos_lite as kl
+        >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3))
+        >>> model.add(kl.Traction("x+", (0.0, 2e3, 0.0)), name="wind")
+        >>> model.named_loads
+        {'wind': Traction(where='x+', traction=(0, 2000, 0))}
+        >>> model.remove("wind")
+        >>> model.loads
+        []
         """
-        return rigid_modes(self.mesh.points)
+        named = self.named_loads
+        wanted = named.get(load) if isinstance(load, str) else load
+        place = _place(self.loads, wanted)
+        if place is None:
+            names = f"; the names are {', '.join(named)}" if named else "; none has a name"
+            hint = nearest(load, named) if isinstance(load, str) else ""
+            raise ModelError(f"there is no load {load!r}{names}.{hint}")
+        del self.loads[place]
 
     # ---- checks -------------------------------------------------------------------------------
 
@@ -283,6 +269,19 @@ class Structure(Solid, Tabular):
         self.supports.check_used(used)
         return groups, part, warnings
 
+    def remarks(self) -> list[str]:
+        """Return what readers of files noted, and constants of materials that no engineering material has.
+
+        Returns
+        -------
+        Notes, one sentence each.
+        """
+        return [*self.notes, *checks.unusual_constants(self._used_materials())]
+
+    def _used_materials(self) -> list[LinearMaterial]:
+        counts = np.bincount(self._material_of + 1, minlength=1)[1:]
+        return [self._materials[i] for i in np.flatnonzero(counts)]
+
     # ---- summary ------------------------------------------------------------------------------
 
     def table(self) -> list[tuple[str, str]]:
@@ -292,19 +291,26 @@ class Structure(Solid, Tabular):
         -------
         Labels and values.
         """
-        used = [m for i, m in enumerate(self._materials) if (self._material_of == i).any()]
         without = int((self._material_of < 0).sum())
         rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []
-        rows += [("material", str(material)) for material in used]
+        rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
         rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))
+        rows += [("support", str(fixing)) for fixing in self.supports.named.values()]
         if self.supports.constraints:
             rows.append(("constraints", str(len(self.supports.constraints))))
-        rows += [("load", type(load).__name__) for load in self.loads]
+        names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
+        rows += [("load", f"{names.get(id(load), '')}{load!r}") for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
-        return rows + [("note", note) for note in self.notes]
+        return rows + [("note", note) for note in self.remarks()]
 
     def __repr__(self) -> str:
         name = type(self).__name__
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
+
+
+def _place(loads: list[Load], wanted: object) -> int | None:
+    """Return where a load stands in a list, the last one if it does several times, or None."""
+    found = [i for i, load in enumerate(loads) if wanted in (load, getattr(load, "load", load))]
+    return found[-1] if found else None

@@ -9,7 +9,8 @@ import numpy as np
 
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import record, replace
+from kratos_lite.model.fixing import AXES, Fixing, PrescribedMotion, Selected, axis_numbers
+from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import (
     ConstraintMap,
     MultiPointConstraint,
@@ -24,61 +25,8 @@ from kratos_lite.validation import finite
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-AXES = "xyz"
 UNUSED = "a constraint uses {}, which belongs to no element; remove it"
 PRESCRIBED_TWICE = "by a function of time and otherwise; fix it once, or with override=True"
-
-
-def axis_numbers(axes: str) -> list[int]:
-    """Return the axis numbers of a word such as ``"xz"``.
-
-    >>> axis_numbers("xz")
-    [0, 2]
-    """
-    known = isinstance(axes, str) and axes and set(axes) <= set(AXES)
-    if not known or len(set(axes)) != len(axes):
-        raise InputError(f"axes must be some of x, y, z, each once, such as 'xz'; got {axes!r}")
-    return [AXES.index(a) for a in axes]
-
-
-@record(frozen=True, eq=False)
-class PrescribedMotion:
-    """The displacement of nodes along an axis as a function of time.
-
-    Attributes
-    ----------
-    rows : the nodes.
-    axis : 0, 1 or 2.
-    function : takes the time in s, returns m; its values are checked.
-    given : the function as the caller gave it.
-    """
-
-    rows: Ints
-    axis: int
-    function: Callable[[float], float]
-    given: object
-
-
-@record(frozen=True, eq=False)
-class Fixing:
-    """One call of `Structure.fix`, from which a finer mesh is fixed alike.
-
-    Attributes
-    ----------
-    where : nodes by part name or predicate, or None where rows were given.
-    rows : the nodes.
-    axes : such as ``"xz"``.
-    value : m; as given, or a function of time.
-    field : function of places, or None.
-    override : whether it won over earlier ones.
-    """
-
-    where: str | Callable[[Array], ArrayLike] | None
-    rows: Ints
-    axes: str
-    value: ArrayLike | Callable[[float], float]
-    field: Callable[[Array], ArrayLike] | None
-    override: bool
 
 
 class Supports:
@@ -117,7 +65,7 @@ class Supports:
     # ---- prescribed displacements ------------------------------------------------------------------------
 
     def apply(self, fixing: Fixing) -> None:
-        """Prescribe what a call of `Structure.fix` asks for; hanging nodes follow their masters instead.
+        """Prescribe or release what a call of `Structure` asks for; hanging nodes follow their masters.
 
         Raises
         ------
@@ -125,6 +73,10 @@ class Supports:
             As by `fix` and `prescribe_motion`.
         """
         rows, value = fixing.rows, fixing.value
+        if value is None:
+            self._free(rows, fixing.axes)
+            self.fixings.append(fixing)
+            return
         stays = ~self._hangs[rows]
         if len(rows) and not stays.any():
             raise ModelError(
@@ -141,6 +93,40 @@ class Supports:
                 value = value[stays]
             self.fix(rows[stays], fixing.axes, value, fixing.override)
         self.fixings.append(fixing)
+
+    @property
+    def named(self) -> dict[str, Fixing]:
+        """The calls of `Structure.fix` that have a name, by their names."""
+        return {fixing.name: fixing for fixing in self.fixings if fixing.name is not None}
+
+    def drop(self, gone: Fixing) -> None:
+        """Take back one call of `Structure.fix`; what others prescribe stays."""
+        kept = [fixing for fixing in self.fixings if fixing is not gone]
+        self.motions = ()
+        self._fixed[:], self._values[:] = False, 0.0
+        self.version += 1
+        self.value_version += 1
+        for fixing in kept:
+            self.apply(replace(fixing, override=True))
+        self.fixings = kept
+
+    def release(self, where: Selected, rows: Ints, axes: str) -> None:
+        """Release nodes along axes, whatever has prescribed them; ModelError if nothing has."""
+        if not self.fixed[np.ix_(rows, np.array(axis_numbers(axes)))].any():
+            raise ModelError(f"nothing is prescribed along {axes} there, so that nothing is released")
+        self.apply(Fixing(where, rows, axes, None, None, True))
+
+    def _free(self, rows: Ints, axes: str) -> None:
+        numbers = axis_numbers(axes)
+        at = np.ix_(rows, np.array(numbers))
+        self._end_motion(rows, numbers, None, override=True)
+        self._fixed[at], self._values[at] = False, 0.0
+        self.version += 1
+        self.value_version += 1
+
+    def __str__(self) -> str:
+        tied = [f"{len(self.constraints)} constraints"] if self.constraints else []
+        return "\n".join([*map(str, self.fixings), *tied]) or "none"
 
     def fix(self, rows: Ints, axes: str, value: ArrayLike = 0.0, override: bool = False) -> None:
         """Prescribe the displacement of nodes along axes.

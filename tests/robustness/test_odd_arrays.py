@@ -58,6 +58,13 @@ def changed(name, *arguments, **options):
     return model.solve().u
 
 
+def released(where):
+    model = static()
+    model.fix(range(8))
+    model.release(where)
+    return model.supports.fixed.astype(float)
+
+
 def element(name, *arguments):
     return getattr(BRICK(BRICK.nodes), name)(*arguments)
 
@@ -107,6 +114,7 @@ CASES: Case = {
     ("box", "origin"): (lambda v: kl.box(origin=v).points, VECTOR),
     ("annulus", "cells"): (lambda v: kl.annulus(1, 2, 1, v).points, (1, 4, 1)),
     ("Structure.fix", "where"): (lambda v: changed("fix", v), NODES),
+    ("Structure.release", "where"): (released, NODES),
     ("Structure.fix", "value"): (lambda v: changed("fix", "z+", "xyz", v), VECTOR),
     ("Solid.assign", "where"): (lambda v: changed("assign", ROCK, v), [0]),
     ("Solid.use_rule", "where"): (lambda v: changed("use_rule", 2, v), [0]),
@@ -355,7 +363,8 @@ ELSEWHERE = {
     *(("Motion", name) for name in ("rate", "acceleration", "part")),
     *((name, "C") for name in ("B_at_gauss_points", "internal_load", "strain")),
     *((name, "xi") for name in ("N", "dN")),
-    *(("plot", name) for name in ("clim", "displacement", "points", "values")),
+    *(("plot", name) for name in ("clim", "displacement", "modes", "points", "values")),
+    *(("animate", name) for name in ("clim", "modes", "values")),
     ("PlacedCell", "X"),
     ("Block", "shape"),
 }

@@ -110,5 +110,6 @@ class _Summary:
         rows += self.transient.result(self.last).report.motion_rows()
         still = [] if self.largest else ["no load, no support that moves and no velocity: nothing moves"]
         still += [f"rigid motions are held by inertia alone: {e.free_motions}"] if e.free_motions else []
-        rows += [("warning", text) for text in (*e.warnings, *still)]
-        return rows + [("note", text) for text in case.model.notes]
+        report = self.transient.result(self.farthest).report
+        rows += [("warning", text) for text in (*report.warnings, *still)]
+        return rows + [("note", text) for text in report.notes]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
-from kratos_lite.validation import finite, takes
+from kratos_lite.validation import finite, short, takes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -26,6 +26,10 @@ OfPlace: TypeAlias = "Callable[[Array], ArrayLike]"
 
 class Load(ABC):
     """Something that pushes a structure.  A load of your own needs `forces` alone."""
+
+    def __repr__(self) -> str:
+        values = {name: value for name, value in vars(self).items() if not name.startswith("_")}
+        return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in values.items())})"
 
     @abstractmethod
     def forces(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> Array:
@@ -208,6 +212,13 @@ class ScaledLoad(TimeDependentLoad):
         """Return the nodal forces (n, 3) in N as a function of time."""
         forces = forces_of(self.load)
         return lambda time: self.amplitude(time) * forces
+
+
+def _shown(value: Any) -> str:
+    """Return a value of a load in a few words."""
+    if isinstance(value, np.ndarray):
+        return f"({', '.join(f'{x:g}' for x in value)})" if value.shape == (3,) else f"array {value.shape}"
+    return getattr(value, "__name__", "a function") if callable(value) else short(value)
 
 
 def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ...] = (1,)) -> Array:

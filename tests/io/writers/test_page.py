@@ -183,6 +183,27 @@ def test_a_trimesh_without_three_js_is_named(result, tmp_path, monkeypatch):
         kl.write(tmp_path / "a.html", result)
 
 
+def test_modes_keep_their_shapes_and_have_names(tmp_path):
+    pytest.importorskip("trimesh")
+    mesh, shapes = kl.box(), np.random.default_rng(2).normal(size=(2, 8, 3))
+    kl.write_modes(tmp_path / "m.html", mesh, [2 * np.pi, 20 * np.pi], shapes)
+    content = content_of(tmp_path / "m.html")
+    assert [frame["name"] for frame in content["frames"]] == ["1: 1 Hz", "2: 10 Hz"]
+    for frame, shape in zip(content["frames"], shapes, strict=True):
+        assert abs(frame["values"][0] - shape / np.linalg.norm(shape, axis=1).max()).max() < 2e-5
+
+
+def test_modes_of_another_mesh_are_refused(tmp_path):
+    pytest.importorskip("trimesh")
+    with pytest.raises(InputError, match=r"\(k,\) and \(k, 8, 3\); got \(1,\) and \(1, 7, 3\)"):
+        kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.zeros((1, 7, 3)))
+    with pytest.raises(InputError, match=r"not finite"):
+        kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.full((1, 8, 3), np.nan))
+    with pytest.raises(InputError, match=r"the ending must be .html"):
+        kl.write_modes(tmp_path / "m.txt", kl.box(), [1.0], np.zeros((1, 8, 3)))
+    assert not list(tmp_path.iterdir())
+
+
 def test_only_vtu_files_have_a_mode(result, tmp_path):
     pytest.importorskip("trimesh")
     with pytest.raises(InputError, match=r"only .vtu files are written as ascii"):

@@ -278,10 +278,8 @@ def test_animation_moves_the_body_and_stops(page):
 
 
 def test_modes_swing_to_both_sides(browser, model, tmp_path):
-    from kratos_lite.io.writers.page.write import write_modes_page
-
     omega, shapes = model.modes(3)
-    write_modes_page(tmp_path / "modes.html", model.mesh, omega, shapes)
+    kl.write_modes(tmp_path / "modes.html", model.mesh, omega, shapes)
     browser.open(tmp_path / "modes.html")
     names = [f"{i}: {w / (2 * np.pi):.5g} Hz" for i, w in enumerate(omega, 1)]
     seen = set()
@@ -294,6 +292,18 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
     wait = WebDriverWait(browser.driver, 10, 0.02)
     for sign in (-1, 1):
         wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
+
+
+def test_complex_modes_pass_through_both_parts(browser, tmp_path):
+    mesh = kl.box()
+    shape = np.random.default_rng(1).normal(size=(1, mesh.n_nodes, 3, 2)) @ [1, 1j]
+    kl.write_modes(tmp_path / "modes.html", mesh, [-0.5 + 4j], shape)
+    browser.open(tmp_path / "modes.html")
+    browser("[page.phase, page.quarter] = [0.6, 0.8]; page.update()")
+    scale, wanted = browser("return page.data.scale"), shape[0] / np.linalg.norm(shape[0], axis=1).max()
+    moved = (wanted * (0.6 + 0.8j)).real
+    places = browser.array("page.positions").reshape(-1, 3) + browser("return page.data.center")
+    assert abs(places - mesh.points - scale * moved).max() < 1e-4
 
 
 def test_states_play_with_one_range_for_all(browser, model, tmp_path):

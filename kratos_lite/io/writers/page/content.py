@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_CELLS = 250_000
 """Elements up to which the page knows the inside, for cuts."""
-MOST_EDGED = 20_000
+MOST_EDGED = 5_000
 """Faces up to which their edges are shown at the start."""
 QUANTUM = 30_000
 """Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from kratos_lite.atomic import refuse_nan, write_whole
 from kratos_lite.errors import InputError
 from kratos_lite.io.writers.page.content import Content, Field, Frame
 from kratos_lite.io.writers.page.library import library
-from kratos_lite.typing import Array
+from kratos_lite.typing import Complexes
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
@@ -52,11 +53,11 @@ def write_result_page(path: str | Path, result: Result) -> None:
     write_page(path, Content(title, "result", result.mesh, fields, [frame], "1:von Mises", result.table()))
 
 
-def write_modes_page(path: str | Path, mesh: Mesh, omega: Array, shapes: Array) -> None:
-    """Write the page of natural modes: frequencies (k,) in rad/s and shapes (k, n, 3)."""
+def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes: Complexes) -> None:
+    """Write the page of modes: their names and shapes (k, n, 3); the real part of φ exp(iωt) is shown."""
     largest = np.linalg.norm(shapes, axis=2).max(axis=1)
-    frames = [
-        Frame(f"{i}: {w / (2 * np.pi):.5g} Hz", [shape / size])
-        for i, (w, shape, size) in enumerate(zip(omega, shapes, largest, strict=True), 1)
-    ]
-    write_page(path, Content(Path(path).stem, "modes", mesh, [Field("displacement", "", "vector")], frames))
+    scaled = shapes / np.where(largest > 0, largest, 1.0)[:, None, None]
+    parts = [scaled.real] if not scaled.imag.any() else [scaled.real, -scaled.imag]
+    fields = [Field(name, "", "vector") for name in ("displacement", "displacement a quarter period later")]
+    frames = [Frame(name, values) for name, *values in zip(names, *parts, strict=True)]
+    write_page(path, Content(Path(path).stem, "modes", mesh, fields[: len(parts)], frames))

@@ -8,7 +8,7 @@ class Page {
   constructor(data) {
     this.data = data;
     this.frame = 0;
-    this.phase = 1;
+    [this.phase, this.quarter] = [1, 0];
     this.surface = surfaceOf(data.faces);
     this.positions = new Float32Array(data.points.length);
     const stage = this.stage = new Stage($("view"), data.radius);
@@ -87,7 +87,9 @@ class Page {
     this.frame = frame;
     $("frame").value = frame;
     $("frame-name").textContent = this.data.frames[frame].name;
-    this.displacement = this.data.read(this.data.frames[frame].values[0]);
+    const [first, second] = this.data.frames[frame].values.map((packed) => this.data.read(packed));
+    this.displacement = first;
+    this.later = this.data.kind === "modes" && second;  // of a complex mode, a quarter period later
     this.values = this.valuesOf(frame);
     if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
     else spread(this.surface, this.values, 1, this.surface.values);
@@ -121,6 +123,8 @@ class Page {
     const { data, surface } = this, scale = Number($("scale").value) * data.scale;
     for (let i = 0; i < this.positions.length; i++)
       this.positions[i] = data.points[i] + scale * this.phase * this.displacement[i];
+    if (this.later)
+      for (let i = 0; i < this.positions.length; i++) this.positions[i] += scale * this.quarter * this.later[i];
     spread(surface, this.positions, 3, surface.positions);
     this.body.geometry.attributes.position.needsUpdate = true;
     colored(this.body, surface.values, this.range);
@@ -186,7 +190,7 @@ class Page {
     $("play").setAttribute("aria-pressed", on);
     $("play").textContent = on ? "■ stop" : "▶ animate";
     if (!on) {
-      this.phase = 1;
+      [this.phase, this.quarter] = [1, 0];
       this.update();
       return;
     }
@@ -199,6 +203,7 @@ class Page {
         if (frame !== this.frame) this.show(frame);
       } else {
         this.phase = this.data.kind === "modes" ? Math.cos(circle) : (1 - Math.cos(circle)) / 2;
+        this.quarter = Math.sin(circle);
         this.update();
       }
       requestAnimationFrame(turn);

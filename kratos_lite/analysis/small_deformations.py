@@ -1,0 +1,88 @@
+"""Small deformations: whether a result is one for which linear theory holds; else, units may be wrong."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from kratos_lite.mesh import Mesh
+from kratos_lite.registry import remembered
+from kratos_lite.typing import Array, Ints
+
+LARGE = 0.1
+"""Displacement, as share of the diagonal of the body, from which it is not small."""
+STRAINED = 0.05
+"""Strain from which it is not small."""
+SAMPLE = 500
+"""Elements whose strain is looked at, spread over the mesh."""
+GOLDEN = (5**0.5 - 1) / 2
+UNITS = "is E in Pa (steel: 210e9), are lengths in m, forces in N and pressures in Pa?"
+
+
+def check_deformation(mesh: Mesh, u: Array, prescribed: Array, start: Array | None = None) -> list[str]:
+    """Warn of displacements or strains that are too large for linear theory.
+
+    Parameters
+    ----------
+    mesh : points and elements.
+    u : (n, 3) m.
+    prescribed : (n, 3) m, displacements of supports; large ones are meant.
+    start : (n, 3) m, displacement without stress, or None.
+    """
+    moved = u if start is None else u - start
+    if not moved.any():
+        return []
+    strain, size = largest_elongation(mesh, moved), _diagonal(mesh.points)
+    largest = _diagonal(moved)
+    if largest > LARGE * size:  # nodes without elements stay, whatever the body does
+        largest = _diagonal(moved[mesh.used_nodes()])
+    found = []
+    if largest > LARGE * size:
+        share = largest / size
+        times = f"{share:.0%} of" if share < 2 else f"{share:.3g} times"
+        found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
+    if strain > STRAINED:
+        found.append(f"strains reach at least {strain:.0%}")
+    if not found:
+        return []
+    meant = prescribed.any() and _diagonal(prescribed) > 0.5 * largest
+    limits = f"linear theory holds up to about {LARGE:.0%} of the size and strains of {STRAINED:.0%}"
+    return ["; ".join([", ".join(found), *([] if meant else [UNITS]), limits])]
+
+
+def largest_elongation(mesh: Mesh, u: Array) -> float:
+    """Return the largest change of length of the lines between corners of elements, relative.
+
+    It is a lower bound of the largest principal strain; of a large mesh, of `SAMPLE` elements.
+    """
+    found = 0.0
+    for block in mesh.blocks:
+        if block.shape is None or not len(block):
+            continue
+        cells = _spread(len(block), -(-SAMPLE * len(block) // mesh.n_elements))
+        corners = block.nodes[cells, : block.shape.corners]
+        one, other = _pairs(block.shape.corners)
+        X, D = mesh.points[corners], u[corners]
+        X, D = X[:, one] - X[:, other], D[:, one] - D[:, other]
+        length = np.maximum(np.einsum("epi,epi->ep", X, X), np.finfo(float).tiny)
+        found = max(found, float(np.abs(np.einsum("epi,epi->ep", X, D) / length).max()))
+    return found
+
+
+@remembered
+def _pairs(corners: int) -> tuple[Ints, Ints]:
+    one, other = np.array(list(combinations(range(corners), 2))).T
+    return one, other
+
+
+def _spread(count: int, wanted: int) -> Ints:
+    """Return rows of some of `count` elements, spread so that no regular order of them hides any."""
+    if wanted >= count:
+        return np.arange(count)
+    return (np.arange(wanted) * GOLDEN % 1 * count).astype(np.int64)
+
+
+def _diagonal(values: Array) -> float:
+    """Return the diagonal of the smallest box around vectors (n, 3)."""
+    return float(np.linalg.norm([np.ptp(column) for column in values.T])) if len(values) else 0.0
