@@ -44,11 +44,12 @@ class Page {
     $("frame").max = data.frames.length - 1;
     $("of-frame").hidden = data.frames.length < 2;
     $("of-frame").firstChild.data = data.kind === "modes" ? "Mode " : "State ";
+    $("hollow").hidden = data.cells.length > 0;
     $("edges").checked = this.edges.visible = data.edged;
     this.on("field", "change", () => this.choose());
     this.on("refit", "click", () => this.fit());
     for (const id of ["low", "high"]) this.on(id, "change", () => this.setRange());
-    this.on("frame", "input", () => this.show(Number($("frame").value)));
+    this.on("frame", "input", () => this.turnTo(Number($("frame").value)));
     this.on("scale", "input", () => this.update());
     this.on("play", "click", () => this.play());
     for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
@@ -58,6 +59,7 @@ class Page {
       button.addEventListener("click", () => this.stage.look(button.dataset.view.split(",").map(Number)));
     this.on("picture", "click", () => this.save());
     this.on("view", "pointermove", (event) => this.point(event));
+    this.on("view", "click", (event) => this.point(event));  // a finger has no other way
     this.on("view", "pointerleave", () => this.unpoint());
     this.on("view", "pointerdown", () => this.unpoint());
     this.stage.onDrawn = () => this.drawTriad();
@@ -94,6 +96,12 @@ class Page {
     if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
     else spread(this.surface, this.values, 1, this.surface.values);
     if (draw) this.update();
+  }
+
+  turnTo(frame) {
+    if (this.playing) this.play(false);
+    this.show(frame);
+    if (this.data.kind === "modes") this.fit();
   }
 
   fit() {
