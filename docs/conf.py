@@ -25,7 +25,9 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_design",
+    "command_line",
     "docstrings",
+    "known_words",
     "public_names",
 ]
 exclude_patterns = ["_static", "extensions", "images"]

@@ -8,7 +8,7 @@ class Page {
   constructor(data) {
     this.data = data;
     this.frame = 0;
-    this.phase = 1;
+    [this.phase, this.quarter] = [1, 0];
     this.surface = surfaceOf(data.faces);
     this.positions = new Float32Array(data.points.length);
     const stage = this.stage = new Stage($("view"), data.radius);
@@ -44,11 +44,12 @@ class Page {
     $("frame").max = data.frames.length - 1;
     $("of-frame").hidden = data.frames.length < 2;
     $("of-frame").firstChild.data = data.kind === "modes" ? "Mode " : "State ";
+    $("hollow").hidden = data.cells.length > 0;
     $("edges").checked = this.edges.visible = data.edged;
     this.on("field", "change", () => this.choose());
     this.on("refit", "click", () => this.fit());
     for (const id of ["low", "high"]) this.on(id, "change", () => this.setRange());
-    this.on("frame", "input", () => this.show(Number($("frame").value)));
+    this.on("frame", "input", () => this.turnTo(Number($("frame").value)));
     this.on("scale", "input", () => this.update());
     this.on("play", "click", () => this.play());
     for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
@@ -58,6 +59,7 @@ class Page {
       button.addEventListener("click", () => this.stage.look(button.dataset.view.split(",").map(Number)));
     this.on("picture", "click", () => this.save());
     this.on("view", "pointermove", (event) => this.point(event));
+    this.on("view", "click", (event) => this.point(event));  // a finger has no other way
     this.on("view", "pointerleave", () => this.unpoint());
     this.on("view", "pointerdown", () => this.unpoint());
     this.stage.onDrawn = () => this.drawTriad();
@@ -87,11 +89,19 @@ class Page {
     this.frame = frame;
     $("frame").value = frame;
     $("frame-name").textContent = this.data.frames[frame].name;
-    this.displacement = this.data.read(this.data.frames[frame].values[0]);
+    const [first, second] = this.data.frames[frame].values.map((packed) => this.data.read(packed));
+    this.displacement = first;
+    this.later = this.data.kind === "modes" && second;  // of a complex mode, a quarter period later
     this.values = this.valuesOf(frame);
     if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
     else spread(this.surface, this.values, 1, this.surface.values);
     if (draw) this.update();
+  }
+
+  turnTo(frame) {
+    if (this.playing) this.play(false);
+    this.show(frame);
+    if (this.data.kind === "modes") this.fit();
   }
 
   fit() {
@@ -121,6 +131,8 @@ class Page {
     const { data, surface } = this, scale = Number($("scale").value) * data.scale;
     for (let i = 0; i < this.positions.length; i++)
       this.positions[i] = data.points[i] + scale * this.phase * this.displacement[i];
+    if (this.later)
+      for (let i = 0; i < this.positions.length; i++) this.positions[i] += scale * this.quarter * this.later[i];
     spread(surface, this.positions, 3, surface.positions);
     this.body.geometry.attributes.position.needsUpdate = true;
     colored(this.body, surface.values, this.range);
@@ -186,7 +198,7 @@ class Page {
     $("play").setAttribute("aria-pressed", on);
     $("play").textContent = on ? "■ stop" : "▶ animate";
     if (!on) {
-      this.phase = 1;
+      [this.phase, this.quarter] = [1, 0];
       this.update();
       return;
     }
@@ -199,6 +211,7 @@ class Page {
         if (frame !== this.frame) this.show(frame);
       } else {
         this.phase = this.data.kind === "modes" ? Math.cos(circle) : (1 - Math.cos(circle)) / 2;
+        this.quarter = Math.sin(circle);
         this.update();
       }
       requestAnimationFrame(turn);

@@ -1,0 +1,91 @@
+"""The directive ``known-words``: names and keys that files may hold, from the tables of their readers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from sphinx.util.docutils import SphinxDirective
+
+from kratos_lite.bodies import BODIES
+from kratos_lite.io.formats.mdpa.scan import INSIDE, LISTS, TOP
+from kratos_lite.io.kratos import (
+    expected_values,
+    expressions,
+    processes,
+    properties,
+    run_file,
+    time_integration,
+)
+from kratos_lite.io.kratos.variables import LOADING
+from kratos_lite.io.readers import body_loads, motion
+from kratos_lite.materials import MATERIALS
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register the directive."""
+    app.add_directive("known-words", KnownWords)
+    return {"parallel_read_safe": True}
+
+
+class KnownWords(SphinxDirective):
+    """A list or a table, by its name."""
+
+    required_arguments = 1
+
+    def run(self) -> list[Any]:
+        """Return what the readers know."""
+        return self.parse_text_to_nodes("\n".join(TABLES[self.arguments[0]]()))
+
+
+def _code(words: Iterable[str]) -> str:
+    return " ".join(f"`{word}`" for word in words) or "–"
+
+
+def _table(*rows: tuple[str, ...], head: str) -> list[str]:
+    return [head, "| --- " * len(rows[0]) + "|", *("| " + " | ".join(row) + " |" for row in rows)]
+
+
+def _blocks() -> list[str]:
+    inside = {name: [word for word in INSIDE[name] if word != name] for name in INSIDE}
+    rows = [(f"`{name}`", _code(inside.get(name, []))) for name in TOP]
+    return _table(*rows, head="| block | may hold |")
+
+
+def _of_registry(registry: Any, head: str) -> list[str]:
+    rows = [(f"`{name}`", _code(registry.aliases(name))) for name in registry]
+    return _table(*rows, head=f"| {head} | also called |")
+
+
+def _processes() -> list[str]:
+    rows = []
+    for name, process in processes.PROCESSES.items():
+        keys = (*processes.COMMON, *process.keys, "entities" if process.on_conditions else "constrained")
+        rows.append((f"`{name}`", _code(keys)))
+    rows += [
+        (f"`{name}`", _code(expected_values.FILE_KEYS if "json" in name else expected_values.NODE_KEYS))
+        for name in expected_values.COMPARISONS
+    ]
+    return _table(*rows, head="| process | keys of its `Parameters` |")
+
+
+def _of_body(kinds: Any) -> list[str]:
+    rows = [(f"`{name}`", _code(kind.needs), _code(kind.takes)) for name, kind in kinds.items()]
+    return _table(*rows, head="| type | needs | takes |")
+
+
+TABLES: dict[str, Callable[[], list[str]]] = {
+    "blocks": _blocks,
+    "lists": lambda: [_code(LISTS)],
+    "laws": lambda: _of_registry(MATERIALS, "law"),
+    "bodies": lambda: _of_registry(BODIES, "body"),
+    "properties": lambda: [_code(sorted(properties.USED))],
+    "loading": lambda: [_code(sorted(LOADING))],
+    "processes": _processes,
+    "functions": lambda: [_code(sorted(expressions._FUNCTIONS))],
+    "solver_settings": lambda: [_code(sorted(run_file.HARMLESS))],
+    "dynamic": lambda: [_code(time_integration.DYNAMIC_KEYS)],
+    "ale": lambda: _table(*((f"`{k}`", _code(v)) for k, v in motion.KEYS.items()), head="| motion | keys |"),
+    "body_loads": lambda: _of_body(body_loads.LOADS),
+    "body_constraints": lambda: _of_body(body_loads.CONSTRAINTS),
+}
