@@ -12,15 +12,16 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 from kratos_lite.view.figure import Values
 
+SIZES = ("largest", "middle", "smallest")
 NAMES = {
     "displacement": "displacement",
     **{f"u{axis}": f"displacement along {axis}" for axis in "xyz"},
     "reaction": "reaction",
     "von_mises": "von Mises stress",
     "tresca": "Tresca stress",
-    **{f"s{i}": f"principal stress {i}" for i in (1, 2, 3)},
+    **{f"s{i}": f"{size} principal stress" for i, size in enumerate(SIZES, 1)},
     **{f"s{name.lower()}": f"stress {name.lower()}" for name in voigt.NAMES},
-    **{f"e{i}": f"principal strain {i}" for i in (1, 2, 3)},
+    **{f"e{i}": f"{size} principal strain" for i, size in enumerate(SIZES, 1)},
     **{
         f"e{name.lower()}": f"{'shear ' if name[0] != name[1] else ''}strain {name.lower()}"
         for name in voigt.NAMES
@@ -28,6 +29,8 @@ NAMES = {
     "error": "estimated error of each element in the energy norm",
 }
 """What each name means."""
+MOTIONS = ("displacement", "ux", "uy", "uz")
+"""Those that need nothing but displacements."""
 
 
 @runtime_checkable
@@ -56,11 +59,10 @@ def named_values(result: Fields, name: str) -> Values:
     title = NAMES[name]
     if name == "error":
         return Values(result.error().per_element, title, "√J", log=True)
-    if name in ("displacement", "reaction"):
-        vectors = result.u if name == "displacement" else result.reactions
-        return Values(np.linalg.norm(vectors, axis=1), title, "m" if name == "displacement" else "N")
-    if name[0] == "u":
-        return Values(result.u[:, "xyz".index(name[1])], title, "m")
+    if name in MOTIONS:
+        return motion_values(result.u, name)
+    if name == "reaction":
+        return Values(np.linalg.norm(result.reactions, axis=1), title, "N")
     if name[0] == "e":
         return Values(
             _component(
@@ -69,6 +71,12 @@ def named_values(result: Fields, name: str) -> Values:
             title,
         )
     return Values(_component(result.stress("node"), name if len(name) > 3 else name[1:]), title, "Pa")
+
+
+def motion_values(u: Array, name: str) -> Values:
+    """Return the values of displacements (n, 3) by a name of `MOTIONS`."""
+    numbers = np.linalg.norm(u, axis=1) if name == "displacement" else u[:, "xyz".index(name[1])]
+    return Values(numbers, NAMES[name], "m")
 
 
 def _component(tensor: Array, name: str) -> Array:

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.state import State, at
-from kratos_lite.bodies import Body
+from kratos_lite.analysis.state import State, at, check_state_of_body
+from kratos_lite.analysis.subjects import evenly
+from kratos_lite.bodies import Body, RigidLink
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
 from kratos_lite.validation import short, whole_number
-from kratos_lite.view.trajectory import trajectory_figure
+from kratos_lite.view.figure import Subject
+from kratos_lite.view.marks import Marks
+from kratos_lite.view.trajectory import Path, trajectory_figure
 
 SHOWN = 6
 """Positions in a picture."""
@@ -31,14 +34,17 @@ def path_figure(body: Body, given: dict[str, Any]) -> Any:
     rows = np.array([_row(body, state) for state in states])
     assert body.mesh is not None
     X, kept = body.mesh.points, [state.q for state in states]
-    positions = [body.position(X, kept[i]) for i in telling(body, kept, shown)]
-    curves = {name: rows[:, i] for i, name in enumerate(ENERGIES, 1) if rows[:, i].any()}
-    return trajectory_figure(
+    chosen = telling(body, kept, shown)
+    path = Path(
         body.mesh,
-        positions,
+        [body.position(X, kept[i]) for i in chosen],
+        [marks_of(body, kept[i]) for i in chosen],
         rows[:, 5:],
         rows[:, 0],
-        curves,
+        {name: rows[:, i] for i, name in enumerate(ENERGIES, 1) if rows[:, i].any()},
+    )
+    return trajectory_figure(
+        path,
         view=given["view"],
         title=given["title"] or "",
         unit="energy in J",
@@ -69,6 +75,38 @@ def _row(body: Body, state: State) -> Array:
             float(e) for e in (body.kinetic_energy(), body.internal_energy(), body.potential_energy())
         ]
         return np.concatenate([[state.time, *energies, sum(energies)], body.mass_center()])
+
+
+def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> list[Subject]:
+    """Return a body in its states, at most so many, with their times as titles."""
+    found = states_of(body, states)
+    assert body.mesh is not None
+    X, chosen = body.mesh.points, [found[row] for row in evenly(len(found), most)]
+    return [
+        Subject(
+            body.mesh,
+            body.position(X, check_state_of_body(state, body).q) - X,
+            None,
+            f"{title or ''}\nt = {state.time:.3f} s".strip(),
+            marks_of(body, state.q),
+            True,
+        )
+        for state in chosen
+    ]
+
+
+def marks_of(body: Body, q: Array) -> Marks:
+    """Return what holds a body in a configuration."""
+    rods, pivots = [], [np.zeros((0, 3))]
+    for constraint in body.constraints:
+        points = body.position(constraint.points, q)
+        if isinstance(constraint, RigidLink):
+            rods += [(point, constraint.anchor) for point in points]
+        else:
+            pivots.append(points)
+    springs = [(body.position(load.ends[0], q), load.ends[1]) for load in body.loads if load.ends is not None]
+    shape = (-1, 2, 3)
+    return Marks(np.reshape(rods, shape), np.reshape(springs, shape), np.concatenate(pivots))
 
 
 def telling(body: Body, kept: list[Array], shown: int) -> list[int]:

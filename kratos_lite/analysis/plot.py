@@ -1,49 +1,31 @@
-"""Pictures of whatever there is to see: meshes, models, results, bodies along their paths, elements."""
+"""Pictures and films of whatever there is to see: meshes, models, results, bodies, elements."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.analysis.named_values import Fields, named_values
-from kratos_lite.analysis.path_picture import path_figure
+from kratos_lite.analysis.path_picture import moving_subjects, path_figure
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.state import State
+from kratos_lite.analysis.subjects import options_of, panels_of, series_of
 from kratos_lite.bodies import Body
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
-from kratos_lite.mesh import Mesh
-from kratos_lite.model.structure import Structure
-from kratos_lite.records import replace
 from kratos_lite.shapes import Shape
-from kratos_lite.validation import finite, number, short
+from kratos_lite.validation import number, short, whole_number
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View
-from kratos_lite.view.figure import Options, Subject, Values, factor_of, figure_of
+from kratos_lite.view.figure import figure_of
 from kratos_lite.view.history import history_figure
 from kratos_lite.view.reference_cell import element_figure
 
-DEFAULT = "von_mises"
-"""What colors a result."""
-KINDS = (
-    "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
-    "an adaptive solution, or the class of an element"
-)
-
-
-@runtime_checkable
-class Transient(Protocol):
-    """A model in time."""
-
-    def state(self) -> State:
-        """Return the state of now."""
-
-    def result(self, state: State | None = None) -> Fields:
-        """Return the result of a state."""
+OF_STATES = 120
+"""Frames of a film of many states."""
 
 
 def plot(
@@ -52,6 +34,7 @@ def plot(
     *,
     values: ArrayLike | str | None = None,
     displacement: ArrayLike | None = None,
+    modes: ArrayLike | None = None,
     states: Iterable[State] | State | None = None,
     view: View | None = None,
     clim: Sequence[float] | None = None,
@@ -78,8 +61,9 @@ def plot(
         ``displacement``, ``ux``, ``uy``, ``uz``, ``reaction``, ``von_mises``, ``tresca``, principal stresses
         ``s1``, ``s2``, ``s3``, components ``sxx``, ``syy``, ``szz``, ``sxy``, ``syz``, ``szx``, the same of
         the strain as ``e1`` … ``ezx``, or ``error``, the estimate of each element.
-    displacement : (n, 3) m, in place of that of a result, such as the shape of a mode; the undeformed edges
-        are drawn thin.
+    displacement : (n, 3) m, in place of that of a result; the undeformed edges are drawn thin.
+    modes : (n, 3) or (k, n, 3), shapes of modes of a mesh or model, side by side; the largest displacement of
+        each is shown as a tenth of the body.
     states : of a body or a transient, in the order of time, or one.
     view : ``iso``, ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``, the side that is looked at; azimuth and
         elevation of the viewer in degrees; or the direction towards the viewer, (3,).  If not given, ``iso``,
@@ -133,6 +117,76 @@ def plot(
     return figure
 
 
+def animate(
+    path: str | Path,
+    thing: Any,
+    *,
+    values: ArrayLike | str | None = None,
+    modes: ArrayLike | None = None,
+    states: Iterable[State] | None = None,
+    view: View | None = None,
+    clim: Sequence[float] | None = None,
+    scale: float | str = "auto",
+    zoom: Any = None,
+    clip: Sequence[Any] | None = None,
+    title: str | None = None,
+    titles: Sequence[str] | None = None,
+    unit: str | None = None,
+    frames: int | None = None,
+    fps: float = 20.0,
+    size: tuple[float, float] = (6, 4.5),
+) -> None:
+    """Write a film of a thing in motion: all frames have one size, camera and scale of colors.
+
+    Parameters
+    ----------
+    path : film to write; .gif, or .mp4, which needs the program ffmpeg.
+    thing : a body or a transient with `states`; a mesh or model with `modes`, over one period; a list of
+        results, one after the other; or a result, which grows from the undeformed body and back.
+    values : what colors the surface, as for `plot`; the displacement of modes and transients if not given.
+    modes : (n, 3) or (k, n, 3), real or complex, shapes of modes, side by side.
+    states : of the body or the transient, in the order of time.
+    view, clim, scale, zoom, clip, title, unit : as for `plot`.
+    titles : of each of several modes, or above each of several results.
+    frames : how many; by default 24 of a period, and all of states, evenly chosen from more than 120.
+    fps : frames per second.
+    size : largest width and height in inches, at 150 dots per inch.
+
+    Raises
+    ------
+    InputError
+        There is nothing that moves, an option does not fit, or the file cannot be written.
+    ModelError
+        A body has no mesh, or is a batch of bodies.
+    KratosLiteError
+        matplotlib or ffmpeg is missing.
+
+    Examples
+    --------
+    >>> import kratos_lite as kl
+    >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    >>> body.set_velocity(linear=(1, 0, 0), angular=(0, 0, 1))
+    >>> spin = getfixture("tmp_path") / "spin.gif"
+    >>> kl.animate(spin, body, states=kl.integrate(body, 0.1, 4))
+    >>> spin.read_bytes()[:6]
+    b'GIF89a'
+    """
+    given = {name: value for name, value in locals().items() if name not in ("path", "thing")}
+    from kratos_lite.view.animation import check_animation, write_animation  # still pictures need none
+
+    check_animation(path)
+    number(fps, "fps", above=0, unit="1/s")
+    most = whole_number(OF_STATES if frames is None else frames, "frames", least=2)
+    if isinstance(thing, Body):
+        _only({**given, "frames": None, "fps": None}, "a body", ("states", "title", "size", "view", "zoom"))
+        subjects = moving_subjects(thing, states, most, title)
+        series, given["view"] = [[subject] for subject in subjects], view or "iso"
+        options = options_of(given, 1.0)
+    else:
+        series, options = series_of(thing, given, most)
+    write_animation(path, series, options, fps)
+
+
 def _figure(thing: Any, given: dict[str, Any]) -> Any:
     """Return the figure of a thing with the options that were given."""
     if isinstance(thing, Report):
@@ -149,7 +203,7 @@ def _figure(thing: Any, given: dict[str, Any]) -> Any:
             raise InputError(
                 f"{name} belongs to {'an element' if name == 'points' else 'a body'}; leave it out"
             )
-    return figure_of(*_subjects(thing, given))
+    return figure_of(*panels_of(thing, given))
 
 
 def _only(given: dict[str, Any], what: str, known: Sequence[str]) -> None:
@@ -183,105 +237,3 @@ def _element(kind: type, points: ArrayLike | None) -> Any:
             f"got {short(kind)}"
         )
     return element_figure(kind, points)
-
-
-# ---- models and results ----------------------------------------------------------------------------
-
-
-def _subjects(thing: Any, given: dict[str, Any]) -> tuple[list[Subject], Options]:
-    """Return what is drawn side by side, and how."""
-    things, titles = _several(thing, given)
-    single = len(things) == 1
-    subjects = [_subject(one, given) for one in things]
-    scale = None if given["scale"] == "auto" else number(given["scale"], "scale")
-    options = Options(
-        given["view"],
-        _clim(given["clim"]),
-        scale,
-        _zoom(given["zoom"]),
-        given["clip"],
-        given["size"] or (8, 6),
-    )
-    factor = factor_of(subjects, scale)
-    heads = [_head(subject, given["title"], factor) for subject in subjects]
-    if single and not titles:
-        return [replace(subjects[0], title=heads[0])], options
-    options.title = given["title"] if given["title"] is not None else heads[0]
-    return [replace(s, title=t) for s, t in zip(subjects, titles or [""] * len(things), strict=True)], options
-
-
-def _several(thing: Any, given: dict[str, Any]) -> tuple[list[Any], list[str]]:
-    """Return things to draw side by side and their titles, if any."""
-    titles = given["titles"]
-    if isinstance(thing, Transient):
-        states = thing.state() if given["states"] is None else given["states"]
-        states = [states] if isinstance(states, State) else list(states)
-        if not states:
-            raise InputError("there is no state to draw")
-        return [thing.result(state) for state in states], [f"t = {state.time:.4g} s" for state in states]
-    if given["states"] is not None:
-        raise InputError("states belong to a body or to a transient, model.transient(); leave them out")
-    if isinstance(thing, Mapping):
-        thing, titles = list(thing.values()), list(thing) if titles is None else titles
-    things = list(thing) if isinstance(thing, (list, tuple)) else [thing]
-    if not things:
-        raise InputError(f"there is nothing to draw in an empty list; give {KINDS}")
-    if titles is not None and (isinstance(titles, str) or len(titles) != len(things)):
-        raise InputError(f"titles: one for each of {len(things)} pictures is needed; got {short(titles)}")
-    return things, [str(title) for title in titles or []]
-
-
-def _subject(thing: Any, given: dict[str, Any]) -> Subject:
-    """Return what is drawn of a mesh, a model or a result."""
-    is_result = isinstance(thing, Fields)
-    mesh = thing if isinstance(thing, Mesh) else getattr(thing, "mesh", None)
-    if not isinstance(mesh, Mesh) or not (mesh is thing or is_result or isinstance(thing, Structure)):
-        raise InputError(f"{KINDS} can be drawn; got {short(thing)}")
-    u = thing.u if is_result else None
-    if given["displacement"] is not None:
-        u = finite(given["displacement"], "displacement", (mesh.n_nodes, 3))
-    return Subject(mesh, u, _values(thing if is_result else None, mesh, given))
-
-
-def _values(result: Fields | None, mesh: Mesh, given: dict[str, Any]) -> Values | None:
-    """Return what colors a mesh or a result."""
-    values, unit = given["values"], given["unit"]
-    if isinstance(values, str) or (values is None and result is not None):
-        if result is None:
-            raise InputError(f"a mesh or a model has no values {values!r}; solve it, or give an array")
-        named = named_values(result, DEFAULT if values is None else values)
-        return named if unit is None else replace(named, unit=unit)
-    if values is None:
-        return None
-    numbers = finite(values, "values")
-    if numbers.shape not in ((mesh.n_nodes,), (mesh.n_elements,)):
-        raise InputError(
-            f"values must have shape ({mesh.n_nodes},), a number for each node, or ({mesh.n_elements},), for "
-            f"each element; got {numbers.shape}"
-        )
-    return Values(numbers, unit=unit or "")
-
-
-def _head(subject: Subject, title: str | None, factor: float) -> str:
-    """Return the title, and beneath it the factor on the displacement."""
-    values = subject.values
-    first = title if title is not None else values.title if values else ""
-    return first if subject.u is None else f"{first}\ndeformation × {factor:g}".strip()
-
-
-def _clim(clim: Any) -> tuple[float, float] | None:
-    if clim is None:
-        return None
-    low, high = finite(clim, "clim, lowest and highest value of the colors,", (2,)).tolist()
-    if low >= high:
-        raise InputError(f"clim: the lowest value must be below the highest; got {short(clim)}")
-    return low, high
-
-
-def _zoom(zoom: Any) -> Any:
-    if zoom is None or isinstance(zoom, str):
-        return zoom
-    if np.ndim(zoom) == 0:
-        return number(zoom, "zoom, a factor, a part or a box,", above=0)
-    low, high = finite(zoom, "zoom, a factor, a part or a box ((x, y, z), (x, y, z)) in m,", (2, 3))
-    return np.minimum(low, high), np.maximum(low, high)

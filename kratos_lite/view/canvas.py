@@ -63,13 +63,12 @@ def new_figure(size: tuple[float, float]) -> tuple[Any, Any]:
     return figure, without_frame(figure.add_subplot())
 
 
-def new_figure_with_curves(size: tuple[float, float]) -> tuple[Any, Any, Any]:
-    """Return a figure with axes as those of `new_figure`, and beneath them axes for curves."""
-    figure = empty(size)
-    upper, lower = figure.subplots(2, 1, height_ratios=[3, 1])
-    lower.spines[["top", "right"]].set_visible(False)
-    lower.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True)
-    return figure, without_frame(upper), lower
+def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
+    """Return new axes for curves, with their lower left corner and size in inches."""
+    axes = axes_in_inches(figure, place, size)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True)
+    return axes
 
 
 def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
@@ -104,6 +103,23 @@ def axes_in_inches(figure: Any, place: Any, size: Any) -> Any:
     return figure.add_axes((place[0] / width, place[1] / height, size[0] / width, size[1] / height))
 
 
+def move(axes: Any, place: Any) -> None:
+    """Move axes with their lower left corner to a place in inches."""
+    box, (width, height) = axes.get_position(original=True), axes.figure.get_size_inches()
+    axes.set_position((place[0] / width, place[1] / height, box.width, box.height))
+
+
+def right_of(axes: Any) -> float:
+    """Return how far axes and their texts reach to the right of their left side, in inches."""
+    reach = axes.get_tightbbox(axes.figure.canvas.get_renderer()).x1 - axes.get_window_extent().x0
+    return float(reach) / DPI
+
+
+def title_widths(panels: list[Any]) -> list[float]:
+    """Return the widths of the titles of axes in inches."""
+    return [float(axes.title.get_window_extent().width) / DPI for axes in panels]
+
+
 def text_in_inches(figure: Any, place: tuple[float, float], text: str) -> None:
     """Write a title, centered, its foot at a place."""
     figure.text(*place, text, transform=figure.dpi_scale_trans, ha="center", va="bottom", size=11)
@@ -127,6 +143,12 @@ def fit(figure: Any, margin: float = 0.1) -> None:
     for text in figure.texts:
         text.set_position(np.array(text.get_position()) - corner)
     figure.set_size_inches(new)
+
+
+def pixels(figure: Any) -> Any:
+    """Return a figure as an array (height, width, 3) uint8, a copy."""
+    figure.canvas.draw()
+    return np.array(figure.canvas.buffer_rgba())[..., :3]
 
 
 # ---- files -----------------------------------------------------------------------------------------
@@ -170,8 +192,8 @@ def color_scale(low: float, high: float, *, log: bool = False) -> Any:
     return ScalarMappable(norm, colormaps["viridis"])
 
 
-def color_bar(axes: Any, colors: Any, unit: str, *, upright: bool) -> None:
-    """Fill axes with the color bar, with one prefix for all its numbers."""
+def color_bar(axes: Any, colors: Any, unit: str, extend: str, *, upright: bool) -> None:
+    """Fill axes with the color bar: one prefix for all numbers, and pointed where values lie beyond."""
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator
 
@@ -179,7 +201,7 @@ def color_bar(axes: Any, colors: Any, unit: str, *, upright: bool) -> None:
     power = int(np.clip(3 * np.floor(np.log10(max(abs(low), abs(high))) / 3), -24, 24))
     shown = FuncFormatter(lambda value, _: f"{round(value / 10.0**power, 9) + 0.0:g}")
     way = "vertical" if upright else "horizontal"
-    bar = axes.figure.colorbar(colors, cax=axes, orientation=way, format=shown)
+    bar = axes.figure.colorbar(colors, cax=axes, orientation=way, format=shown, extend=extend)
     if isinstance(colors.norm, LogNorm):
         bar.set_ticks(LogLocator(subs=(1, 2, 5)))
         bar.minorticks_off()
@@ -192,13 +214,13 @@ def color_bar(axes: Any, colors: Any, unit: str, *, upright: bool) -> None:
 # ---- what is drawn ---------------------------------------------------------------------------------
 
 
-def polygons(axes: Any, corners: Array, colors: Array, widths: Array) -> Any:
+def polygons(axes: Any, corners: Array, colors: Array) -> Any:
     """Draw flat polygons (m, k, 2) in their order, each edged in its own color (m, 4)."""
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
     return axes.add_collection(
-        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=widths, zorder=2),
+        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=0.45, zorder=2),
         autolim=False,
     )
 

@@ -21,6 +21,8 @@ LIGHT: Array = np.array([0.35, -0.65, 0.67])
 INK = (0.1, 0.1, 0.15, 0.55)
 MANY = 20000
 """Faces from which their edges are no longer drawn, and facets to aim at."""
+FINEST = 40
+"""Parts of an edge at most."""
 
 
 @record(eq=False)
@@ -48,6 +50,7 @@ def facets_of(
     rows: Array,
     plane: Plane | None = None,
     most: int = MANY,
+    window: tuple[Array, Array] | None = None,
 ) -> Facets:
     """Return what is seen of the surface of a body.
 
@@ -59,9 +62,11 @@ def facets_of(
     rows : of the camera.
     plane : where the body is cut; the part towards the viewer is taken away.
     most : facets to aim at.
+    window : what is shown, lower left and upper right in the picture; all if not given.
     """
-    n, edged = fineness(sum(map(len, mesh.boundary)), most)
-    parts = [_of_block(block, mesh, x, values, rows, plane, n) for block in mesh.boundary]
+    faces = [_inside(block, x, rows, window) for block in mesh.boundary]
+    n, edged = fineness(sum(map(len, faces)), most)
+    parts = [_of_block(block, mesh, x, values, rows, plane, n) for block in faces]
     if plane is not None:
         parts += [_of_cut(block, start, mesh, x, values, rows, plane) for block, start in _blocks(mesh)]
     joined = Facets(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
@@ -70,9 +75,19 @@ def facets_of(
     return joined
 
 
+def _inside(block: Block, x: Array, rows: Array, window: tuple[Array, Array] | None) -> Block:
+    """Return the faces that may be seen in a window."""
+    if window is None:
+        return block
+    flat = (x @ rows[:2].T)[block.nodes]
+    low, high = flat.min(axis=1), flat.max(axis=1)
+    margin = 0.25 * (high - low)  # a curved face reaches beyond its nodes by less
+    return block.take(((high + margin >= window[0]) & (low - margin <= window[1])).all(axis=1))
+
+
 def fineness(count: int, most: int = MANY) -> tuple[int, bool]:
     """Return into how many parts an edge of each of so many faces is cut, and whether edges are drawn."""
-    return int(np.clip(np.sqrt(most / max(count, 1)), 1, 16)), count < MANY
+    return int(np.clip(np.sqrt(most / max(count, 1)), 1, FINEST)), count < MANY
 
 
 def _blocks(mesh: Mesh) -> list[tuple[Block, int]]:
@@ -171,8 +186,7 @@ def draw_facets(axes: Any, rows: Array, facets: Facets, colors: Array, ink: Arra
     above = (near.max(axis=1) - near.mean(axis=1)).max() if len(P) else 0.0
     order = np.argsort(np.concatenate([near.mean(axis=1), E.mean(axis=1) @ rows[2] + above]), kind="stable")
     both = np.vstack([colors, np.tile(ink, (len(E), 1))])[order]
-    widths = np.repeat([0.4, 0.5], [len(P), len(E)])[order]
-    return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both, widths)
+    return polygons(axes, np.concatenate([P, E])[order] @ rows[:2].T, both)
 
 
 def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:
@@ -183,24 +197,36 @@ def colored(facets: Facets, colors: Any = None, strength: float = 1.0) -> Array:
 
 
 def outline(mesh: Mesh) -> Array:
-    """Return the sharp edges of the undeformed body, (m, 2, 3) m."""
-    return mesh.points[sharp_edges(mesh)]
+    """Return the sharp edges of the undeformed body in straight pieces, (m, 2, 3) m."""
+    rows, m = _sharp(mesh)
+    a, b = np.moveaxis(mesh.points[rows], 1, 0)
+    t = np.linspace(0, 1, 7 if (m != (a + b) / 2).any() else 2)[:, None, None]
+    curves = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
+    return np.stack([curves[:-1], curves[1:]], axis=2).reshape(-1, 2, 3)
 
 
 def sharp_edges(mesh: Mesh) -> Ints:
     """Return the edges along which faces of the undeformed body meet at an angle, (m, 2) rows of nodes."""
-    pairs, normals = [], []
+    return _sharp(mesh)[0]
+
+
+def _sharp(mesh: Mesh) -> tuple[Ints, Array]:
+    """Return sharp edges (m, 2) as rows of nodes, and their middles (m, 3) m."""
+    pairs, middles, normals = [], [], []
     for block in mesh.boundary:
         assert block.shape is not None
         X = mesh.points[block.nodes]
         normal = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        for edge in block.shape.edges:
+        for number, edge in enumerate(block.shape.edges, block.shape.corners):
             pairs.append(np.sort(block.nodes[:, list(edge)], axis=1))
+            straight = len(block.shape.nodes) == block.shape.corners
+            middles.append(X[:, list(edge)].mean(axis=1) if straight else X[:, number])
             normals.append(normal)
-    unique, which, counts = np.unique(np.vstack(pairs), axis=0, return_inverse=True, return_counts=True)
+    found = np.unique(np.vstack(pairs), axis=0, return_index=True, return_inverse=True, return_counts=True)
+    unique, first, which, counts = found
     mean = np.zeros((len(unique), 3))
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).
     sharp = (counts == 2) & (np.linalg.norm(mean, axis=1) < 2 * np.cos(np.radians(15)))
-    return np.asarray(unique[sharp])
+    return np.asarray(unique[sharp]), np.concatenate(middles)[first[sharp]]

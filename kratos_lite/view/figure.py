@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, box_corners, rows_of, window_of
-from kratos_lite.view.facets import colored, draw_facets, facets_of, outline
+from kratos_lite.view.facets import MANY, colored, draw_facets, facets_of, outline
+from kratos_lite.view.marks import Marks, draw_marks
 from kratos_lite.view.plane import Plane, plane_of
 from kratos_lite.view.rulers import draw_rulers, draw_triad, rounded
 
@@ -21,8 +22,8 @@ DECADES = 4
 """Powers of ten that a logarithmic scale of colors shows."""
 WIDE = 2.2
 """Width over height of a picture from which its color bar lies beneath."""
-LINE = 0.2
-"""Height of a line of a title, in inches."""
+GAP = 0.45
+"""Inches between panels; a title fits in."""
 
 
 @record(frozen=True, eq=False)
@@ -53,12 +54,16 @@ class Subject:
     u : (n, 3) m, displacement; None of what has none.
     values : what colors it.
     title : above the picture.
+    marks : what holds it.
+    moving : whether it moves through space, so that its first place is none to show.
     """
 
     mesh: Mesh
     u: Array | None = None
     values: Values | None = None
     title: str = ""
+    marks: Marks | None = None
+    moving: bool = False
 
 
 @record(eq=False)
@@ -86,6 +91,7 @@ class Scene:
     window : lower left and upper right of what is shown, in m in the picture.
     colors : scale of colors, or None.
     plane : that cuts the bodies, or None.
+    zoomed : whether the window cuts them off.
     """
 
     subjects: Sequence[Subject]
@@ -94,7 +100,7 @@ class Scene:
     window: tuple[Array, Array]
     colors: Any
     plane: Plane | None
-    zoomed: bool
+    zoomed: bool = False
 
     def place(self, subject: Subject) -> Array:
         """Return where the nodes of a subject are drawn, (n, 3) m."""
@@ -104,9 +110,9 @@ class Scene:
 def figure_of(subjects: Sequence[Subject], options: Options) -> Any:
     """Return the figure of some subjects, side by side."""
     scene = scene_of(subjects, options)
-    figure, panels = compose(scene, options)
+    figure, panels, inch = compose(scene, options)
     for axes, subject in zip(panels, subjects, strict=True):
-        draw_body(axes, scene, subject)
+        draw_body(axes, scene, subject, inch)
     return figure
 
 
@@ -131,18 +137,16 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
     scene.window = window_of(np.concatenate([_drawn(scene, subject) for subject in subjects]))
     if options.zoom is not None:
         scene.window = _zoomed(scene, options.zoom)
-    if plane is not None and not any((plane.distance(s.mesh.points) < 0).any() for s in subjects):
-        d = plane.distance(points)
-        raise InputError(
-            f"clip leaves nothing to draw: along its normal the body spans {d.min() + plane.offset:g} … "
-            f"{d.max() + plane.offset:g} m"
-        )
+    if plane is not None:
+        plane.check(points)
     return scene
 
 
 def _drawn(scene: Scene, subject: Subject) -> Array:
     """Return the nodes of a subject in the picture, (k, 2), deformed and not."""
-    points = [subject.mesh.points, scene.place(subject)]
+    points = [scene.place(subject)] if subject.moving else [subject.mesh.points, scene.place(subject)]
+    if subject.marks is not None:
+        points.append(subject.marks.points())
     return np.concatenate(points) @ scene.rows[:2].T
 
 
@@ -200,21 +204,42 @@ def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
 # ---- layout ----------------------------------------------------------------------------------------
 
 
-def compose(scene: Scene, options: Options) -> tuple[Any, list[Any]]:
-    """Return the figure with its axes, titles, rulers and color bar, all but the bodies, and the axes.
+def compose(scene: Scene, options: Options, title: str | None = None) -> tuple[Any, list[Any], float]:
+    """Return the figure with all but the bodies, its panels, and how many m are an inch in them.
 
-    Texts keep their size, so that what they leave for the body is found by laying it out twice.
+    A `title` takes the place of those of the subjects, as the longest one of an animation.
     """
-    low, high = scene.window
-    extent = high - low
+    extent = scene.window[1] - scene.window[0]
     columns = _columns(len(scene.subjects), extent, options.size)
-    lines = -(-len(scene.subjects) // columns)
-    counts, inside = np.array([columns, lines]), np.array(options.size, dtype=float)
+    counts = np.array([columns, -(-len(scene.subjects) // columns)])
+    last: list[Any] = []
+
+    def lay_out(inch: float) -> Any:
+        last[:] = [*_laid_out(scene, options, columns, inch, title), inch]
+        return last[0]
+
+    fitted(extent, counts, options.size, lay_out)
+    return last[0], last[1], last[2]
+
+
+def fitted(extent: Array, counts: Array, size: tuple[float, float], lay_out: Callable[[float], Any]) -> Any:
+    """Return the figure of a size that `lay_out` makes for the m of an inch.
+
+    Texts keep their size, so that what they leave for the bodies is found by laying it out twice.
+
+    Parameters
+    ----------
+    extent : (2,) m of each panel.
+    counts : (2,) panels from left to right and from top to bottom.
+    size : largest width and height in inches.
+    lay_out : makes a figure, for the number of m that are an inch in the picture.
+    """
+    inside = whole = np.array(size, dtype=float)
     for _ in range(2):
-        per_metre = float((np.maximum(inside, 0.2 * np.array(options.size)) / (extent * counts)).min())
-        figure, panels = _laid_out(scene, options, columns, 1 / per_metre)
-        inside = np.array(options.size) - (figure.get_size_inches() - per_metre * extent * counts)
-    return figure, panels
+        per_metre = float((np.maximum(inside, 0.2 * whole) / (extent * counts)).min())
+        figure = lay_out(1 / per_metre)
+        inside = whole - (figure.get_size_inches() - per_metre * extent * counts)
+    return figure
 
 
 def _columns(count: int, extent: Array, size: tuple[float, float]) -> int:
@@ -227,32 +252,39 @@ def _columns(count: int, extent: Array, size: tuple[float, float]) -> int:
     return max(range(1, count + 1), key=scale)
 
 
-def _laid_out(scene: Scene, options: Options, columns: int, inch: float) -> tuple[Any, list[Any]]:
+def _laid_out(
+    scene: Scene, options: Options, columns: int, inch: float, title: str | None
+) -> tuple[Any, list[Any]]:
     """Return figure and axes; `inch` is that many m in the picture."""
     low, high = scene.window
     size = (high - low) / inch
     figure = canvas.empty((20, 20), layout=None)
     panels: list[Any] = []
-    step = np.array([size[0] + 0.5, size[1] + 0.5])
-    for number, subject in enumerate(scene.subjects):
-        line, column = divmod(number, columns)
-        axes = canvas.without_frame(canvas.axes_in_inches(figure, (column * step[0], -line * step[1]), size))
+    for subject in scene.subjects:
+        axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_title(subject.title, fontsize=11, pad=8)
-        if scene.zoomed:
-            draw_triad(axes, scene.rows, scene.window)
-        elif not number:
-            draw_rulers(axes, scene.rows, subject.mesh.points, _drawn(scene, subject), inch)
+        axes.set_title(subject.title if title is None else title, fontsize=11, pad=8)
         panels.append(axes)
+    step = np.array([max(size[0], *canvas.title_widths(panels)) + GAP, size[1] + GAP])
+    # The rulers are those of the first panel of the last line, where they are in nobody's way.
+    first = (len(panels) - 1) // columns * columns
+    if scene.zoomed or scene.subjects[first].moving:
+        draw_triad(panels[first], scene.rows, scene.window, inch)
+    else:
+        subject = scene.subjects[first]
+        draw_rulers(panels[first], scene.rows, subject.mesh.points, _drawn(scene, subject), inch)
+        step[0] = max(step[0], canvas.right_of(panels[first]) + GAP / 2)
+    for number, axes in enumerate(panels):
+        line, column = divmod(number, columns)
+        canvas.move(axes, (column * step[0], -line * step[1]))
     if scene.colors is not None:
-        values = next(s.values for s in scene.subjects if s.values is not None)
-        _place_bar(figure, scene.colors, values.unit)
+        _place_bar(figure, scene)
     _place_title(figure, options.title)
     canvas.fit(figure)
     return figure, panels
 
 
-def _place_bar(figure: Any, colors: Any, unit: str) -> None:
+def _place_bar(figure: Any, scene: Scene) -> None:
     """Draw the color bar right of what is there, or beneath if that is wide."""
     (x0, y0), (x1, y1) = canvas.bounds(figure)
     upright = x1 - x0 < WIDE * (y1 - y0)
@@ -262,7 +294,13 @@ def _place_bar(figure: Any, colors: Any, unit: str) -> None:
     else:
         length = min(max(0.5 * (x1 - x0), 2.0), 4.0)
         place, size = ((x0 + x1 - length) / 2, y0 - 0.35), (length, 0.14)
-    canvas.color_bar(canvas.axes_in_inches(figure, place, size), colors, unit, upright=upright)
+    values = [subject.values for subject in scene.subjects if subject.values is not None]
+    low, high = scene.colors.get_clim()
+    below = any(v.numbers.min() < low for v in values if not v.log)
+    above = any(v.numbers.max() > high for v in values)
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
+    bar = canvas.axes_in_inches(figure, place, size)
+    canvas.color_bar(bar, scene.colors, values[0].unit, extend, upright=upright)
 
 
 def _place_title(figure: Any, title: str) -> None:
@@ -272,16 +310,21 @@ def _place_title(figure: Any, title: str) -> None:
         canvas.text_in_inches(figure, ((x0 + x1) / 2, y1 + 0.12), title)
 
 
-def draw_body(axes: Any, scene: Scene, subject: Subject) -> list[Any]:
+def draw_body(axes: Any, scene: Scene, subject: Subject, inch: float, most: int = MANY) -> list[Any]:
     """Draw one subject; return what was drawn."""
     drawn = []
-    if (subject.u is not None and subject.u.any()) or scene.plane is not None:
+    deformed = subject.u is not None and subject.u.any() and not subject.moving
+    if deformed or scene.plane is not None:
         ends = outline(subject.mesh)
         drawn.append(canvas.lines(axes, ends @ scene.rows[:2].T))
     values = None if subject.values is None else subject.values.numbers
-    facets = facets_of(subject.mesh, scene.place(subject), values, scene.rows, scene.plane)
+    window = scene.window if scene.zoomed else None
+    most *= 3 if scene.zoomed else 1  # many of them are not seen
+    facets = facets_of(subject.mesh, scene.place(subject), values, scene.rows, scene.plane, most, window)
     colors = colored(facets, None if values is None else scene.colors)
     drawn.append(draw_facets(axes, scene.rows, facets, colors))
     for artist in drawn:
         artist.set_clip_on(scene.zoomed)
+    if subject.marks is not None:
+        drawn += draw_marks(axes, scene.rows, subject.marks, inch)
     return drawn

@@ -29,20 +29,31 @@ FINEST = 8
 
 @record(frozen=True, eq=False)
 class Plane:
-    """The plane n·X = offset of the undeformed body; what has n·X > offset is taken away.
+    """The plane n·X = offset of the undeformed body; what lies on one side is taken away.
 
     Attributes
     ----------
     normal : (3,) unit vector.
     offset : m.
+    side : 1 if n·X > offset is taken away, else -1.
     """
 
     normal: Array
     offset: float
+    side: float
 
     def distance(self, X: Array) -> Array:
         """Return how far points (n, 3) lie beyond the plane, (n,) m."""
-        return X @ self.normal - self.offset
+        return self.side * (X @ self.normal - self.offset)
+
+    def check(self, X: Array) -> None:
+        """Raise InputError if the plane leaves nothing of points (n, 3)."""
+        if not (self.distance(X) < 0).any():
+            low, high = (X @ self.normal).min(), (X @ self.normal).max()
+            raise InputError(
+                f"clip leaves nothing to draw: along the normal of the plane, at {self.offset:g} m, the body "
+                f"spans {low:g} … {high:g} m"
+            )
 
 
 def plane_of(clip: Any, towards: Array) -> Plane | None:
@@ -65,7 +76,7 @@ def plane_of(clip: Any, towards: Array) -> Plane | None:
     if length == 0:
         raise InputError("the normal of clip must not be zero")
     sign = -1.0 if normal @ towards < -1e-9 * length else 1.0
-    return Plane(sign * normal / length, sign * number(offset, "the offset of clip", unit="m") / length)
+    return Plane(normal / length, number(offset, "the offset of clip", unit="m") / length, sign)
 
 
 def clip_facets(P: Array, d: Array) -> tuple[Array, Ints]:

@@ -75,37 +75,44 @@ def _label(axes: Any, place: Array, side: Array, text: str) -> Any:
 
 
 def _separate(axes: Any, texts: list[tuple[Any, Array]], inch: float) -> None:
-    """Move texts outwards until none lies on another."""
+    """Move texts outwards or along their rulers, as little as needed, until none lies on another."""
     renderer = axes.figure.canvas.get_renderer()
     placed: list[Any] = []
     for text, side in texts:
-        for _ in range(40):
-            box = text.get_window_extent(renderer).padded(4)
-            if not any(box.overlaps(other) for other in placed):
+        start = np.array(text.get_position())
+        for step in range(60):
+            across = np.array([-side[1], side[0]])
+            ways = [side, across, -across] if step else [side]
+            if any(_free(text, start + 0.05 * step * inch * way, renderer, placed) for way in ways):
                 break
-            text.set_position(np.array(text.get_position()) + 0.05 * inch * side)
-        placed.append(box)
+        placed.append(text.get_window_extent(renderer).padded(3))
 
 
-def draw_triad(axes: Any, rows: Array, drawn: tuple[Array, Array]) -> None:
-    """Draw the three axes, of one length that is written to them, at the lower left of a window."""
-    low, high = drawn
-    longest = float((high - low).max())
-    length = rounded(0.16 * longest)
-    start = low + 0.1 * length
-    for along in rows[:2].T:
-        if np.linalg.norm(along) < SHORTEST:
-            continue
-        start = np.maximum(start, low + length * np.maximum(-along, 0) * 1.3)
-    for name, along in zip("xyz", rows[:2].T, strict=True):
-        if np.linalg.norm(along) >= SHORTEST:
-            axes.plot(*np.array([start, start + length * along]).T, color=INK, lw=1.0, zorder=5)
-            axes.text(
-                *(start + 1.2 * length * along), name, ha="center", va="center", size=9, color=TEXT, zorder=5
-            )
+def _free(text: Any, place: Array, renderer: Any, placed: list[Any]) -> bool:
+    """Move a text to a place; return whether it lies on no other there."""
+    text.set_position(place)
+    box = text.get_window_extent(renderer).padded(3)
+    return not any(box.overlaps(other) for other in placed)
+
+
+def draw_triad(axes: Any, rows: Array, window: tuple[Array, Array], inch: float, down: float = 0.0) -> None:
+    """Draw the three axes and their length beneath the lower left of a window, `down` inches deeper."""
+    low, high = window
+    length = rounded(min(0.5 * inch, 0.3 * float((high - low).max())))
+    ends = length * rows[:2].T
+    start = (
+        low
+        - np.minimum(ends.min(axis=0), 0)
+        - (0, float(np.maximum(ends[:, 1], 0).max()) + (0.35 + down) * inch)
+    )
+    for name, end in zip("xyz", ends, strict=True):
+        if np.linalg.norm(end) >= SHORTEST * length:
+            axes.plot(*np.array([start, start + end]).T, color=INK, lw=1.0, clip_on=False)
+            place = start + end * (1 + 0.1 * inch / np.linalg.norm(end))
+            axes.text(*place, name, ha="center", va="center", size=9, color=TEXT)
     factor, unit = _unit(length)
-    below = start - (0, length * max(0.25, 0.25 - float(rows[1].min())))
-    axes.text(*below, f"{length * factor:g} {unit}", ha="center", va="top", size=9, color=TEXT, zorder=5)
+    place = start + np.array([np.maximum(ends[:, 0], 0).max() + 0.25 * inch, 0.0])
+    axes.text(*place, f"{length * factor:g} {unit}", ha="left", va="center", size=9, color=TEXT)
 
 
 def rounded(length: float) -> float:

@@ -9,42 +9,61 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
+from kratos_lite.records import record
 from kratos_lite.typing import Array
-from kratos_lite.view.camera import View, rows_of
-from kratos_lite.view.canvas import new_figure, new_figure_with_curves
+from kratos_lite.view import canvas
+from kratos_lite.view.camera import View, rows_of, window_of
 from kratos_lite.view.facets import INK, MANY, colored, draw_facets, facets_of
-from kratos_lite.view.rulers import rounded
+from kratos_lite.view.figure import fitted
+from kratos_lite.view.marks import Marks, draw_marks
+from kratos_lite.view.rulers import draw_triad
 
 FADED = 0.25
 """Strength of the colors of the first position; the last has 1."""
 PATH = "#c8442b"
+CURVES = (4.0, 1.3)
+"""Least width, and height, of the curves in inches."""
+
+
+@record(frozen=True, eq=False)
+class Path:
+    """A body along its path.
+
+    Attributes
+    ----------
+    mesh : the elements.
+    positions : of the nodes, each (n, 3) in m, in the order of time.
+    marks : what holds the body in each position.
+    centers : (k, 3) m, path of the mass center.
+    times : (k,) s.
+    curves : (k,) numbers against time by name.
+    """
+
+    mesh: Mesh
+    positions: Sequence[Array]
+    marks: Sequence[Marks]
+    centers: Array
+    times: Array
+    curves: Mapping[str, Array]
 
 
 def trajectory_figure(
-    mesh: Mesh,
-    positions: Sequence[Array],
-    centers: Array,
-    times: Array,
-    curves: Mapping[str, Array],
+    path: Path,
     *,
     view: View | None = None,
     title: str = "",
     unit: str = "J",
     size: tuple[float, float] = (8, 8),
 ) -> Any:
-    """Return a figure of positions of a body in isometric view, later ones stronger, and of curves.
+    """Return a figure of positions of a body, later ones stronger, and of curves.
 
     The first and the last position have their times beneath them; a triad of axes shows directions and scale.
     The curves, against time, are beneath; one time alone has none.
 
     Parameters
     ----------
-    mesh : the elements.
-    positions : of the nodes, each (n, 3) in m, in the order of time.
-    centers : (k, 3) m, path of the mass center.
-    times : (k,) s.
-    curves : (k,) numbers against time by name.
-    view : where one looks from, as for `kratos_lite.plot`.
+    path : what is drawn.
+    view : where one looks from, as for `kratos_lite.plot`; isometric if not given.
     title : above the picture.
     unit : of the curves.
     size : largest width and height in inches, at 150 dots per inch.
@@ -60,23 +79,52 @@ def trajectory_figure(
     KratosLiteError
         matplotlib is missing.
     """
-    if not mesh.boundary or not len(positions):
+    if not path.mesh.boundary or not len(path.positions):
         raise InputError("there is nothing to draw: no position, or no element of a known shape")
-    figure, axes, below = new_figure_with_curves(size) if len(times) > 1 else (*new_figure(size), None)
-    everything = np.concatenate([*positions, centers])
+    everything = np.concatenate([*path.positions, path.centers, *(marks.points() for marks in path.marks)])
     rows = rows_of("iso" if view is None else view, everything)
-    for strength, x in zip(np.linspace(FADED, 1, len(positions)), positions, strict=True):
-        _body(axes, mesh, rows, x, float(strength) if len(positions) > 1 else 1.0, MANY // len(positions))
-    axes.plot(*(centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
-    axes.plot(*(centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)
-    corners = everything @ rows[:2].T
-    axes.update_datalim(corners)
-    _label_times(axes, rows, positions, times, 0.05 * float(np.ptp(corners, axis=0).max()))
-    _triad(axes, rows, corners)
-    axes.autoscale_view()
-    axes.set_title(title, fontsize=11)
-    if below is not None:
-        _draw_curves(below, times, curves, unit)
+    window = window_of(everything @ rows[:2].T)
+    scale: list[float] = []
+
+    def lay_out(inch: float) -> Any:
+        scale[:] = [inch]
+        return _laid_out(path, rows, window, inch, title, unit)
+
+    figure = fitted(window[1] - window[0], np.ones(2), size, lay_out)
+    axes = figure.axes[0]
+    for strength, x, marks in zip(_strengths(path), path.positions, path.marks, strict=True):
+        facets = facets_of(path.mesh, x, None, rows, most=MANY // len(path.positions))
+        ink = (*INK[:3], INK[3] * strength)
+        draw_facets(axes, rows, facets, colored(facets, strength=strength), ink).set_clip_on(False)
+        draw_marks(axes, rows, marks, scale[0], strength)
+    axes.plot(*(path.centers @ rows[:2].T).T, color=PATH, lw=1.2, zorder=3)
+    axes.plot(*(path.centers[[0, -1]] @ rows[:2].T).T, ".", color=PATH, ms=6, zorder=3)
+    return figure
+
+
+def _strengths(path: Path) -> list[float]:
+    count = len(path.positions)
+    return [float(s) for s in np.linspace(FADED, 1, count)] if count > 1 else [1.0]
+
+
+def _laid_out(
+    path: Path, rows: Array, window: tuple[Array, Array], inch: float, title: str, unit: str
+) -> Any:
+    """Return the figure with all but the body; `inch` is that many m in the picture."""
+    figure = canvas.empty((20, 20), layout=None)
+    size = (window[1] - window[0]) / inch
+    axes = canvas.without_frame(canvas.axes_in_inches(figure, (0, 0), size))
+    axes.set(xlim=(window[0][0], window[1][0]), ylim=(window[0][1], window[1][1]))
+    axes.set_title(title, fontsize=11, pad=8)
+    _label_times(axes, rows, path, 0.05 * float((window[1] - window[0]).max()))
+    draw_triad(axes, rows, window, inch, 0.2)
+    if len(path.times) > 1 and path.curves:
+        (_, low), _ = canvas.bounds(figure)
+        width = max(size[0], CURVES[0])
+        place = ((size[0] - width) / 2, low - CURVES[1] - 0.15)
+        below = canvas.axes_for_curves(figure, place, (width, CURVES[1]))
+        _draw_curves(below, path.times, path.curves, unit)
+    canvas.fit(figure)
     return figure
 
 
@@ -87,35 +135,26 @@ def _draw_curves(below: Any, times: Array, curves: Mapping[str, Array], unit: st
         below.plot(times, values, label=name, **style)
     below.set_xlabel("time in s")
     below.set_ylabel(unit)
-    if curves:
-        below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    below.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _label_times(axes: Any, rows: Array, positions: Sequence[Array], times: Array, near: float) -> None:
+def _label_times(axes: Any, rows: Array, path: Path, near: float) -> None:
     """Write the times of the first and the last position beneath them; as one text if these are one."""
-    ends = [x @ rows[:2].T for x in (positions[0], positions[-1])]
-    feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{times[i]:.3g} s" for i in (0, -1)]
+    ends = [x @ rows[:2].T for x in (path.positions[0], path.positions[-1])]
+    feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{path.times[i]:.3g} s" for i in (0, -1)]
     if np.abs(ends[0] - ends[1]).max() < near:
         feet, texts = feet[1:], [" and ".join(dict.fromkeys(texts))]
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
     for foot, text in zip(feet, texts, strict=True):
         axes.annotate(
-            text, foot, (0, -4), textcoords="offset points", ha="center", va="top", size=9, bbox=box, zorder=4
+            text,
+            foot,
+            (0, -4),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            size=9,
+            bbox=box,
+            zorder=6,
+            annotation_clip=False,
         )
-
-
-def _triad(axes: Any, rows: Array, drawn: Array) -> None:
-    """Draw the three axes, of one length that is written to them, left of and below what is drawn."""
-    (left, low), extent = drawn.min(axis=0), float(np.ptp(drawn, axis=0).max())
-    length = rounded(0.2 * extent)
-    start = np.array([left - 1.1 * length, low + 0.41 * length])
-    for name, along in zip("xyz", rows[:2].T, strict=True):
-        axes.plot(*np.array([start, start + length * along]).T, color="0.35", lw=1.0, zorder=3)
-        axes.text(*(start + 1.18 * length * along), name, ha="center", va="center", size=9, color="0.25")
-    axes.text(*(start - (0, 0.5 * length)), f"{length:g} m", ha="center", va="top", size=9, color="0.25")
-
-
-def _body(axes: Any, mesh: Mesh, rows: Array, x: Array, strength: float, most: int) -> None:
-    """Draw one position over those before it, its colors mixed with white."""
-    facets = facets_of(mesh, x, None, rows, most=most)
-    draw_facets(axes, rows, facets, colored(facets, strength=strength), (*INK[:3], INK[3] * strength))

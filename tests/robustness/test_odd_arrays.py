@@ -363,7 +363,8 @@ ELSEWHERE = {
     *(("Motion", name) for name in ("rate", "acceleration", "part")),
     *((name, "C") for name in ("B_at_gauss_points", "internal_load", "strain")),
     *((name, "xi") for name in ("N", "dN")),
-    *(("plot", name) for name in ("clim", "displacement", "points", "values")),
+    *(("plot", name) for name in ("clim", "displacement", "modes", "points", "values")),
+    *(("animate", name) for name in ("clim", "modes", "values")),
     ("PlacedCell", "X"),
     ("Block", "shape"),
 }

@@ -45,6 +45,7 @@ class AppliedLoad:
     follows_velocity : whether it may depend on the velocity.
     amplitude : function of the time in s.
     steady : whether the amplitude never changes.
+    ends : point of the body and anchor in space of a spring, for pictures.
     """
 
     generalized: Generalized
@@ -56,6 +57,7 @@ class AppliedLoad:
     follows_velocity: bool = False
     amplitude: Callable[[float], float] = lambda time: 1.0
     steady: bool = True
+    ends: tuple[Array, Array] | None = None
 
     @classmethod
     def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> AppliedLoad:

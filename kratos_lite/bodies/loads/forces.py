@@ -127,7 +127,13 @@ class Spring(BodyLoad):
             return np.asarray(self.stiffness * stretch**2 / 2)
 
         damped = callable(self.stiffness) or self.damping > 0
-        return AppliedLoad(generalized, tangent=tangent, potential_energy=potential, follows_velocity=damped)
+        return AppliedLoad(
+            generalized,
+            tangent=tangent,
+            potential_energy=potential,
+            follows_velocity=damped,
+            ends=(X, anchor),
+        )
 
     def _stiffness(self, elongation: float, rate: float, distance: float) -> tuple[float, float]:
         """Return the derivative of the pull along the spring, and across it, at rest, in N/m."""

@@ -1,0 +1,248 @@
+"""Subjects of pictures: what is drawn of meshes, models, results, modes and transients, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from kratos_lite.analysis.named_values import MOTIONS, Fields, motion_values, named_values
+from kratos_lite.analysis.state import State
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.structure import Structure
+from kratos_lite.records import replace
+from kratos_lite.typing import Array, Numbers
+from kratos_lite.validation import finite, number, short
+from kratos_lite.view.figure import Options, Subject, Values, factor_of
+
+DEFAULT = "von_mises"
+"""What colors a result."""
+PERIOD = 24
+"""Frames of a period."""
+AMPLITUDE = 0.1
+"""Largest displacement of a mode as it is drawn, of the size of the body."""
+KINDS = (
+    "a mesh, a model, a result, several of them, a body with states, a transient with states, the report of "
+    "an adaptive solution, or the class of an element"
+)
+
+
+@runtime_checkable
+class Transient(Protocol):
+    """A model in time."""
+
+    def state(self) -> State:
+        """Return the state of now."""
+
+    def result(self, state: State | None = None) -> Fields:
+        """Return the result of a state."""
+
+
+def panels_of(thing: Any, given: dict[str, Any]) -> tuple[list[Subject], Options]:
+    """Return what is drawn side by side, and how."""
+    if given["modes"] is not None:
+        shapes, titles = _modes(thing, given)
+        options = options_of(given, _factor(given, 1.0))
+        return _phase(thing, given, shapes, titles, 1.0), options
+    things, titles = _several(thing, given)
+    subjects = [_subject(one, given) for one in things]
+    options = options_of(given, _factor(given, None))
+    heads = _heads(subjects, given, factor_of(subjects, options.scale))
+    if len(things) == 1 and not titles:
+        return [replace(subjects[0], title=heads)], options
+    options.title = heads
+    return [replace(s, title=t) for s, t in zip(subjects, titles or [""] * len(things), strict=True)], options
+
+
+def series_of(thing: Any, given: dict[str, Any], most: int) -> tuple[list[list[Subject]], Options]:
+    """Return the frames of a film, each of some subjects side by side, and how they are drawn."""
+    given["displacement"] = None
+    phases = np.arange(given["frames"] or PERIOD) / (given["frames"] or PERIOD)
+    if given["modes"] is not None:
+        shapes, titles = _modes(thing, given)
+        turns = np.exp(2j * np.pi * phases)
+        return [_phase(thing, given, shapes, titles, turn) for turn in turns], options_of(
+            given, _factor(given, 1.0)
+        )
+    if isinstance(thing, Transient) and given["values"] is None:
+        given["values"] = "displacement"
+    things, titles = _several(thing, given)
+    if len(things) > 1:
+        rows = evenly(len(things), most)
+        subjects = [_subject(things[row], given) for row in rows]
+        titles = [titles[row] for row in rows] if titles else [""] * len(rows)
+    else:
+        if not isinstance(things[0], Fields) or not things[0].u.any():
+            raise InputError("nothing moves here: give modes, states, or a result with displacements")
+        subjects = [
+            _grown(_subject(things[0], given), share) for share in (1 - np.cos(2 * np.pi * phases)) / 2
+        ]
+        titles = [""] * len(subjects)
+    scale = factor_of(subjects, _factor(given, None))
+    heads = _heads(subjects, given, scale)
+    return [
+        [replace(subject, title=f"{heads}\n{title}".strip())]
+        for subject, title in zip(subjects, titles, strict=True)
+    ], options_of(given, scale)
+
+
+def options_of(given: dict[str, Any], scale: float | None) -> Options:
+    """Return how subjects are drawn."""
+    size = given["size"] or (8, 6)
+    return Options(given["view"], _clim(given["clim"]), scale, _zoom(given["zoom"]), given["clip"], size)
+
+
+def evenly(count: int, most: int) -> list[int]:
+    """Return at most so many of 0 … count - 1, evenly spread, the first and the last among them."""
+    return [int(row) for row in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
+
+
+def _factor(given: dict[str, Any], otherwise: float | None) -> float | None:
+    """Return the factor on displacements that was given; else another."""
+    return otherwise if given["scale"] == "auto" else number(given["scale"], "scale")
+
+
+def _several(thing: Any, given: dict[str, Any]) -> tuple[list[Any], list[str]]:
+    """Return things to draw and their titles, if any."""
+    titles = given["titles"]
+    if isinstance(thing, Transient):
+        states = thing.state() if given["states"] is None else given["states"]
+        states = [states] if isinstance(states, State) else list(states)
+        if not states:
+            raise InputError("there is no state to draw")
+        return [thing.result(state) for state in states], [f"t = {state.time:.4g} s" for state in states]
+    if given["states"] is not None:
+        raise InputError("states belong to a body or to a transient, model.transient(); leave them out")
+    if isinstance(thing, Mapping):
+        thing, titles = list(thing.values()), list(thing) if titles is None else titles
+    things = list(thing) if isinstance(thing, (list, tuple)) else [thing]
+    if not things:
+        raise InputError(f"there is nothing to draw in an empty list; give {KINDS}")
+    return things, _titles(titles, len(things))
+
+
+def _titles(titles: Any, count: int) -> list[str]:
+    if titles is not None and (isinstance(titles, str) or len(titles) != count):
+        raise InputError(f"titles: one for each of {count} pictures is needed; got {short(titles)}")
+    return [str(title) for title in titles or []]
+
+
+# ---- one subject -----------------------------------------------------------------------------------
+
+
+def _mesh(thing: Any) -> Mesh:
+    """Return the mesh of a mesh, a model or a result; InputError for anything else."""
+    if isinstance(thing, Mesh):
+        return thing
+    if not isinstance(thing, (Structure, Fields)):
+        raise InputError(f"{KINDS} can be drawn; got {short(thing)}")
+    return thing.mesh
+
+
+def _subject(thing: Any, given: dict[str, Any]) -> Subject:
+    """Return what is drawn of a mesh, a model or a result."""
+    mesh, result = _mesh(thing), thing if isinstance(thing, Fields) else None
+    u = None if result is None else result.u
+    if given["displacement"] is not None:
+        u = finite(given["displacement"], "displacement", (mesh.n_nodes, 3))
+    return Subject(mesh, u, _values(result, mesh, u, given))
+
+
+def _values(result: Fields | None, mesh: Mesh, u: Array | None, given: dict[str, Any]) -> Values | None:
+    """Return what colors a mesh or a result."""
+    values, unit = given["values"], given["unit"]
+    if isinstance(values, str) or (values is None and result is not None):
+        name = DEFAULT if values is None else values
+        if u is not None and name in MOTIONS:
+            named = motion_values(u, name)
+        elif result is None:
+            raise InputError(f"a mesh or a model has no values {name!r}; solve it, or give an array")
+        else:
+            named = named_values(result, name)
+        return named if unit is None else replace(named, unit=unit)
+    if values is None:
+        return None
+    numbers = finite(values, "values")
+    if numbers.shape not in ((mesh.n_nodes,), (mesh.n_elements,)):
+        raise InputError(
+            f"values must have shape ({mesh.n_nodes},), a number for each node, or ({mesh.n_elements},), for "
+            f"each element; got {numbers.shape}"
+        )
+    return Values(numbers, unit=unit or "")
+
+
+def _grown(subject: Subject, share: float) -> Subject:
+    """Return a share of a linear response."""
+    values = subject.values
+    if values is not None and not values.log:
+        values = replace(values, numbers=share * values.numbers)
+    assert subject.u is not None
+    return replace(subject, u=share * subject.u, values=values)
+
+
+def _heads(subjects: Sequence[Subject], given: dict[str, Any], factor: float) -> str:
+    """Return the title, and beneath it the factor on the displacement."""
+    values = subjects[0].values
+    first = given["title"] if given["title"] is not None else values.title if values else ""
+    return first if subjects[0].u is None else f"{first}\ndeformation × {factor:g}".strip()
+
+
+# ---- modes -----------------------------------------------------------------------------------------
+
+
+def _modes(thing: Any, given: dict[str, Any]) -> tuple[Numbers, list[str]]:
+    """Return shapes (k, n, 3) with the amplitude with which they are drawn, and their titles."""
+    mesh, shapes = _mesh(thing), np.asarray(given["modes"])
+    for part in (shapes.real, shapes.imag):
+        finite(part, "modes")
+    if shapes.shape[-2:] != (mesh.n_nodes, 3) or shapes.ndim not in (2, 3) or not len(shapes):
+        raise InputError(
+            f"modes must have shape ({mesh.n_nodes}, 3) or (k, {mesh.n_nodes}, 3); got {shapes.shape}"
+        )
+    titles = given["titles"]
+    if shapes.ndim == 2:
+        shapes, titles = shapes[None], [given["title"] or "mode"] if titles is None else titles
+    elif titles is None:
+        titles = [f"mode {i}" for i in range(1, len(shapes) + 1)]
+    largest = np.linalg.norm(shapes, axis=2).max(axis=1)
+    size = AMPLITUDE * np.linalg.norm(np.ptp(mesh.points, axis=0))
+    return shapes * (size / np.where(largest > 0, largest, 1.0))[:, None, None], _titles(titles, len(shapes))
+
+
+def _phase(
+    thing: Any, given: dict[str, Any], shapes: Numbers, titles: list[str], turn: complex
+) -> list[Subject]:
+    """Return modes side by side in a phase, colored by their displacement as a share of the largest one."""
+    mesh = _mesh(thing)
+    u = (shapes * turn).real
+    size = np.linalg.norm(shapes, axis=2).max(axis=1)
+    subjects = []
+    for shape, largest, title in zip(u, size, titles, strict=True):
+        values = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
+        if given["values"] is not None:
+            values = _values(None, mesh, shape / (largest or 1.0), given)
+        subjects.append(Subject(mesh, shape, values, title))
+    return subjects
+
+
+# ---- options ---------------------------------------------------------------------------------------
+
+
+def _clim(clim: Any) -> tuple[float, float] | None:
+    if clim is None:
+        return None
+    low, high = finite(clim, "clim, lowest and highest value of the colors,", (2,)).tolist()
+    if low >= high:
+        raise InputError(f"clim: the lowest value must be below the highest; got {short(clim)}")
+    return low, high
+
+
+def _zoom(zoom: Any) -> Any:
+    if zoom is None or isinstance(zoom, str):
+        return zoom
+    if np.ndim(zoom) == 0:
+        return number(zoom, "zoom, a factor, a part or a box,", above=0)
+    low, high = finite(zoom, "zoom, a factor, a part or a box ((x, y, z), (x, y, z)) in m,", (2, 3))
+    return np.minimum(low, high), np.maximum(low, high)

@@ -1,0 +1,72 @@
+"""Marks: what holds a body: anchors in space, rods and springs to them, and pivots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.records import field, record
+from kratos_lite.typing import Array
+
+DARK = "#3a3a44"
+COILS = 7
+"""Of a spring."""
+
+
+def _none() -> Array:
+    return np.zeros((0, 2, 3))
+
+
+@record(frozen=True, eq=False)
+class Marks:
+    """What holds a body.
+
+    Attributes
+    ----------
+    rods, springs : (k, 2, 3) m, from a point of the body to an anchor in space.
+    pivots : (k, 3) m, points of the body that are held.
+    """
+
+    rods: Array = field(default_factory=_none)
+    springs: Array = field(default_factory=_none)
+    pivots: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def points(self) -> Array:
+        """Return all that must be in the picture, (k, 3) m."""
+        return np.concatenate([self.rods.reshape(-1, 3), self.springs.reshape(-1, 3), self.pivots])
+
+
+def draw_marks(axes: Any, rows: Array, marks: Marks, inch: float, strength: float = 1.0) -> list[Any]:
+    """Draw marks over the bodies; return what was drawn.  `inch` is that many m in the picture."""
+    flat = rows[:2].T
+    drawn = []
+    for a, b in marks.rods @ flat:
+        drawn += axes.plot(*np.array([a, b]).T, color=DARK, lw=2.0, alpha=strength, zorder=4, clip_on=False)
+    for a, b in marks.springs @ flat:
+        drawn += axes.plot(
+            *_coil(a, b, 0.06 * inch).T, color=DARK, lw=1.0, alpha=strength, zorder=4, clip_on=False
+        )
+    anchors = np.concatenate([marks.rods[:, 1], marks.springs[:, 1]]) @ flat
+    joints = np.concatenate([marks.rods[:, 0], marks.springs[:, 0], marks.pivots]) @ flat
+    drawn += _dots(axes, anchors, "s", 7, DARK, 1.0)
+    drawn += _dots(axes, joints, "o", 5, "w", strength)
+    return drawn
+
+
+def _dots(axes: Any, places: Array, marker: str, size: float, face: str, strength: float) -> list[Any]:
+    style = {"ls": "", "marker": marker, "ms": size, "mfc": face, "mec": DARK, "mew": 1.2, "alpha": strength}
+    return list(axes.plot(*places.T, **style, zorder=5, clip_on=False)) if len(places) else []
+
+
+def _coil(a: Array, b: Array, width: float) -> Array:
+    """Return the corners of a zigzag between two points, (k, 2)."""
+    along = b - a
+    length = float(np.linalg.norm(along))
+    if length == 0:
+        return np.array([a, b])
+    across = width * np.array([-along[1], along[0]]) / length
+    t = np.linspace(0.15, 0.85, 2 * COILS + 1)[1:-1]
+    sides = np.where(np.arange(len(t)) % 2 == 0, 1.0, -1.0)
+    zigzag = a + t[:, None] * along + sides[:, None] * across
+    return np.vstack([a, a + 0.15 * along, zigzag, a + 0.85 * along, b])
