@@ -269,6 +269,22 @@ def test_the_pointer_sees_the_section_behind_what_is_cut_away(page):
     assert abs(found["point"][0] - page("return page.offset")) < 1e-4
 
 
+def test_a_saved_picture_has_the_legend(page):
+    page.pixels()
+    top, bottom, body = page("""
+        const canvas = page.legend.over(page.stage.renderer.domElement), pen = canvas.getContext("2d");
+        const view = document.getElementById("view").getBoundingClientRect();
+        const box = ramp.getBoundingClientRect();
+        const pixel = (x, y) => pen.getImageData(x - view.left, y - view.top, 1, 1).data;
+        const color = (x, y) => Array.from(pixel(x, y).slice(0, 3));
+        return [color(box.left + 8, box.top + 1), color(box.left + 8, box.bottom - 2),
+                color(view.left + view.width / 2, view.top + view.height / 2)];
+    """)
+    assert abs(np.array(top) - (253, 231, 37)).max() < 8
+    assert abs(np.array(bottom) - (68, 1, 84)).max() < 8
+    assert min(body) < 200
+
+
 def test_animation_moves_the_body_and_stops(page):
     page.click("play")
     seen = {page.pixels() for _ in range(5)}
@@ -290,7 +306,7 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
         seen.add(browser.pixels())
     assert len(seen) == 3
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 10, 0.02)
+    wait = WebDriverWait(browser.driver, 30, 0.02)
     for sign in (-1, 1):
         wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
 
@@ -323,7 +339,7 @@ def test_states_play_with_one_range_for_all(browser, model, tmp_path):
     assert browser.pixels() != first
     assert abs(browser.array("page.displacement") - states[6].u.ravel()).max() < 1e-4 * largest
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 10, 0.02)
+    wait = WebDriverWait(browser.driver, 30, 0.02)
     wait.until(lambda _: browser("return page.frame") != 6)
 
 

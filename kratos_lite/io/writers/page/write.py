@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 OURS = Path(__file__).with_name("browser")
 LARGEST = 1e38
 """Largest number in a page, which has single precision."""
-SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "app.js")
+SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
 
 
 def write_page(path: str | Path, content: Content) -> None:
