@@ -27,6 +27,8 @@ extensions = [
     "sphinx_design",
     "command_line",
     "docstrings",
+    "browser_pages",
+    "gallery",
     "known_words",
     "public_names",
 ]
@@ -35,7 +37,7 @@ nitpicky = True
 
 # ---- pages and notebooks ---------------------------------------------------------------------------
 
-myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_in_temp = True

@@ -84,6 +84,7 @@ from kratos_lite.io.files import read_case as read_case
 from kratos_lite.io.files import write as write
 from kratos_lite.io.run import run as run
 from kratos_lite.io.runners.outcome import Outcome as Outcome
+from kratos_lite.io.writers.modes import write_modes as write_modes
 from kratos_lite.io.writers.series import SeriesWriter as SeriesWriter
 from kratos_lite.io.writers.state import read_state as read_state
 from kratos_lite.materials import MATERIALS as MATERIALS

@@ -202,19 +202,11 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
 
 
 def _check_python(path: Path) -> int:
-    from kratos_lite.testing import failures, run_file
+    from kratos_lite.testing import failures, report, run_file
 
-    broken = 0
-    for name, findings in run_file(path):
-        failed = failures(findings)
-        broken += len(failed)
-        skipped = sum(finding.skipped for finding in findings)
-        passed = len(findings) - len(failed) - skipped
-        print(f"{name}: {passed} checks passed, {len(failed)} failed, {skipped} not run")
-        for finding in findings:
-            word = "ok" if finding.passed else "not run" if finding.skipped else "FAILED"
-            print(f"  {word:<8}{finding}")
-    return EXIT_UNSOLVABLE if broken else 0
+    checked = run_file(path)
+    _print([report(name, findings, whole=True) for name, findings in checked])
+    return EXIT_UNSOLVABLE if any(failures(findings) for _, findings in checked) else 0
 
 
 def convert(options: Namespace) -> int:

@@ -16,6 +16,7 @@ Anything else in one of them is an InputError.
 from __future__ import annotations
 
 import os
+import sys
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -74,7 +75,21 @@ def _warn_once(why: str) -> None:
     import logging
 
     log = logging.getLogger("kratos_lite")
-    log.warning("compiled kernels are not available (%s); computing with NumPy", why)
+    log.warning("compiled kernels are not available (%s); computing with NumPy%s", why, _cure())
+
+
+def _cure() -> str:
+    """Return how to get kernels in a source tree: Python prefers the one it runs in to what is installed."""
+    from pathlib import Path
+
+    here = Path(__file__).parents[2]
+    if not (here / "setup.py").is_file():
+        return ""
+    elsewhere = [Path(folder) for folder in sys.path if folder and Path(folder).resolve() != here.resolve()]
+    found = [folder for folder in elsewhere if any((folder / "kratos_lite" / "native").glob("_gauss.*"))]
+    installed = f"run elsewhere to use what is installed in {found[0]}, or " if found else ""
+    tree = f"This is the source tree of kratos_lite in {here}"
+    return f". {tree}: {installed}build them here by pip install -e ."
 
 
 def threads() -> int:

@@ -116,10 +116,10 @@ inline void run(Kernel kernel, const Elements& w, int64_t first, int64_t last) {
 }
 
 // What a kernel finds for each element: rows of an array of this shape.
-inline Array<double> per_element(Kernel kernel, Elements w, std::vector<py::ssize_t> shape) {
+inline Array<double> per_element(Kernel kernel, Elements w, std::initializer_list<int64_t> shape) {
     Array<double> out(shape);
     w.out = out.mutable_data();
-    py::gil_scoped_release release;
+    GilReleased release;
     run(kernel, w, 0, w.last);
     return out;
 }
@@ -127,10 +127,10 @@ inline Array<double> per_element(Kernel kernel, Elements w, std::vector<py::ssiz
 // The sum (n, width) of what a kernel finds for each node (k, width) of each element.
 template <int width>
 Array<double> scattered(Kernel kernel, Elements w) {
-    Array<double> total({static_cast<py::ssize_t>(w.n), static_cast<py::ssize_t>(width)});
+    Array<double> total({w.n, int64_t{width}});
     double* to = total.mutable_data();
     std::fill_n(to, total.size(), 0.0);
-    py::gil_scoped_release release;
+    GilReleased release;
     std::vector<double> found(std::min(w.last, BATCH) * w.k * width);
     w.out = found.data();
     for (w.origin = 0; w.origin < w.last; w.origin += BATCH) {
@@ -150,7 +150,7 @@ struct Totals {
 
 // Sum and maximum of the two numbers that a kernel finds for an element; sums of GRAIN are added in order.
 inline Totals totaled(Kernel kernel, Elements w) {
-    py::gil_scoped_release release;
+    GilReleased release;
     std::vector<double> found(2 * w.last);
     w.out = found.data();
     run(kernel, w, 0, w.last);

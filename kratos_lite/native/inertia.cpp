@@ -26,7 +26,7 @@ void add(Numbers points, Indices nodes, Numbers N, Numbers dN, Numbers weights, 
     const Graph graph = pattern(indptr, indices, w.n);
     w.N_padded.assign(static_cast<int64_t>(w.g) * w.padded_k(), 0.0);
     for (int q = 0; q < w.g; ++q) std::copy_n(w.N + q * w.k, w.k, w.N_padded.data() + q * w.padded_k());
-    py::gil_scoped_release release;
+    GilReleased release;
     const int V = vector_width();
     for_chunks({w.nodes, w.last, w.k}, graph, V, w.size(V), [&](const Chunk& chunk) {
         dispatch<double>([&](auto V) KL_INLINE_LAMBDA { add_inertia<V>(w, chunk); });
@@ -35,9 +35,8 @@ void add(Numbers points, Indices nodes, Numbers N, Numbers dN, Numbers weights, 
 
 }  // namespace
 
-PYBIND11_MODULE(_inertia, m) {
-    common(m);
-    define(m, "add", add, "Add M, G and H of elements to the data of matrices, of those that are given", "points",
-           "nodes", "N", "dN", "weights", "velocity", "indptr", "indices", py::arg("M").noconvert() = py::none(),
-           py::arg("G").noconvert() = py::none(), py::arg("H").noconvert() = py::none());
+KL_MODULE(_inertia, m) {
+    define<&add>(m, "add", "Add M, G and H of elements to the data of matrices, of those that are given",
+                 {"points", "nodes", "N", "dN", "weights", "velocity", "indptr", "indices",
+                  {"M", Py_None}, {"G", Py_None}, {"H", Py_None}});
 }

@@ -16,6 +16,13 @@
 #include <type_traits>
 #include <vector>
 
+#if !defined(__GNUC__) && !defined(__clang__)
+#error "kernels are written with vectors of GCC and Clang; on Windows clang-cl compiles them"
+#endif
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 #define KL_INLINE inline __attribute__((always_inline))
 #define KL_INLINE_LAMBDA __attribute__((always_inline))
 
@@ -23,16 +30,23 @@ namespace kl {
 
 enum class Isa { base, avx2, avx512 };
 
-inline Isa best_isa() {
 #if defined(__x86_64__)
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
-        return Isa::avx512;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Isa::avx2;
-#endif
-    return Isa::base;
+// What the processor has and the system saves; compilers have a function for this, but not on every system the
+// library behind it.
+inline Isa best_isa() {
+    const auto all = [](unsigned bits, unsigned wanted) { return (bits & wanted) == wanted; };
+    unsigned a, b, c, d;
+    constexpr unsigned FMA = 1u << 12, OSXSAVE = 1u << 27, AVX = 1u << 28;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !all(c, FMA | OSXSAVE | AVX)) return Isa::base;
+    unsigned saved;
+    __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0));
+    constexpr unsigned AVX2 = 1u << 5, F = 1u << 16, DQ = 1u << 17, BW = 1u << 30, VL = 1u << 31;
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || !all(b, AVX2) || !all(saved, 0x06)) return Isa::base;
+    return all(b, F | DQ | BW | VL) && all(saved, 0xe6) ? Isa::avx512 : Isa::avx2;
 }
+#else
+inline Isa best_isa() { return Isa::base; }
+#endif
 
 // KRATOS_LITE_ISA lowers the choice, never above what the machine has.
 inline Isa isa() {

@@ -26,10 +26,10 @@ Array<double> internal_load(Numbers points, Indices nodes, Numbers dN, Numbers w
 }
 
 // Energy and largest |E|.
-py::tuple totals(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers q, Numbers C,
+auto totals(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers q, Numbers C,
                  MaybeNumbers prestress) {
     const Totals found = totaled(lagrange_totals, strained(points, nodes, dN, weights, q, C, prestress));
-    return py::make_tuple(found.sum, std::sqrt(found.largest));
+    return std::make_tuple(found.sum, std::sqrt(found.largest));
 }
 
 void add_stiffness(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers q, MaybeNumbers dq,
@@ -39,7 +39,7 @@ void add_stiffness(Numbers points, Indices nodes, Numbers dN, Numbers weights, N
     const Graph graph = pattern(indptr, indices, w.n);
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     double* to = data.mutable_data();
-    py::gil_scoped_release release;
+    GilReleased release;
     const int V = vector_width();
     for_chunks({w.nodes, w.last, w.k}, graph, V, tangent_size(w, V), [&](const Chunk& chunk) {
         dispatch<double>([&](auto V) KL_INLINE_LAMBDA { add_tangent<V>(w, chunk, to); });
@@ -48,13 +48,12 @@ void add_stiffness(Numbers points, Indices nodes, Numbers dN, Numbers weights, N
 
 }  // namespace
 
-PYBIND11_MODULE(_lagrange, m) {
-    common(m);
-    const auto damping = py::arg("damping");
-    define(m, "internal_load", internal_load, "∫ P grad N dV, (n, 3)", "points", "nodes", "dN", "weights", "q", "dq",
-           damping, "C", "prestress");
-    define(m, "totals", totals, "∫ (½ E:C:E + S0:E) dV and the largest |E|", "points", "nodes", "dN", "weights", "q",
-           "C", "prestress");
-    define(m, "add_stiffness", add_stiffness, "Add the derivative of the load to the blocks of a matrix", "points",
-           "nodes", "dN", "weights", "q", "dq", damping, "C", "prestress", "indptr", "indices", "data");
+KL_MODULE(_lagrange, m) {
+    define<&internal_load>(m, "internal_load", "∫ P grad N dV, (n, 3)",
+                           {"points", "nodes", "dN", "weights", "q", "dq", "damping", "C", "prestress"});
+    define<&totals>(m, "totals", "∫ (½ E:C:E + S0:E) dV and the largest |E|",
+                    {"points", "nodes", "dN", "weights", "q", "C", "prestress"});
+    define<&add_stiffness>(m, "add_stiffness", "Add the derivative of the load to the blocks of a matrix",
+                           {"points", "nodes", "dN", "weights", "q", "dq", "damping", "C", "prestress", "indptr",
+                            "indices", "data"});
 }

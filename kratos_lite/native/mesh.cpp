@@ -60,7 +60,7 @@ std::vector<int32_t> next_equal(const std::vector<uint64_t>& key) {
     return next;
 }
 
-py::tuple equal_sets(const std::vector<Array<int32_t>>& nodes, const std::vector<Array<int32_t>>& picks) {
+auto equal_sets(const std::vector<Array<int32_t>>& nodes, const std::vector<Array<int32_t>>& picks) {
     require(nodes.size() == picks.size(), "nodes and picks must come in pairs");
     std::vector<Cells> groups;
     int64_t total = 0;
@@ -77,7 +77,7 @@ py::tuple equal_sets(const std::vector<Array<int32_t>>& nodes, const std::vector
     std::vector<int32_t> next;
     int64_t pairs = 0;
     {
-        py::gil_scoped_release release;
+        GilReleased release;
         std::vector<uint64_t> key(total);
         uint64_t* start = key.data();
         for (const Cells& cells : groups) {
@@ -91,7 +91,7 @@ py::tuple equal_sets(const std::vector<Array<int32_t>>& nodes, const std::vector
     int64_t *a = one.mutable_data(), *b = other.mutable_data();
     for (int64_t i = 0; i < total; ++i)
         if (next[i] >= 0) *a++ = i, *b++ = next[i];
-    return py::make_tuple(one, other);
+    return std::make_tuple(one, other);
 }
 
 int64_t root(int64_t* parent, int64_t i) {
@@ -107,7 +107,7 @@ Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
         require(0 <= ends[i] && ends[i] < n, "pairs must name members");
     Array<int64_t> labels(n);
     int64_t* parent = labels.mutable_data();
-    py::gil_scoped_release release;
+    GilReleased release;
     for (int64_t i = 0; i < n; ++i) parent[i] = i;
     for (int64_t i = 0; i < pairs.shape(0); ++i) {
         if (i % MANY == 0) watch().look();
@@ -120,8 +120,7 @@ Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
 
 }  // namespace
 
-PYBIND11_MODULE(_mesh, m) {
-    common(m);
-    define(m, "equal_sets", equal_sets, "pairs of sets that have the same nodes", "nodes", "picks");
-    define(m, "components", components, "smallest member of the part of each of n members", py::arg("n"), "pairs");
+KL_MODULE(_mesh, m) {
+    define<&equal_sets>(m, "equal_sets", "pairs of sets that have the same nodes", {"nodes", "picks"});
+    define<&components>(m, "components", "smallest member of the part of each of n members", {"n", "pairs"});
 }

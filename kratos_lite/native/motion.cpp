@@ -17,20 +17,10 @@ using kl::LANES;
 using kl::Pack;
 using kl::PseudoGroup;
 using kl::RigidGroup;
-namespace py = pybind11;
 
-using Floats = const py::array&;
+using Floats = kl::Numbers;
 
 constexpr int64_t GRAIN = 1024;  // steps of a body in one task
-
-// The numbers of an array; casting each argument to Array<double> would take longer than the step of one body.
-double* numbers(Floats array) {
-    static const py::handle floats = py::dtype::of<double>().release();
-    const auto* proxy = py::detail::array_proxy(array.ptr());
-    const bool right = proxy->descr == floats.ptr() || py::isinstance<py::array_t<double>>(array);
-    if (!right || !(proxy->flags & py::array::c_style)) throw py::type_error("arrays must be C-contiguous float64");
-    return reinterpret_cast<double*>(proxy->data);
-}
 
 void require(bool condition, const char* name, const char* what) {
     if (!condition) throw std::invalid_argument(std::string(name) + what);
@@ -68,7 +58,7 @@ public:
     void add(Pack (Group::*to)[width], Floats array, const char* name) {
         const bool one = array.size() == width;
         check_size(one || array.size() == n * width, name, width);
-        fields[count++] = {offset(to), width, one ? 0 : width, numbers(array), nullptr};
+        fields[count++] = {offset(to), width, one ? 0 : width, array.data(), nullptr};
     }
 
     // What the steps change.
@@ -76,7 +66,7 @@ public:
     void add_state(Pack (Group::*to)[width], Floats array, const char* name) {
         check_size(array.size() == n * width, name, width);
         require(array.writeable(), name, " is read-only and cannot be advanced in place");
-        double* data = numbers(array);
+        double* data = kl::Array<double>(array).mutable_data();
         fields[count++] = {offset(to), width, width, data, data};
     }
 
@@ -85,7 +75,7 @@ public:
     std::pair<int64_t, int64_t> run(int64_t steps, const F& step) const {
         const int64_t few = std::max<int64_t>(1, GRAIN / std::max<int64_t>(1, steps));
         Failure failure;
-        py::gil_scoped_release release;
+        kl::GilReleased release;
         kl::parallel_ranges(n, (few + LANES - 1) / LANES * LANES, [&](int64_t first, int64_t last) {
             for (; first < last; first += LANES)
                 run_group(first, static_cast<int>(std::min<int64_t>(LANES, last - first)), steps, step, failure);
@@ -185,10 +175,8 @@ Bodies<PseudoGroup> pseudo_bodies(Floats q, Floats u, Floats euler, Floats mass,
 
 // The work of loads, from where it was, so that it does not matter how steps are divided into calls.
 template <class Group>
-void add_work(Bodies<Group>& all, const py::object& work) {
-    if (work.is_none()) return;
-    require(py::isinstance<py::array>(work), "work", " must be float64 (N)");
-    all.add_state(&Group::work, py::reinterpret_borrow<py::array>(work), "work");
+void add_work(Bodies<Group>& all, kl::MaybeNumbers work) {
+    if (work) all.add_state(&Group::work, *work, "work");
 }
 
 void rigid_half(Floats q, Floats u, double h, Floats out) {
@@ -207,9 +195,9 @@ int64_t rigid_finish(Floats q, Floats u, Floats qh, Floats load, Floats inertia,
     return all.run(1, [](RigidGroup& g, int64_t) { run<kl::rigid_finish>(g); }).first;
 }
 
-std::pair<int64_t, int64_t> rigid_steps(Floats q, Floats u, Floats inertia, Floats inverse, Floats mass,
+std::tuple<int64_t, int64_t> rigid_steps(Floats q, Floats u, Floats inertia, Floats inverse, Floats mass,
                                         Floats acceleration, Floats spatial, Floats convected, double h,
-                                        int64_t steps, int integrator, double tolerance, const py::object& work) {
+                                        int64_t steps, int integrator, double tolerance, kl::MaybeNumbers work) {
     Bodies<RigidGroup> all = rigid_bodies(q, u, inertia, inverse, mass, h, integrator, tolerance);
     all.add(&RigidGroup::acceleration, acceleration, "acceleration");
     all.add(&RigidGroup::spatial, spatial, "spatial");
@@ -229,9 +217,9 @@ int64_t pseudo_finish(Floats q, Floats u, Floats load, Floats euler, Floats mass
     return all.run(1, [](PseudoGroup& g, int64_t) { run<kl::pseudo_finish>(g); }).first;
 }
 
-std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Floats mass, Floats volume, Floats C,
+std::tuple<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Floats mass, Floats volume, Floats C,
                                          Floats damping, Floats acceleration, Floats spatial, double h,
-                                         int64_t steps, int integrator, double tolerance, const py::object& work) {
+                                         int64_t steps, int integrator, double tolerance, kl::MaybeNumbers work) {
     Bodies<PseudoGroup> all = pseudo_bodies(q, u, euler, mass, volume, C, damping, h, integrator, tolerance);
     all.add(&PseudoGroup::acceleration, acceleration, "acceleration");
     all.add(&PseudoGroup::load, spatial, "spatial");
@@ -245,21 +233,19 @@ std::pair<int64_t, int64_t> pseudo_steps(Floats q, Floats u, Floats euler, Float
 
 }  // namespace
 
-PYBIND11_MODULE(_motion, m) {
-    kl::common(m);
+KL_MODULE(_motion, m) {
     kl::interruption() = nullptr;  // bodies change in place: all of them take the step, or none
-    using py::arg;
     const char* one = "q and u at the end of the step; returns the first body that failed, or -1";
     const char* many = "q and u after steps with constant loads; returns the first body that failed and its step";
-    m.def("rigid_half", &rigid_half, "out = q at mid-step", arg("q"), arg("u"), arg("h"), arg("out"));
-    m.def("rigid_finish", &rigid_finish, one, arg("q"), arg("u"), arg("qh"), arg("load"), arg("inertia"),
-          arg("inverse"), arg("mass"), arg("h"), arg("integrator"), arg("tolerance"));
-    m.def("rigid_steps", &rigid_steps, many, arg("q"), arg("u"), arg("inertia"), arg("inverse"), arg("mass"),
-          arg("acceleration"), arg("spatial"), arg("convected"), arg("h"), arg("steps"), arg("integrator"),
-          arg("tolerance"), arg("work") = py::none());
-    m.def("pseudo_finish", &pseudo_finish, one, arg("q"), arg("u"), arg("load"), arg("euler"), arg("mass"),
-          arg("volume"), arg("C"), arg("damping"), arg("h"), arg("integrator"), arg("tolerance"));
-    m.def("pseudo_steps", &pseudo_steps, many, arg("q"), arg("u"), arg("euler"), arg("mass"), arg("volume"), arg("C"),
-          arg("damping"), arg("acceleration"), arg("spatial"), arg("h"), arg("steps"), arg("integrator"),
-          arg("tolerance"), arg("work") = py::none());
+    kl::define<&rigid_half>(m, "rigid_half", "out = q at mid-step", {"q", "u", "h", "out"});
+    kl::define<&rigid_finish>(m, "rigid_finish", one, {"q", "u", "qh", "load", "inertia", "inverse", "mass", "h",
+                                                       "integrator", "tolerance"});
+    kl::define<&rigid_steps>(m, "rigid_steps", many, {"q", "u", "inertia", "inverse", "mass", "acceleration",
+                                                      "spatial", "convected", "h", "steps", "integrator",
+                                                      "tolerance", {"work", Py_None}});
+    kl::define<&pseudo_finish>(m, "pseudo_finish", one, {"q", "u", "load", "euler", "mass", "volume", "C", "damping",
+                                                         "h", "integrator", "tolerance"});
+    kl::define<&pseudo_steps>(m, "pseudo_steps", many, {"q", "u", "euler", "mass", "volume", "C", "damping",
+                                                        "acceleration", "spatial", "h", "steps", "integrator",
+                                                        "tolerance", {"work", Py_None}});
 }

@@ -66,7 +66,7 @@ public:
             set_law(w, C, {});
             add(w, tensor_tables(factors, w));
         }
-        py::gil_scoped_release release;
+        GilReleased release;
         prepare();
     }
 
@@ -76,14 +76,14 @@ public:
         Doubles from(x.data(), x.data() + 3 * n);
         from.push_back(0);
         double* to = y.mutable_data();
-        py::gil_scoped_release release;
+        GilReleased release;
         std::lock_guard<std::recursive_mutex> lock(busy);
         multiply(from.data(), to);
         return y;
     }
 
     double largest_row_sum() const {
-        py::gil_scoped_release release;
+        GilReleased release;
         std::lock_guard<std::recursive_mutex> lock(busy);
         return norm();
     }
@@ -119,7 +119,7 @@ public:
         : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
         require(fixed.size() == 3 * A.rows(), "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
-        py::gil_scoped_release release;
+        GilReleased release;
         hierarchy.add_nodal(A.graph(), A.data.data(), this->fixed, std::move(X));
     }
 
@@ -127,28 +127,28 @@ public:
         : elements(std::move(product)), fixed(bytes_of(fixed)), hierarchy(settings) {
         require(fixed.size() == 3 * elements->n, "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
-        py::gil_scoped_release release;
+        GilReleased release;
         std::lock_guard<std::recursive_mutex> lock(elements->busy);
         hierarchy.add_elements(*elements, this->fixed, std::move(X));
     }
 
     // Smoothed aggregation below the finest level, of its matrix; where it works without one, of that given.
-    void aggregate(Array<double> modes, std::optional<Matrix> matrix) {
+    void aggregate(Array<double> modes, std::optional<std::shared_ptr<Matrix>> matrix) {
         require(hierarchy.levels.size() == 1, "aggregated already");
         require(matrix.has_value() == (elements != nullptr), "a matrix is needed where elements take its place");
-        const Matrix& finest = matrix ? *matrix : A;
+        const Matrix& finest = matrix ? **matrix : A;
         require(3 * finest.rows() == static_cast<int64_t>(fixed.size()), "the matrix must have a row for each unknown");
         Doubles B = free_modes(modes, fixed);
-        py::gil_scoped_release release;
+        GilReleased release;
         hierarchy.coarsen(finest.graph(), finest.data.data(), fixed, std::move(B));
     }
 
     // A linear level below the finest one, and smoothed aggregation below that.
-    void aggregate_linear(Matrix linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
+    void aggregate_linear(std::shared_ptr<Matrix> linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
                           Array<int32_t> indices, Array<double> weights, Numbers points,
                           Array<double> modes) {
         require(hierarchy.levels.size() == 1, "aggregated already");
-        below = std::move(linear);
+        below = *linear;
         require(linear_fixed.size() == 3 * below.rows(), "one entry for each linear unknown");
         require(3 * (indptr.size() - 1) == static_cast<int64_t>(fixed.size()), "weights must have one row for each node");
         require(weights.size() == indices.size(), "one weight for each index is needed");
@@ -160,7 +160,7 @@ public:
         transfer.P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
         transfer.P.indices.assign(indices.data(), indices.data() + indices.size());
         transfer.P.data.assign(weights.data(), weights.data() + weights.size());
-        py::gil_scoped_release release;
+        GilReleased release;
         hierarchy.add_linear(below.graph(), below.data.data(), coarse_fixed, std::move(transfer), fixed,
                              std::move(X));
         hierarchy.coarsen(below.graph(), below.data.data(), coarse_fixed, std::move(B));
@@ -181,7 +181,7 @@ public:
         P.data.assign(blocks.data(), blocks.data() + blocks.size());
         P.data.resize(P.data.size() + 8);
         Doubles B(modes.data(), modes.data() + modes.size());
-        py::gil_scoped_release release;
+        GilReleased release;
         hierarchy.coarsen_plate(A.data.data(), std::move(P), static_cast<int32_t>(nodes), std::move(B));
     }
 
@@ -190,14 +190,14 @@ public:
         Array<double> z(r.size());
         const double* from = r.data();
         double* to = z.mutable_data();
-        py::gil_scoped_release release;
+        GilReleased release;
         std::lock_guard<std::mutex> lock(busy);
         const auto lock_elements = occupied();
         hierarchy.cycle(from, to);
         return z;
     }
 
-    py::tuple solve(Array<double> b, double tolerance, double norm, int most, py::object progress) {
+    auto solve(Array<double> b, double tolerance, double norm, int most, const Object& progress) {
         require(b.size() == static_cast<int64_t>(fixed.size()), "b must have one number for each unknown");
         Array<double> x(b.size());
         const double* from = b.data();
@@ -205,12 +205,12 @@ public:
         const bool tell = !progress.is_none();
         const auto each = [&](double residual) {
             if (!tell) return true;
-            py::gil_scoped_acquire acquire;
-            return !progress(residual).is(py::bool_(false));  // it may say stop
+            GilHeld held;
+            return progress(residual).get() != Py_False;  // it may say stop
         };
         Outcome outcome;
         {
-            py::gil_scoped_release release;
+            GilReleased release;
             std::lock_guard<std::mutex> lock(busy);
             const auto lock_elements = occupied();
             const auto times_A = [&](const double* p, double* Ap) {
@@ -218,26 +218,29 @@ public:
             };
             outcome = conjugate_gradients(times_A, fixed, hierarchy, from, to, tolerance, norm, most, each);
         }
-        return py::make_tuple(x, outcome.iterations, outcome.converged);
+        return std::make_tuple(x, outcome.iterations, outcome.converged);
     }
 
     // The number of each node's cluster; empty without clusters.
     Array<int32_t> labels() const {
-        const Ints& of = hierarchy.levels.front().clusters.of;
-        return Array<int32_t>(static_cast<int64_t>(of.size()), of.data());
+        return Array<int32_t>(hierarchy.levels.front().clusters.of);
     }
 
-    py::list sizes() const {
-        py::list out;
-        for (const Level& level : hierarchy.levels) out.append(level.size());
+    std::vector<int64_t> sizes() const {
+        std::vector<int64_t> out;
+        for (const Level& level : hierarchy.levels) out.push_back(level.size());
         return out;
     }
 
-    py::list clusters() const {
-        py::list out;
-        for (const Level& level : hierarchy.levels) out.append(level.clusters.count());
+    std::vector<int64_t> clusters() const {
+        std::vector<int64_t> out;
+        for (const Level& level : hierarchy.levels) out.push_back(level.clusters.count());
         return out;
     }
+
+    bool has_planes() const { return !hierarchy.levels.front().clusters.near.empty(); }
+    double complexity() const { return hierarchy.complexity(); }
+    auto bytes() const { return hierarchy.bytes(); }
 
     Matrix A, below;
     std::shared_ptr<Product> elements;  // in place of A
@@ -270,42 +273,46 @@ struct Blocks {
 // Displacements by a multigrid, and pressures.
 class Pressures {
 public:
-    Pressures(Multigrid& multigrid, const py::tuple& D, const py::tuple& S, Array<double> scale, Array<double> bulk,
-              Array<double> kept, Array<double> weight, double share, int most)
-        : M(multigrid), R(block_size(D)), D(blocks<double>(D, bulk.size() / R, M.A.rows())),
-          S(blocks<float>(S, bulk.size() / R, bulk.size() / R)), scale(std::move(scale)), bulk(std::move(bulk)),
+    // Arrays (indptr, indices, data) of a sparse matrix.
+    template <class T>
+    using Parts = std::tuple<Array<int32_t>, Array<int32_t>, Array<T>>;
+
+    Pressures(std::shared_ptr<Multigrid> multigrid, const Parts<double>& D, const Parts<float>& S, Array<double> scale,
+              Array<double> bulk, Array<double> kept, Array<double> weight, double share, int most)
+        : multigrid(std::move(multigrid)), M(*this->multigrid), R(block_size(D)),
+          D(blocks(D, bulk.size() / R, M.A.rows())), S(blocks(S, bulk.size() / R, bulk.size() / R)),
+          scale(std::move(scale)), bulk(std::move(bulk)),
           kept(std::move(kept)), solver(made(weight, share, most)) {}
 
-    py::tuple solve(Array<double> b, double tolerance, double norm, int most, int directions, double reduced,
-                    py::object progress) {
+    auto solve(Array<double> b, double tolerance, double norm, int most, int directions, double reduced,
+                    const Object& progress) {
         require(b.size() == 3 * M.A.rows(), "b must have one number for each unknown");
         Array<double> x(b.size());
         const double* from = b.data();
         double* to = x.mutable_data();
         const auto each = [&](double residual) {
-            py::gil_scoped_acquire acquire;
-            return !progress(residual).is(py::bool_(false));  // it may say stop
+            GilHeld held;
+            return progress(residual).get() != Py_False;  // it may say stop
         };
         Outcome outcome;
         {
-            py::gil_scoped_release release;
+            GilReleased release;
             std::lock_guard<std::mutex> lock(M.busy);
             outcome = solver.solve(from, to, tolerance, norm, {most, directions, reduced}, each);
         }
-        return py::make_tuple(x, outcome.iterations, outcome.converged);
+        return std::make_tuple(x, outcome.iterations, outcome.converged);
     }
 
 private:
-    static int block_size(const py::tuple& D) {
-        const auto size = D[2].cast<Array<double>>().shape(1);
+    static int block_size(const Parts<double>& D) {
+        const auto size = std::get<2>(D).shape(1);
         require(size == 1 || size == 4, "1 or 4 pressures must share a row of blocks");
         return static_cast<int>(size);
     }
 
     template <class T>
-    static Blocks<T> blocks(const py::tuple& parts, int64_t rows, int64_t columns) {
-        using Rows = Array<int32_t>;
-        return {parts[0].cast<Rows>(), parts[1].cast<Rows>(), parts[2].cast<Array<T>>(), rows, columns};
+    static Blocks<T> blocks(const Parts<T>& parts, int64_t rows, int64_t columns) {
+        return {std::get<0>(parts), std::get<1>(parts), std::get<2>(parts), rows, columns};
     }
 
     DisplacementPressure made(const Array<double>& weight, double share, int most) {
@@ -323,6 +330,7 @@ private:
                 bulk.data(), kept.data(), Doubles(weight.data(), weight.data() + weight.size())};
     }
 
+    std::shared_ptr<Multigrid> multigrid;
     Multigrid& M;
     int R;
     Blocks<double> D;
@@ -331,40 +339,54 @@ private:
     DisplacementPressure solver;
 };
 
+auto matrix(Array<int32_t> indptr, Array<int32_t> indices, Array<double> data) {
+    return std::make_shared<Matrix>(std::move(indptr), std::move(indices), std::move(data));
+}
+
+auto product(Numbers points, std::vector<ElementTables> groups) {
+    return std::make_shared<Product>(points, std::move(groups));
+}
+
+// A multigrid of a matrix or of a product.
+std::shared_ptr<Multigrid> multigrid(const Object& A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
+                                     double theta, int thin) {
+    const Settings settings{degree, ratio, theta, thin};
+    if (is_instance<Product>(A.get()))
+        return std::make_shared<Multigrid>(held<Product>(A.get()), std::move(fixed), points, settings);
+    if (!is_instance<Matrix>(A.get())) signature<&multigrid>.refuse("A must be a Matrix or a Product, not ", A.get());
+    return std::make_shared<Multigrid>(*held<Matrix>(A.get()), std::move(fixed), points, settings);
+}
+
+auto pressures(std::shared_ptr<Multigrid> multigrid, const Pressures::Parts<double>& D, const Pressures::Parts<float>& S,
+               Array<double> scale, Array<double> bulk, Array<double> kept, Array<double> weight, double share,
+               int most) {
+    return std::make_shared<Pressures>(std::move(multigrid), D, S, std::move(scale), std::move(bulk), std::move(kept),
+                                       std::move(weight), share, most);
+}
+
 }  // namespace
 
-PYBIND11_MODULE(_multigrid, m) {
-    common(m);
-    py::class_<Matrix>(m, "Matrix")
-        .def(py::init<Array<int32_t>, Array<int32_t>, Array<double>>(), argument("indptr"), argument("indices"),
-             argument("data"));
-    py::class_<Product, std::shared_ptr<Product>>(m, "Product")
-        .def(py::init<Numbers, std::vector<ElementTables>>(), argument("points"), py::arg("groups"))
-        .def("times", &Product::times)
-        .def("norm", &Product::largest_row_sum);
-    py::class_<Pressures>(m, "Pressures")
-        .def(py::init<Multigrid&, py::tuple, py::tuple, Array<double>, Array<double>, Array<double>, Array<double>,
-                      double, int>(),
-             py::keep_alive<1, 2>())
-        .def("solve", &Pressures::solve);
-    py::class_<Multigrid>(m, "Multigrid")
-        .def(py::init([](Matrix A, Array<uint8_t> fixed, Numbers points, int degree, float ratio,
-                         double theta, int thin) {
-            return std::make_unique<Multigrid>(std::move(A), fixed, points, Settings{degree, ratio, theta, thin});
-        }))
-        .def(py::init([](std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, int degree,
-                         float ratio, double theta) {
-            return std::make_unique<Multigrid>(std::move(product), fixed, points, Settings{degree, ratio, theta});
-        }))
-        .def("aggregate", &Multigrid::aggregate, py::arg("modes"), py::arg("matrix") = py::none())
-        .def("aggregate_plate", &Multigrid::aggregate_plate)
-        .def("labels", &Multigrid::labels)
-        .def("aggregate_linear", &Multigrid::aggregate_linear)
-        .def("cycle", &Multigrid::cycle)
-        .def("solve", &Multigrid::solve)
-        .def("sizes", &Multigrid::sizes)
-        .def("clusters", &Multigrid::clusters)
-        .def("has_planes", [](const Multigrid& m) { return !m.hierarchy.levels.front().clusters.near.empty(); })
-        .def("bytes", [](const Multigrid& m) { return m.hierarchy.bytes(); })
-        .def("complexity", [](const Multigrid& m) { return m.hierarchy.complexity(); });
+KL_MODULE(_multigrid, m) {
+    add_class<Matrix>("kratos_lite.native.Matrix", {});
+    add_class<Product>("kratos_lite.native.Product",
+                       {method<&Product::times>("times"), method<&Product::largest_row_sum>("norm")});
+    add_class<Pressures>("kratos_lite.native.Pressures", {method<&Pressures::solve>("solve")});
+    add_class<Multigrid>("kratos_lite.native.Multigrid",
+                         {method<&Multigrid::aggregate>("aggregate", nullptr, {"modes", {"matrix", Py_None}}),
+                          method<&Multigrid::aggregate_plate>("aggregate_plate"),
+                          method<&Multigrid::aggregate_linear>("aggregate_linear"),
+                          method<&Multigrid::labels>("labels"),
+                          method<&Multigrid::cycle>("cycle"),
+                          method<&Multigrid::solve>("solve"),
+                          method<&Multigrid::sizes>("sizes"),
+                          method<&Multigrid::clusters>("clusters"),
+                          method<&Multigrid::has_planes>("has_planes"),
+                          method<&Multigrid::bytes>("bytes"),
+                          method<&Multigrid::complexity>("complexity")});
+    define<&matrix>(m, "Matrix", "a matrix of 3x3 blocks", {"indptr", "indices", "data"});
+    define<&product>(m, "Product", "products of the stiffness of elements, without a matrix", {"points", "groups"});
+    define<&multigrid>(m, "Multigrid", "a multigrid of a Matrix or a Product",
+                       {"A", "fixed", "points", "degree", "ratio", "theta", {"thin", PyLong_FromLong(0)}});
+    define<&pressures>(m, "Pressures", "displacements by a multigrid, and pressures",
+                       {"multigrid", "D", "S", "scale", "bulk", "kept", "weight", "share", "most"});
 }

@@ -19,7 +19,7 @@ void require_rows(Indices start, int64_t size, const char* what) {
     require(start.size() > 0, what);
 }
 
-py::tuple fitted(Numbers X, Numbers values, Indices offset, Indices start, Indices elements, Numbers weights,
+auto fitted(Numbers X, Numbers values, Indices offset, Indices start, Indices elements, Numbers weights,
                  Indices degree, Indices means) {
     const int64_t s = X.shape(0), patches = start.size() - 1;
     require(has_shape(X, s, 3) && has_shape(values, s, 6), "places must be (s, 3), values (s, 6)");
@@ -37,13 +37,13 @@ py::tuple fitted(Numbers X, Numbers values, Indices offset, Indices start, Indic
     const Fit fit{X.data(),      values.data(), offset.data(),  start.data(),         elements.data(),      weights.data(),
                   degree.data(), means.data(),  summary.data(), frame.mutable_data(), terms.mutable_data(), most};
     {
-        py::gil_scoped_release release;
+        GilReleased release;
         parallel_ranges(m, 8 * GRAIN, [&](int64_t first, int64_t last) {
             for (int64_t e = first; e < last; ++e) summarize(fit, e, summary.data() + SUMMARY * e);
         });
         parallel_ranges(patches, GRAIN, [&](int64_t first, int64_t last) { fit_patches({&fit, first, last}); });
     }
-    return py::make_tuple(frame, terms);
+    return std::make_tuple(frame, terms);
 }
 
 Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, Indices patches) {
@@ -55,11 +55,11 @@ Array<double> evaluated(Numbers frame, Numbers terms, Numbers X, Indices start, 
     require(has_shape(X, n, 3) && start.size() == n + 1, "places must be (n, 3), start (n + 1)");
     require_rows(start, patches.size(), "start must be (n + 1)");
     require(are_rows(patches, p), "patches must be rows of the fits");
-    Array<double> out({static_cast<py::ssize_t>(n), py::ssize_t{6}});
+    Array<double> out({static_cast<int64_t>(n), int64_t{6}});
     double* to = out.mutable_data();
     const double *at = X.data(), *frames = frame.data(), *coefficients = terms.data();
     const int32_t *from = start.data(), *rows = patches.data();
-    py::gil_scoped_release release;
+    GilReleased release;
     parallel_ranges(n, 8 * GRAIN, [&](int64_t first, int64_t last) {
         for (int64_t node = first; node < last; ++node) {
             double sum[6] = {};
@@ -93,7 +93,7 @@ Array<double> residuals(Numbers frame, Numbers terms, Numbers X, Numbers values,
     Array<double> out({m, k, int64_t{6}});
     const Residuals every{frame.data(), terms.data(), X.data(),     values.data(),  E.data(),           nodes.data(),
                           start.data(), patches.data(), count, degree, k, s, out.mutable_data(), 0, m};
-    py::gil_scoped_release release;
+    GilReleased release;
     parallel_ranges(m, GRAIN, [&](int64_t first, int64_t last) {
         Residuals task = every;
         task.first = first;
@@ -112,7 +112,7 @@ Array<double> combined(Numbers table, Numbers values, Indices rows) {
     require(are_rows(rows, values.shape(0)), "rows must be those of the values");
     Array<double> out({m, s, c});
     const Combination every{table.data(), values.data(), rows.data(), s, rows.shape(1), out.mutable_data(), 0, m};
-    py::gil_scoped_release release;
+    GilReleased release;
     parallel_ranges(m, 4 * GRAIN, [&](int64_t first, int64_t last) {
         Combination task = every;
         task.first = first;
@@ -130,7 +130,7 @@ Array<double> summed(Numbers values, Indices nodes, int64_t n) {
     double* to = total.mutable_data();
     const double* from = values.data();
     const int32_t* rows = nodes.data();
-    py::gil_scoped_release release;
+    GilReleased release;
     std::fill_n(to, 6 * n, 0.0);
     for (int64_t a = 0; a < nodes.size(); ++a)
         for (int c = 0; c < 6; ++c) to[6 * int64_t{rows[a]} + c] += from[6 * a + c];
@@ -149,7 +149,7 @@ Array<double> multiplied(Numbers nodal, Numbers raw, Numbers others, Numbers oth
     Array<double> out(m);
     const Differences every{nodal.data(), raw.data(), others.data(), other_raw.data(), nodes.data(), N.data(),
                             dV.data(),    S.data(),   k,             g,                out.mutable_data(), 0, m};
-    py::gil_scoped_release release;
+    GilReleased release;
     parallel_ranges(m, 4 * GRAIN, [&](int64_t first, int64_t last) {
         Differences task = every;
         task.first = first;
@@ -168,23 +168,20 @@ void require_members(Integers numbers, int64_t n, const char* what) {
     require(inside, what);
 }
 
-Array<int64_t> copied(const std::vector<int64_t>& numbers) {
-    return Array<int64_t>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
-}
+Array<int64_t> copied(const std::vector<int64_t>& numbers) { return Array<int64_t>(numbers); }
 
-py::tuple dealt(Integers owner, Integers entries, int64_t n) {
+auto dealt(Integers owner, Integers entries, int64_t n) {
     require(n >= 0 && owner.size() == entries.size(), "each entry must have an owner");
     require_members(owner, n, "owners must be rows");
     Array<int64_t> start(n + 1), out(entries.size());
     deal(owner.data(), entries.data(), owner.size(), n, start.mutable_data(), out.mutable_data());
-    return py::make_tuple(start, out);
+    return std::make_tuple(start, out);
 }
 
-py::tuple distinct(Integers owner, Integers entries, int64_t n) {
-    const py::tuple rows = dealt(owner, entries, n);
-    auto start = rows[0].cast<Array<int64_t>>(), all = rows[1].cast<Array<int64_t>>();
+auto distinct(Integers owner, Integers entries, int64_t n) {
+    auto [start, all] = dealt(owner, entries, n);
     const Distinct found(start.data(), all.mutable_data(), n);
-    return py::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
+    return std::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
 }
 
 void require_rises(Integers start, int64_t size) {
@@ -193,21 +190,20 @@ void require_rises(Integers start, int64_t size) {
             "start must rise from 0 to the number of entries");
 }
 
-py::tuple grown(Integers owner, Integers cells, Integers corners, Integers from, Integers around, int64_t n) {
+auto grown(Integers owner, Integers cells, Integers corners, Integers from, Integers around, int64_t n) {
     require(corners.ndim() == 2, "corners must be (m, c)");
     const int64_t m = corners.shape(0), nodes = from.size() - 1;
-    const py::tuple rows = dealt(owner, cells, n);
-    const auto start = rows[0].cast<Array<int64_t>>(), mine = rows[1].cast<Array<int64_t>>();
+    const auto [start, mine] = dealt(owner, cells, n);
     require_members(mine, m, "cells must be there");
     require_rises(from, around.size());
     require_members(around, m, "cells around corners must be there");
     for (int64_t i = 0; i < corners.size(); ++i) require(corners.data()[i] < nodes, "corners must be nodes");
     const Grown found(start.data(), mine.data(), n, corners.data(), m, corners.shape(1), from.data(), around.data(),
                       nodes);
-    return py::make_tuple(copied(found.owner), copied(found.entries));
+    return std::make_tuple(copied(found.owner), copied(found.entries));
 }
 
-py::tuple taken(Integers start, Integers entries, Integers rows) {
+auto taken(Integers start, Integers entries, Integers rows) {
     const int64_t n = start.size() - 1, *from = start.data();
     require_rises(start, entries.size());
     require_members(rows, n, "rows must be there");
@@ -218,27 +214,26 @@ py::tuple taken(Integers start, Integers entries, Integers rows) {
     Array<int64_t> out(to[rows.size()]);
     for (int64_t i = 0; i < rows.size(); ++i)
         std::copy_n(entries.data() + from[rows.data()[i]], to[i + 1] - to[i], out.mutable_data() + to[i]);
-    return py::make_tuple(first, out);
+    return std::make_tuple(first, out);
 }
 
 }  // namespace
 
-PYBIND11_MODULE(_recovery, m) {
-    common(m);
-    define(m, "fit", fitted, "frames (p, 12) and coefficients (p, t, 6) of the polynomials of patches", "places",
-           "values", "offset", "start", "elements", "weights", "degree", "means");
-    define(m, "evaluate", evaluated, "mean of some polynomials at each place, (n, 6)", "frame", "terms", "places",
-           "start", "patches");
-    define(m, "residuals", residuals, "E (values - mean of some polynomials) (m, k, 6)", "frame", "terms", "places",
-           "values", "E", "nodes", "start", "patches");
-    define(m, "dealt", dealt, "start (n + 1) and entries of n rows, by their owners", "owner", "entries", py::arg("n"));
-    define(m, "distinct", distinct, "owner, entry and count of the distinct entries of n rows", "owner", "entries",
-           py::arg("n"));
-    define(m, "grown", grown, "owner and cell of rows of cells with those around their corners", "owner", "cells",
-           "corners", "start", "around", py::arg("n"));
-    define(m, "taken", taken, "some of the rows", "start", "entries", "rows");
-    define(m, "combined", combined, "rows of values combined by a table, (m, s, c)", "table", "values", "rows");
-    define(m, "summed", summed, "sums at n nodes of values (m, k, 6) of elements", "values", "nodes", py::arg("n"));
-    define(m, "products", multiplied, "∫ (σ* - σ) S (σ*' - σ') dV (m)", "nodal", "raw", "others", "other_raw",
-           "nodes", "N", "dV", "S");
+KL_MODULE(_recovery, m) {
+    define<&fitted>(m, "fit", "frames (p, 12) and coefficients (p, t, 6) of the polynomials of patches",
+                    {"places", "values", "offset", "start", "elements", "weights", "degree", "means"});
+    define<&evaluated>(m, "evaluate", "mean of some polynomials at each place, (n, 6)",
+                       {"frame", "terms", "places", "start", "patches"});
+    define<&residuals>(m, "residuals", "E (values - mean of some polynomials) (m, k, 6)",
+                       {"frame", "terms", "places", "values", "E", "nodes", "start", "patches"});
+    define<&dealt>(m, "dealt", "start (n + 1) and entries of n rows, by their owners", {"owner", "entries", "n"});
+    define<&distinct>(m, "distinct", "owner, entry and count of the distinct entries of n rows",
+                      {"owner", "entries", "n"});
+    define<&grown>(m, "grown", "owner and cell of rows of cells with those around their corners",
+                   {"owner", "cells", "corners", "start", "around", "n"});
+    define<&taken>(m, "taken", "some of the rows", {"start", "entries", "rows"});
+    define<&combined>(m, "combined", "rows of values combined by a table, (m, s, c)", {"table", "values", "rows"});
+    define<&summed>(m, "summed", "sums at n nodes of values (m, k, 6) of elements", {"values", "nodes", "n"});
+    define<&multiplied>(m, "products", "∫ (σ* - σ) S (σ*' - σ') dV (m)",
+                        {"nodal", "raw", "others", "other_raw", "nodes", "N", "dV", "S"});
 }

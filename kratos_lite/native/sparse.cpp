@@ -17,7 +17,7 @@ Array<double> product(Indices indptr, Indices indices, Numbers data, Numbers x) 
     const BlockMatrix A{pattern(indptr, indices, rows), data.data(), static_cast<uint32_t>(x.size() / 3)};
     const double* from = x.data();
     double* to = y.mutable_data();
-    py::gil_scoped_release release;
+    GilReleased release;
     multiply(A, from, to);
     return y;
 }
@@ -26,14 +26,13 @@ double largest_row_sum(Indices indptr, Numbers data) {
     const int64_t rows = indptr.size() - 1;
     check_rows(indptr, data.size() / 9);
     const BlockMatrix A{{rows, indptr.data(), nullptr}, data.data(), 0};
-    py::gil_scoped_release release;
+    GilReleased release;
     return norm(A);
 }
 
 }  // namespace
 
-PYBIND11_MODULE(_sparse, m) {
-    common(m);
-    define(m, "norm", largest_row_sum, "largest row sum of |A|", "indptr", "data");
-    define(m, "multiply", product, "A x of a matrix of 3x3 blocks", "indptr", "indices", "data", "x");
+KL_MODULE(_sparse, m) {
+    define<&largest_row_sum>(m, "norm", "largest row sum of |A|", {"indptr", "data"});
+    define<&product>(m, "multiply", "A x of a matrix of 3x3 blocks", {"indptr", "indices", "data", "x"});
 }

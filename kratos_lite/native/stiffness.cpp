@@ -15,13 +15,13 @@ Connectivity connectivity(Indices nodes) {
     return {nodes.data(), nodes.shape(0), static_cast<int>(nodes.shape(1))};
 }
 
-py::tuple mesh_pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& arrays) {
+auto mesh_pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& arrays) {
     std::vector<Connectivity> groups;
     for (const auto& nodes : arrays) groups.push_back(connectivity(nodes));
     std::unique_ptr<Pattern> rows;
     int64_t size;
     {
-        py::gil_scoped_release release;
+        GilReleased release;
         rows = std::make_unique<Pattern>(n_nodes, groups);
         size = rows->size();
     }
@@ -29,11 +29,11 @@ py::tuple mesh_pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& array
     Array<int32_t> indptr(n_nodes + 1), indices(size);
     int32_t *starts = indptr.mutable_data(), *columns = indices.mutable_data();
     {
-        py::gil_scoped_release release;
+        GilReleased release;
         rows->copy(starts, columns);
         rows.reset();
     }
-    return py::make_tuple(indptr, indices);
+    return std::make_tuple(indptr, indices);
 }
 
 // Products of the reference cell, R_ab for a <= b.
@@ -78,7 +78,7 @@ int64_t add(Numbers points, Indices nodes, Numbers dN, Numbers weights, Numbers 
     const Graph graph = pattern(indptr, indices, w.n);
     require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
     if (affine && w.affine_pays()) w.products = products(w);
-    py::gil_scoped_release release;
+    GilReleased release;
     switch (w.addition.kind) {
         case Addition::modes: return add_stiffness<ModesAdded>(w, graph);
         case Addition::dilatation: return add_stiffness<DilatationAdded>(w, graph);
@@ -96,18 +96,18 @@ void add_given(Indices nodes, Numbers matrices, Indices indptr, Indices indices,
     require(are_rows(nodes, graph.rows), "nodes must be rows of the matrix");
     const double* from = matrices.data();
     double* to = data.mutable_data();
-    py::gil_scoped_release release;
+    GilReleased release;
     each == 9 ? add_matrices<3>(mesh, from, graph, to) : add_matrices<1>(mesh, from, graph, to);
 }
 
 }  // namespace
 
-PYBIND11_MODULE(_stiffness, m) {
-    common(m);
-    m.def("pattern", mesh_pattern, "Rows (indptr, indices) of the nodes that share an element", py::arg("n_nodes"),
-          py::arg("connectivity"));
-    define(m, "add_stiffness", add, "Add the stiffness of elements to the blocks of a matrix", "points", "nodes",
-           "dN", "weights", "C", "addition", "indptr", "indices", "data", py::arg("affine") = true);
-    define(m, "add_matrices", add_given, "Add given element matrices to a matrix", "nodes", "matrices", "indptr",
-           "indices", "data");
+KL_MODULE(_stiffness, m) {
+    define<&mesh_pattern>(m, "pattern", "Rows (indptr, indices) of the nodes that share an element",
+                          {"n_nodes", "connectivity"});
+    define<&add>(m, "add_stiffness", "Add the stiffness of elements to the blocks of a matrix",
+                 {"points", "nodes", "dN", "weights", "C", "addition", "indptr", "indices", "data",
+                  {"affine", Py_True}});
+    define<&add_given>(m, "add_matrices", "Add given element matrices to a matrix",
+                       {"nodes", "matrices", "indptr", "indices", "data"});
 }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import traceback
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import is_dataclass
 from inspect import get_annotations
 from math import inf, nan
@@ -38,7 +39,8 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
 
     Parameters
     ----------
-    path : the file.  It is run in a module of its own; what it registers is forgotten afterwards.
+    path : the file.  It is run in a module of its own, beside the modules of its folder; what it registers
+        is forgotten afterwards.
 
     Returns
     -------
@@ -54,6 +56,7 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
     with ExitStack() as stack:
         for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
+        stack.enter_context(beside(Path(path)))
         library = _registered()
         defined = vars(run_module(Path(path)))
         kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
@@ -86,6 +89,21 @@ def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, li
             text += f"soil = {kind.__name__}(…) with its constants"
             found.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
     return found
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[None]:
+    """Let a Python file import the modules of its folder, as if Python ran it, and forget them afterwards."""
+    folder, before = str(path.parent.absolute()), set(sys.modules)
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+        for name in sys.modules.keys() - before:
+            home = getattr(sys.modules[name], "__file__", None)
+            if home and Path(folder) in Path(home).parents:
+                del sys.modules[name]
 
 
 def run_module(path: Path) -> ModuleType:

@@ -435,15 +435,35 @@ def test_check_of_an_element_in_a_python_file(run, folder):
     Path("good.py").write_text(good)
     done = run("check", "good.py")
     assert (done.code, done.err) == (0, "")
-    assert "MyWedge3D6N: " in done.out
+    assert done.out.startswith("MyWedge3D6N conforms: 33 checks passed, 2 not run\n  ok      definition: ")
     Path("bad.py").write_text(good.replace("L * (1 + t)", "L * (1 - t)"))
     done = run("check", "bad.py")
     assert (done.code, done.err) == (2, "")
-    assert "MyWedge3D6N: " in done.out
+    words = [line[:9].strip() for line in done.out.splitlines()[1:]]
+    assert words == ["FAILED"] * 2 + ["ok"] * 8 + ["not run"]
     Path("empty.py").write_text("x = 1\n")
     assert run("check", "empty.py").refuses("empty.py")
     Path("wrong.py").write_text("x = (\n")
     assert run("check", "wrong.py").refuses("wrong.py")
+
+
+@pytest.mark.parametrize("command", ["check", "verify"])
+def test_a_python_file_imports_the_modules_beside_it(run, folder, command):
+    """Its folder counts, not the present one; what it imports is forgotten, as another file may differ."""
+    text = (EXAMPLES / "my_wedge.py").read_text()
+    for name, sign in (("good", "+"), ("bad", "-")):
+        Path(name).mkdir()
+        Path(name, "beside_me.py").write_text(text.replace("L * (1 + t)", f"L * (1 {sign} t)"))
+        Path(name, "mine.py").write_text(
+            "from beside_me import KinematicLinear, MyWedge, wedge\n\n\n"
+            "class Mine6N(KinematicLinear):\n    shape, rule = MyWedge, wedge(degree=2)\n"
+        )
+    before = list(sys.path)
+    more = ["element/uniaxial"] if command == "verify" else []
+    codes = [run(command, f"{name}/mine.py", *more).code for name in ("good", "bad", "good")]
+    assert codes == [0, 2 if command == "check" else 1, 0]
+    assert "beside_me" not in sys.modules
+    assert sys.path == before
 
 
 def test_conversions_keep_the_mesh_and_the_model(run, folder):

@@ -23,14 +23,12 @@ def users_of(source: Path) -> list[Path]:
 
 
 def build(sources: list[Path], folder: Path, *flags: str) -> None:
-    """Compile kernels, two at a time, into a folder; pybind11 must be installed."""
-    import pybind11
-
-    includes = [f"-I{pybind11.get_include()}", f"-I{sysconfig.get_paths()['include']}"]
+    """Compile kernels, two at a time, into a folder."""
+    include = f"-I{sysconfig.get_paths()['include']}"
 
     def compile_one(source: Path) -> None:
         out = folder / f"_{source.stem}{sysconfig.get_config_var('EXT_SUFFIX')}"
-        command = ["g++", *FLAGS, *flags, *includes, str(source), "-o", str(out)]
+        command = ["g++", *FLAGS, *flags, include, str(source), "-o", str(out)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{' '.join(command)}\n{done.stderr}")

@@ -1,12 +1,15 @@
 """Compiled kernels: the same numbers as NumPy, whatever the threads; a working package without them."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from kratos_lite import native
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError
 from kratos_lite.native import described, kernels, threads
@@ -121,6 +124,29 @@ def test_a_missing_kernel_is_said_once():
     out, errors = python(code, KRATOS_LITE_KERNELS="")
     assert out == ["None", "None"]
     assert errors.count("compiled kernels are not available") == 1
+
+
+@pytest.mark.parametrize("installed", [False, True])
+def test_a_source_tree_without_kernels_names_the_cure(tmp_path, installed):
+    tree, site = tmp_path / "tree", tmp_path / "site"
+    package = Path(native.__file__).parents[1]
+    ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__")
+    shutil.copytree(package, tree / "kratos_lite", ignore=ignored)
+    (tree / "setup.py").touch()
+    (site / "kratos_lite" / "native").mkdir(parents=True)
+    if installed:
+        (site / "kratos_lite" / "native" / "_gauss.so").touch()
+    run = subprocess.run(
+        [sys.executable, "-c", "from kratos_lite.native import kernels; kernels('gauss')"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": str(site), "KRATOS_LITE_KERNELS": ""},
+    )
+    assert f"This is the source tree of kratos_lite in {tree}: " in run.stderr
+    assert (f"what is installed in {site}, or" in run.stderr) == installed
+    assert run.stderr.strip().endswith("build them here by pip install -e .")
 
 
 @compiled

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kratos_lite.atomic import refuse_nan, write_whole
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.content import Content, Field, Frame
 from kratos_lite.io.writers.page.library import library
-from kratos_lite.typing import Array
+from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
     from kratos_lite.mesh import Mesh
 
 OURS = Path(__file__).with_name("browser")
-SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "app.js")
+LARGEST = 1e38
+"""Largest number in a page, which has single precision."""
+SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
 
 
 def write_page(path: str | Path, content: Content) -> None:
@@ -28,15 +31,27 @@ def write_page(path: str | Path, content: Content) -> None:
     parts = {"library": library(), "title": html.escape(content.title)}
     if not content.mesh.boundary:
         raise InputError(f"{path}: there is nothing to show: the mesh has no element of a known shape")
+    _refuse_large(path, "coordinates", content.mesh.points)
     for frame in content.frames:
         for field, values in zip(content.fields, frame.values, strict=True):
             refuse_nan(path, field.name, values)
+            _refuse_large(path, field.name, values)
     parts["data"] = content.packed()
     parts["style"] = (OURS / "page.css").read_text(encoding="utf-8")
     parts["script"] = "\n".join((OURS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     pieces = re.split(r"\{(\w+)\}", (OURS / "page.html").read_text(encoding="utf-8"))
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     write_whole(path, "".join(pieces).encode())
+
+
+def _refuse_large(path: str | Path, name: str, values: Array) -> None:
+    """Raise SolveError for numbers that single precision does not hold."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest > LARGEST:
+        raise SolveError(
+            f"{path}: not written: {name} reaches {largest:.3g}, and a page holds numbers up to "
+            f"{LARGEST:.0e}; look for loads, supports or constants in wrong units, or write .vtu"
+        )
 
 
 def write_result_page(path: str | Path, result: Result) -> None:
@@ -52,11 +67,11 @@ def write_result_page(path: str | Path, result: Result) -> None:
     write_page(path, Content(title, "result", result.mesh, fields, [frame], "1:von Mises", result.table()))
 
 
-def write_modes_page(path: str | Path, mesh: Mesh, omega: Array, shapes: Array) -> None:
-    """Write the page of natural modes: frequencies (k,) in rad/s and shapes (k, n, 3)."""
+def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes: Complexes) -> None:
+    """Write the page of modes: their names and shapes (k, n, 3); the real part of φ exp(iωt) is shown."""
     largest = np.linalg.norm(shapes, axis=2).max(axis=1)
-    frames = [
-        Frame(f"{i}: {w / (2 * np.pi):.5g} Hz", [shape / size])
-        for i, (w, shape, size) in enumerate(zip(omega, shapes, largest, strict=True), 1)
-    ]
-    write_page(path, Content(Path(path).stem, "modes", mesh, [Field("displacement", "", "vector")], frames))
+    scaled = shapes / np.where(largest > 0, largest, 1.0)[:, None, None]
+    parts = [scaled.real] if not scaled.imag.any() else [scaled.real, -scaled.imag]
+    fields = [Field(name, "", "vector") for name in ("displacement", "displacement a quarter period later")]
+    frames = [Frame(name, values) for name, *values in zip(names, *parts, strict=True)]
+    write_page(path, Content(Path(path).stem, "modes", mesh, fields[: len(parts)], frames))

@@ -1,0 +1,58 @@
+"""What describes the library in several files is the same in all of them."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import kratos_lite as kl
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def project():
+    """Return the table of the project; Python has a reader from 3.11 on."""
+    tomllib = pytest.importorskip("tomllib")
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def text(name):
+    """Return the text of a file beside the package."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def test_the_version_is_the_same_everywhere():
+    assert json.loads(text("codemeta.json"))["version"] == kl.__version__
+    assert f"version: {kl.__version__}\n" in text("CITATION.cff")
+    assert f'version: "{kl.__version__}"\n' in text("conda/recipe.yaml")
+
+
+def test_addresses_and_words_are_the_same_everywhere(project):
+    known, urls = json.loads(text("codemeta.json")), project["urls"]
+    assert [known["url"], known["codeRepository"], known["issueTracker"]] == [
+        urls[name] for name in ("Homepage", "Source", "Issues")
+    ]
+    recipe = text("conda/recipe.yaml")
+    for name, field in (
+        ("Homepage", "homepage"),
+        ("Documentation", "documentation"),
+        ("Source", "repository"),
+    ):
+        assert f"{field}: {urls[name]}\n" in recipe
+    assert known["description"] == project["description"]
+    assert known["keywords"] == project["keywords"]
+    assert [author["name"] for author in known["author"]] == [author["name"] for author in project["authors"]]
+
+
+def test_requirements_are_the_same_everywhere(project):
+    required = project["dependencies"]
+    assert json.loads(text("codemeta.json"))["softwareRequirements"] == required
+    recipe = re.findall(r"- (\w+ >=[\d.]+)", text("conda/recipe.yaml").split("  run:")[1])
+    assert [line.replace(" ", "") for line in recipe] == required
+    oldest = dict(line.split("==") for line in text(".ci/oldest.txt").split() if "==" in line)
+    bounds = dict(line.split(">=") for line in (*required, *project["optional-dependencies"]["view"]))
+    for name, version in bounds.items():
+        assert f"{oldest.pop(name)}.".startswith(f"{version}.")
+    assert not oldest
