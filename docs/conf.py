@@ -30,6 +30,7 @@ extensions = [
     "sphinx_design",
     "command_line",
     "docstrings",
+    "browser_pages",
     "gallery",
     "known_words",
     "public_names",

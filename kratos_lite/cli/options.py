@@ -162,7 +162,11 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
     _add_options(
         out,
         ("--json", "OUT.json", "summary, displacements and reactions by node id"),
-        ("--picture", "OUT.png", "picture of the deformed model, of its modes, or of a body along its path"),
+        (
+            "--picture",
+            "OUT.png",
+            "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film",
+        ),
         ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
     )
     out.add_argument(
