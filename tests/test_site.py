@@ -1,4 +1,4 @@
-"""The documentation site: every public name is there, and the built pages work in a browser without a network."""
+"""The documentation site: every public name is there, and the built pages work in a browser and offline."""
 
 import re
 import shutil
