@@ -4,6 +4,7 @@ It works offline: fonts, search and formulas are in the site itself.
 """
 
 import logging
+import os
 import sys
 from importlib.metadata import files
 from pathlib import Path
@@ -12,6 +13,8 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "extensions")]
 
 import kratos_lite  # noqa: E402
+
+os.environ["KRATOS_LITE_PROGRESS"] = "off"  # pages show what stays, not what passes
 
 project = "kratos_lite"
 author = "The kratos_lite developers"
