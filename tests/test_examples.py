@@ -46,7 +46,7 @@ def test_python_of_the_readme_runs(number, tmp_path):
 DOCS = EXAMPLES.parent / "docs"
 PAGES = sorted(
     str(page.relative_to(DOCS))
-    for folder in (DOCS, DOCS / "howto", DOCS / "reference")
+    for folder in (DOCS, DOCS / "howto", DOCS / "reference", DOCS / "topics")
     for page in folder.glob("*.md")
     if python_blocks(page.read_text())
 )

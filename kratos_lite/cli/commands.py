@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.cli.progress import TerminalProgress
+from kratos_lite.cli.progress import shown
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 if TYPE_CHECKING:
@@ -63,16 +63,14 @@ def _solve(options: Namespace, clock: float) -> int:
     reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
-    with TerminalProgress(options.progress) as progress:
-        progress("read", 0.0)
+    with shown("read", options.progress) as progress:
         case = case_of(options)
         seconds["read"] = perf_counter() - clock
         outcome = run(case, progress)
     if outcome.result is not None:
         outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
-        with TerminalProgress(options.progress) as progress:
-            progress("evaluate", 0.0)
+        with shown("evaluate", options.progress):
             summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
         _print(summary)
     except OSError:
@@ -83,8 +81,7 @@ def _solve(options: Namespace, clock: float) -> int:
 
 def _write(outcome: Outcome, options: Namespace) -> int:
     """Write what the end gives, compare it with expected values, and say both; return the exit code."""
-    with TerminalProgress(options.progress) as progress:
-        progress("write", 0.0)
+    with shown("write", options.progress):
         written, expected = outcome.write(), outcome.compare()
     _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
     _print(expected)
@@ -202,19 +199,11 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
 
 
 def _check_python(path: Path) -> int:
-    from kratos_lite.testing import failures, run_file
+    from kratos_lite.testing import failures, report, run_file
 
-    broken = 0
-    for name, findings in run_file(path):
-        failed = failures(findings)
-        broken += len(failed)
-        skipped = sum(finding.skipped for finding in findings)
-        passed = len(findings) - len(failed) - skipped
-        print(f"{name}: {passed} checks passed, {len(failed)} failed, {skipped} not run")
-        for finding in findings:
-            word = "ok" if finding.passed else "not run" if finding.skipped else "FAILED"
-            print(f"  {word:<8}{finding}")
-    return EXIT_UNSOLVABLE if broken else 0
+    checked = run_file(path)
+    _print([report(name, findings, whole=True) for name, findings in checked])
+    return EXIT_UNSOLVABLE if any(failures(findings) for _, findings in checked) else 0
 
 
 def convert(options: Namespace) -> int:

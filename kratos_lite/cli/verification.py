@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 from kratos_lite.atomic import write_whole
-from kratos_lite.cli.progress import TerminalProgress
+from kratos_lite.cli.progress import shown
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
-from kratos_lite.testing.files import MODULE, REGISTRIES, run_module
+from kratos_lite.testing.files import MODULE, REGISTRIES, beside, run_module
 from kratos_lite.verification import page
 from kratos_lite.verification.problem import Row
 from kratos_lite.verification.table import chosen, verify
@@ -20,7 +20,7 @@ EXIT_FAILED = 1
 
 
 def run(options: Namespace) -> int:
-    """Print the rows wanted; return 1 if one fails that has to pass."""
+    """Print the rows wanted, those first that fail; return 1 if one fails that has to pass."""
     files = [Path(name) for name in options.names if name.endswith(".py")]
     names = [name for name in options.names if not name.endswith(".py")]
     target = Path(options.output) if options.output else None
@@ -33,6 +33,8 @@ def run(options: Namespace) -> int:
     with ExitStack() as stack:  # elements of a file are forgotten afterwards
         for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
+        for file in files:
+            stack.enter_context(beside(file))
         own = [name for file in files for name in _elements_of(file)]
         rows = _printed(names, options.element or own)
         print(page.summary(rows))
@@ -52,13 +54,20 @@ def _elements_of(path: Path) -> list[str]:
 
 
 def _printed(names: list[str], elements: list[str]) -> list[Row]:
+    """Print failures as they come and the other rows at the end, also after Ctrl-C."""
     rows: list[Row] = []
     print(page.HEADER)
-    with TerminalProgress() as progress:
-        for row in verify(names, elements, progress):
-            progress.close()
-            print(page.line(row), flush=True)
-            rows.append(row)
+    try:
+        with shown() as progress:
+            for row in verify(names, elements, progress):
+                rows.append(row)
+                if row.failed:
+                    with progress.hidden() if progress else nullcontext():
+                        print(page.line(row), flush=True)
+    finally:
+        for row in rows:
+            if not row.failed:
+                print(page.line(row))
     return rows
 
 

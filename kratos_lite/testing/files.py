@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import traceback
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import is_dataclass
 from inspect import get_annotations
 from math import inf, nan
@@ -38,7 +39,8 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
 
     Parameters
     ----------
-    path : the file.  It is run in a module of its own; what it registers is forgotten afterwards.
+    path : the file.  It is run in a module of its own, beside the modules of its folder; what it registers
+        is forgotten afterwards.
 
     Returns
     -------
@@ -54,12 +56,12 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
     with ExitStack() as stack:
         for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
-        library = _registered()
+        stack.enter_context(beside(Path(path)))
         defined = vars(run_module(Path(path)))
         kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
         found = _check_all(defined, kinds)
         for kind in kinds:
-            extra = _forgotten(kind) + _replaced(kind, library, Path(path))
+            extra = _forgotten(kind)
             same = [f for name, f in found if name == kind.__name__ or name.endswith(f" ({kind.__name__})")]
             if same:
                 same[0].extend(extra)
@@ -86,6 +88,21 @@ def _check_all(defined: dict[str, Any], kinds: list[type]) -> list[tuple[str, li
             text += f"soil = {kind.__name__}(…) with its constants"
             found.append((kind.__name__, [Finding("instance", False, nan, nan, text, skipped=True)]))
     return found
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[None]:
+    """Let a Python file import the modules of its folder, as if Python ran it, and forget them afterwards."""
+    folder, before = str(path.parent.absolute()), set(sys.modules)
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+        for name in sys.modules.keys() - before:
+            home = getattr(sys.modules[name], "__file__", None)
+            if home and Path(folder) in Path(home).parents:
+                del sys.modules[name]
 
 
 def run_module(path: Path) -> ModuleType:
@@ -117,27 +134,6 @@ def run_module(path: Path) -> ModuleType:
 
 
 # ---- mistakes that Python lets pass ------------------------------------------------------------------
-
-
-def _registered() -> dict[tuple[str, str], Any]:
-    """Return what stands in the registries: (kind, name or alias) to class."""
-    return {
-        (registry.kind, name): registry[name]
-        for registry in REGISTRIES
-        for own in registry
-        for name in (own, *registry.aliases(own))
-    }
-
-
-def _replaced(kind: type, library: dict[tuple[str, str], Any], path: Path) -> list[Finding]:
-    """Return a finding if a class took names of the library; its own file may define it."""
-    now = _registered()
-    lost = {name: old for (of, name), old in library.items() if now[of, name] is kind is not old}
-    homes = {Path(sys.modules[old.__module__].__file__ or "").resolve() for old in lost.values()}
-    if not lost or homes == {path.resolve()}:
-        return []
-    text = f"the library has {', '.join(lost)} already; importing this file would replace it: "
-    return [Finding("name", False, inf, 0, text + "choose another name")]
 
 
 def _forgotten(kind: type) -> list[Finding]:

@@ -82,13 +82,14 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if not finding.passed and not finding.skipped]
 
 
-def report(name: str, findings: list[Finding]) -> str:
+def report(name: str, findings: list[Finding], *, whole: bool = False) -> str:
     """Return the text that counts the findings of a subject and shows its failures.
 
     Parameters
     ----------
     name : of the subject.
     findings : those of its checks.
+    whole : show also what passed, after the failures, and then in one line what was not run.
 
     Returns
     -------
@@ -102,13 +103,35 @@ def report(name: str, findings: list[Finding]) -> str:
     bad, skipped = failures(findings), sum(finding.skipped for finding in findings)
     run = len(findings) - skipped
     aside = f", {skipped} not run" if skipped else ""
-    if not bad:
-        return f"{name} conforms: {run} check{'s' * (run != 1)} passed{aside}"
-    lines = [f"{name} does not conform: {len(bad)} of {run} checks failed{aside}"]
-    lines += [f"  {finding}" for finding in bad[:MAX_PROBLEMS]]
+    lines = [f"{name} conforms: {run} check{'s' * (run != 1)} passed{aside}"]
+    if skipped and not run:
+        lines = [f"{name}: nothing was checked"]
+    if bad:
+        lines = [f"{name} does not conform: {len(bad)} of {run} checks failed{aside}"]
+    lines += [f"  FAILED  {finding}" for finding in bad[:MAX_PROBLEMS]]
     if len(bad) > MAX_PROBLEMS:
         lines.append(f"  … and {len(bad) - MAX_PROBLEMS} more")
+    if whole:
+        lines += [f"  ok      {finding}" for finding in findings if finding.passed]
+        lines += [f"  not run {_reasons(findings)}"] if skipped else []
     return "\n".join(lines)
+
+
+def _reasons(findings: Iterable[Finding]) -> str:
+    """Return why checks were not run, those of one reason together.
+
+    >>> _reasons([Finding("mid edges", False, 0, 0, "there are none", skipped=True)])
+    'mid edges (there are none)'
+    """
+    checks: dict[str, list[str]] = {}
+    for finding in findings:
+        if finding.skipped:
+            checks.setdefault(finding.detail, []).append(finding.check)
+    few = 3
+    return "; ".join(
+        f"{', '.join(names) if len(names) <= few else f'{len(names)} checks'} ({why})"
+        for why, names in checks.items()
+    )
 
 
 def run(checks: Iterable[Callable[[S], Measured | str]], subject: S) -> list[Finding]:

@@ -64,7 +64,7 @@ def _triad(axes: Any, X: Array, directions: Array) -> None:
     """Draw the reference axes below and to the left of a cell."""
     length = 0.2 * np.ptp(X, axis=0).max()
     low = X.min(axis=0) - 1.2 * length
-    for axis, name in zip(directions, "rst", strict=False):
+    for axis, name in zip(directions, "ξηζ", strict=False):
         arrow = {"arrowstyle": "-|>", "color": "0.3", "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", low + length * axis, low, arrowprops=arrow, annotation_clip=False)
         axes.text(*(low + 1.25 * length * axis), name, ha="center", va="center", style="italic", color="0.3")

@@ -32,6 +32,9 @@ MASS = "tests/assembly/test_exact_mass.py"
 QUANTITIES = "tests/analysis/test_quantities.py"
 BOUND = "tests/analysis/test_error_bound.py"
 PRESTRESS = "tests/io/kratos/test_initial_state.py -k prestress"
+VOIGT = "tests/test_voigt.py"
+LINES = "tests/analysis/test_line_values.py"
+COMPARED = "tests/analysis/test_comparison.py"
 
 MUTATIONS = [
     # ---- elements that lock, and those that do not
@@ -563,4 +566,20 @@ MUTATIONS = [
     Mutation("assembly/equilibrated_error.py", "load -= (gradients", "load += (gradients", BOUND),
     Mutation("assembly/equilibrated_tractions.py", "np.where(sides.inner, 0.5, 1.0)", "1.0", BOUND),
     Mutation("assembly/equilibrated_tractions.py", "np.where(is_first, 1.0, -1.0)", "np.ones(h)", BOUND),
+    # ---- principal stresses, lines, comparisons
+    Mutation("voigt.py", "np.sqrt(2 / 3) * radius", "np.sqrt(1 / 3) * radius", VOIGT),
+    Mutation("voigt.py", "np.sin(angle + np.pi / 3)", "np.sin(angle + np.pi / 6)", VOIGT),
+    Mutation("voigt.py", "r * (yz * zx - dz * xy)", "r * (yz * zx + dz * xy)", VOIGT),
+    Mutation("voigt.py", "dy * dy + xy * xy + yz * yz", "dy * dy + xy * xy + zx * zx", VOIGT),
+    Mutation("analysis/line_values.py", "6 * (0.5 - t)", "3 * (0.5 - t)", LINES),
+    Mutation("analysis/line_values.py", "half * weights", "weights / len(half) / 2", LINES),
+    Mutation("mesh/crossings.py", "np.diff(t) > SHORT", "np.diff(t) > 1e-3", "tests/mesh/test_crossings.py"),
+    Mutation("analysis/comparison.py", "share = volumes", "share = 2 + 0 * volumes", COMPARED),
+    Mutation("analysis/comparison.py", "voigt.tensor(values).reshape(len(values), 9)", "values", COMPARED),
+    Mutation(
+        "assembly/point_fields.py",
+        "nodal[region.nodes] = values",
+        "nodal[region.nodes] += 2 * values",
+        "tests/analysis/test_values_at_points.py -k recovered",
+    ),
 ]

@@ -840,14 +840,30 @@ def test_assert_conforms_reports_every_failure_in_one_error():
         assert_conforms(with_functions(Tetrahedron4, dN=dN))
     lines = str(caught.value).splitlines()
     assert lines[0] == "BrokenTetrahedron4 does not conform: 1 of 6 checks failed, 4 not run"
-    assert lines[1].startswith("  derivatives: 0.25 exceeds 1e-09: dN[3] / d t at xi = (")
+    assert lines[1].startswith("  FAILED  derivatives: 0.25 exceeds 1e-09: dN[3] / d t at xi = (")
     assert lines[1].endswith("): dN gives 1.25, differences of N give 1")
     assert len(lines) == 2
 
 
 def test_a_long_report_is_cut_and_counted():
     text = report("Broken", [Finding(f"check {i}", False, 1.0, 0.0, "no") for i in range(23)])
-    assert text.splitlines()[20:] == ["  check 19: no", "  … and 3 more"]
+    assert text.splitlines()[20:] == ["  FAILED  check 19: no", "  … and 3 more"]
+
+
+def test_failures_stand_first_and_what_was_not_run_is_one_line():
+    findings = [
+        Finding("first", True, 0.0, 0.0, "", claim="it holds"),
+        Finding("second", False, 0.0, 0.0, "there are none", skipped=True),
+        Finding("third", False, 1.0, 0.0, "mend this"),
+        *(Finding(f"later {i}", False, 0.0, 0.0, "fix third first", skipped=True) for i in range(4)),
+    ]
+    assert report("My8N", findings, whole=True).splitlines() == [
+        "My8N does not conform: 1 of 2 checks failed, 5 not run",
+        "  FAILED  third: mend this",
+        "  ok      first: it holds",
+        "  not run second (there are none); 4 checks (fix third first)",
+    ]
+    assert report("Mine", findings[1:2], whole=True).splitlines()[0] == "Mine: nothing was checked"
 
 
 def test_a_finding_that_passes_says_what_holds_and_not_how_to_fix_it():

@@ -252,6 +252,16 @@ def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
     assert "| uniaxial | Stiff8N |" in Path("own.md").read_text()
 
 
+def test_rows_that_fail_stand_first(folder, capsys):
+    more = "    def stiffness(self, C):\n        return super().stiffness(C) * 1.01"
+    Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
+    assert main(["verify", "own.py", "element"]) == 1
+    told = capsys.readouterr().out.splitlines()[1:-1]
+    failed = [" FAIL" in line for line in told]
+    assert 0 < sum(failed) < len(failed)
+    assert failed == sorted(failed, reverse=True)
+
+
 def test_an_error_of_ones_own_element_is_named_with_exit_code_2(folder, capsys):
     Path("own.py").write_text(OWN.format(name="Zero8N", more="    def B(self, xi):\n        return 1 / 0"))
     assert main(["verify", "own.py", "element/uniaxial"]) == 2

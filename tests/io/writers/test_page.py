@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.errors import InputError, KratosLiteError
+from kratos_lite.errors import InputError, KratosLiteError, SolveError
 from kratos_lite.io.writers.page.lattices import TETRAHEDRA, lattice_of_cell, lattice_of_face
 from kratos_lite.shapes import LINEAR, SHAPES
 from kratos_lite.view.facets import sharp_edges
@@ -45,7 +45,7 @@ def unpacked(value, raw):
         return [unpacked(item, raw) for item in value]
     if not isinstance(value, dict):
         return value
-    if value.get("type") not in ("f4", "i4", "i2"):
+    if value.get("type") not in ("f4", "i8", "i4", "i2"):
         return {name: unpacked(item, raw) for name, item in value.items()}
     kind = np.dtype("<" + value["type"])
     part = raw[value["start"] : value["start"] + value["count"] * kind.itemsize]
@@ -135,6 +135,62 @@ def test_a_page_holds_mesh_and_fields(result, tmp_path):
         assert abs(found - wanted).max() <= 1e-7 * abs(wanted).max()
 
 
+def test_a_large_page_holds_the_surface_alone(tmp_path, monkeypatch):
+    pytest.importorskip("trimesh")
+    monkeypatch.setattr("kratos_lite.io.writers.page.content.MOST_CELLS", 26)
+    mesh = kl.box((3, 3, 3), (3, 3, 3))
+    kl.write_modes(tmp_path / "a.html", mesh, [1.0], np.ones((1, 64, 3)))
+    content = content_of(tmp_path / "a.html")
+    inside = (abs(mesh.points - 1.5) < 1).all(axis=1)
+    assert content["cells"] == []
+    assert content["node_ids"].ravel().tolist() == mesh.node_ids[~inside].tolist()
+    assert abs(content["points"] + content["center"] - mesh.points[~inside]).max() < 1e-6
+    faces = mesh.node_ids[mesh.boundary[0].nodes]
+    assert content["node_ids"].ravel()[content["faces"][0]["nodes"]].tolist() == faces.tolist()
+    ends = content["points"][content["outline"]]
+    assert abs(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() - 36) < 1e-5
+
+
+def test_large_ids_keep_their_digits(tmp_path):
+    pytest.importorskip("trimesh")
+    box = kl.box()
+    ids = box.node_ids + 2**62
+    mesh = kl.Mesh(box.points, box.blocks, node_ids=ids)
+    kl.write_modes(tmp_path / "a.html", mesh, [1.0], np.ones((1, 8, 3)))
+    assert content_of(tmp_path / "a.html")["node_ids"].ravel().tolist() == ids.tolist()
+
+
+def test_numbers_beyond_single_precision_are_refused(result, tmp_path):
+    pytest.importorskip("trimesh")
+    stiff = kl.Model(kl.box(), kl.Isotropic3D(E=1e45, nu=0.3))
+    stiff.fix("x-")
+    stiff.fix("x+", value=(1e-3, 0, 0))
+    with pytest.raises(
+        SolveError, match=r"not written: stress reaches \S+ and a page holds numbers up to 1e\+38"
+    ):
+        kl.write(tmp_path / "a.html", stiff.solve())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_mesh_without_solids_is_refused(tmp_path):
+    pytest.importorskip("trimesh")
+    mesh = kl.Mesh(np.eye(3), [kl.Block("Unknown3N", [[0, 1, 2]])])
+    with pytest.raises(InputError, match="nothing to show: the mesh has no element of a known shape"):
+        kl.write_modes(tmp_path / "a.html", mesh, [1.0], np.ones((1, 3, 3)))
+
+
+def test_of_very_many_states_some_are_kept(tmp_path, monkeypatch):
+    pytest.importorskip("trimesh")
+    monkeypatch.setattr("kratos_lite.io.writers.page.states.MOST_FRAMES", 4)
+    body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
+    with kl.SeriesWriter(tmp_path / "a.html", body) as series:
+        for state in kl.integrate(body, dt=0.01, steps=10):
+            series.add(state)
+    content = content_of(tmp_path / "a.html")
+    assert [frame["name"] for frame in content["frames"]] == [f"t = {t} s" for t in (0.01, 0.04, 0.07, 0.1)]
+    assert ["states", "4 of 10"] in content["about"]
+
+
 def test_a_page_asks_nothing_of_a_network(result, tmp_path):
     pytest.importorskip("trimesh")
     kl.write(tmp_path / "a.html", result)
@@ -199,7 +255,7 @@ def test_modes_of_another_mesh_are_refused(tmp_path):
         kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.zeros((1, 7, 3)))
     with pytest.raises(InputError, match=r"not finite"):
         kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.full((1, 8, 3), np.nan))
-    with pytest.raises(InputError, match=r"the ending must be .html"):
+    with pytest.raises(InputError, match=r"modes are written as .pvd"):
         kl.write_modes(tmp_path / "m.txt", kl.box(), [1.0], np.zeros((1, 8, 3)))
     assert not list(tmp_path.iterdir())
 

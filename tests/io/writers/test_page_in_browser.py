@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
+from kratos_lite.shapes import SHAPES
 
 webdriver = pytest.importorskip("selenium.webdriver")
 WebDriverWait = pytest.importorskip("selenium.webdriver.support.wait").WebDriverWait
@@ -268,6 +269,22 @@ def test_the_pointer_sees_the_section_behind_what_is_cut_away(page):
     assert abs(found["point"][0] - page("return page.offset")) < 1e-4
 
 
+def test_a_saved_picture_has_the_legend(page):
+    page.pixels()
+    top, bottom, body = page("""
+        const canvas = page.legend.over(page.stage.renderer.domElement), pen = canvas.getContext("2d");
+        const view = document.getElementById("view").getBoundingClientRect();
+        const box = ramp.getBoundingClientRect();
+        const pixel = (x, y) => pen.getImageData(x - view.left, y - view.top, 1, 1).data;
+        const color = (x, y) => Array.from(pixel(x, y).slice(0, 3));
+        return [color(box.left + 8, box.top + 1), color(box.left + 8, box.bottom - 2),
+                color(view.left + view.width / 2, view.top + view.height / 2)];
+    """)
+    assert abs(np.array(top) - (253, 231, 37)).max() < 8
+    assert abs(np.array(bottom) - (68, 1, 84)).max() < 8
+    assert min(body) < 200
+
+
 def test_animation_moves_the_body_and_stops(page):
     page.click("play")
     seen = {page.pixels() for _ in range(5)}
@@ -289,7 +306,7 @@ def test_modes_swing_to_both_sides(browser, model, tmp_path):
         seen.add(browser.pixels())
     assert len(seen) == 3
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 10, 0.02)
+    wait = WebDriverWait(browser.driver, 30, 0.02)
     for sign in (-1, 1):
         wait.until(lambda _, sign=sign: sign * browser("return page.phase") > 0.2)
 
@@ -322,8 +339,37 @@ def test_states_play_with_one_range_for_all(browser, model, tmp_path):
     assert browser.pixels() != first
     assert abs(browser.array("page.displacement") - states[6].u.ravel()).max() < 1e-4 * largest
     browser.click("play")
-    wait = WebDriverWait(browser.driver, 10, 0.02)
+    wait = WebDriverWait(browser.driver, 30, 0.02)
     wait.until(lambda _: browser("return page.frame") != 6)
+
+
+def test_all_kinds_of_cells_together_are_shown_and_cut(browser, tmp_path):
+    points, blocks = [], []
+    for i, name in enumerate(("Tetrahedron10", "Hexahedron27", "Wedge6", "Pyramid13")):
+        X = SHAPES[name].nodes
+        rows = np.arange(len(X))[None] + sum(map(len, points))
+        points.append(X + 4.0 * i * np.eye(3)[0])
+        blocks.append(kl.Block(f"KinematicLinear3D{len(X)}N", rows, ids=[2**60 + i]))
+    mesh = kl.Mesh(np.concatenate(points), blocks)
+    kl.write_modes(tmp_path / "kinds.html", mesh, [1.0], [1e-9 + 0 * mesh.points])
+    browser.open(tmp_path / "kinds.html")
+    browser.set("scale", 0)
+    browser.set("axis", "z")
+    browser.set("depth", 0.6)
+    z = browser("return page.offset + page.data.center[2]")
+    assert 0.1 < z < 0.9
+    P = browser.array("page.section.positions").reshape(-1, 3, 3)
+    area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1).sum() / 2
+    # of a simplex, a square, half a square, and what is left of the base of a pyramid
+    assert abs(area - ((1 - z) ** 2 / 2 + 4 + 0.5 + 4 * (1 - z) ** 2)) < 1e-4
+    for i in range(4):
+        element = browser(
+            "const [x, y] = arguments, { data } = page;"
+            "const found = page.find([x - data.center[0], y - data.center[1], 50], [0, 0, -1]);"
+            "return String(data.element_ids[found.element])",
+            *(4.0 * i + 0.1, 0.2),
+        )
+        assert element == str(2**60 + i)
 
 
 def test_a_narrow_window_keeps_body_and_controls_apart(page):

@@ -177,8 +177,9 @@ class _Packer:
         self.size, self.is_short = 0, is_short
 
     def whole(self, array: NDArray[Any]) -> dict[str, Any]:
-        """Take whole numbers, as differences from row to row."""
-        return self._take("i4", array.astype(np.int32))
+        """Take whole numbers, as differences from row to row; large ids keep all their digits."""
+        is_large = array.size > 0 and array.max() >= 2**31
+        return self._take("i8" if is_large else "i4", array.astype(np.int64 if is_large else np.int32))
 
     def real(self, array: Array) -> dict[str, Any]:
         """Take real numbers in single precision."""

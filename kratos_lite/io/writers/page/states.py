@@ -25,15 +25,16 @@ OF_STATES = {
 
 def write_states_page(path: str | Path, subject: Recorded, states: list[Any]) -> None:
     """Write the page of states of a body or a transient: displacements, von Mises stresses, velocities."""
-    mesh = subject.mesh()
+    mesh, all_of_them = subject.mesh(), len(states)
     states = _thinned(states, max(2, min(MOST_FRAMES, MOST_VALUES // mesh.n_nodes)))
     kept, frames = list[str](), []
     for state in states:
         points, _ = subject.fields(state)
         kept = [name for name in OF_STATES if name in points]
         frames.append(Frame(f"t = {state.time:.5g} s", [points[name] for name in kept]))
+    about = [("states", f"{len(states)} of {all_of_them}")]
     fields = [OF_STATES[name] for name in kept]
-    write_page(path, Content(Path(path).stem, "states", mesh, fields, frames))
+    write_page(path, Content(Path(path).stem, "states", mesh, fields, frames, about=about))
 
 
 def _thinned(states: list[Any], most: int) -> list[Any]:

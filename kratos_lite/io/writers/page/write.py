@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kratos_lite.atomic import refuse_nan, write_whole
-from kratos_lite.errors import InputError
+from kratos_lite.errors import InputError, SolveError
 from kratos_lite.io.writers.page.content import Content, Field, Frame
 from kratos_lite.io.writers.page.library import library
-from kratos_lite.typing import Complexes
+from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
     from kratos_lite.mesh import Mesh
 
 OURS = Path(__file__).with_name("browser")
-SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "app.js")
+LARGEST = 1e38
+"""Largest number in a page, which has single precision."""
+SCRIPTS = ("data.js", "fields.js", "body.js", "stage.js", "legend.js", "app.js")
 
 
 def write_page(path: str | Path, content: Content) -> None:
@@ -29,15 +31,27 @@ def write_page(path: str | Path, content: Content) -> None:
     parts = {"library": library(), "title": html.escape(content.title)}
     if not content.mesh.boundary:
         raise InputError(f"{path}: there is nothing to show: the mesh has no element of a known shape")
+    _refuse_large(path, "coordinates", content.mesh.points)
     for frame in content.frames:
         for field, values in zip(content.fields, frame.values, strict=True):
             refuse_nan(path, field.name, values)
+            _refuse_large(path, field.name, values)
     parts["data"] = content.packed()
     parts["style"] = (OURS / "page.css").read_text(encoding="utf-8")
     parts["script"] = "\n".join((OURS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     pieces = re.split(r"\{(\w+)\}", (OURS / "page.html").read_text(encoding="utf-8"))
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     write_whole(path, "".join(pieces).encode())
+
+
+def _refuse_large(path: str | Path, name: str, values: Array) -> None:
+    """Raise SolveError for numbers that single precision does not hold."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest > LARGEST:
+        raise SolveError(
+            f"{path}: not written: {name} reaches {largest:.3g}, and a page holds numbers up to "
+            f"{LARGEST:.0e}; look for loads, supports or constants in wrong units, or write .vtu"
+        )
 
 
 def write_result_page(path: str | Path, result: Result) -> None:

@@ -1,6 +1,5 @@
 // The page: what the controls mean.
 
-const $ = (id) => document.getElementById(id);
 const INK = 0x10141c;
 const FRAMES_PER_SECOND = 20, SECONDS_PER_CYCLE = 3;
 
@@ -21,8 +20,8 @@ class Page {
     stage.reshape(this.outline, data.points, Uint32Array.from(data.outline));
     this.cap = stage.triangles(false);
     this.capLines = stage.lines(INK, 0.45, false);
-    this.mark = stage.add(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: 0xd2342a, size: 8, sizeAttenuation: false, depthTest: false })));
-    this.mark.visible = false;
+    this.mark = stage.mark(0xd2342a, 8);
+    this.legend = new Legend();
     this.section = null;
     this.setUp();
     this.choose();
@@ -36,19 +35,23 @@ class Page {
     for (const [name, text] of data.about) $("about").append(element("dt", name), element("dd", text));
     data.fields.forEach((field, i) => {
       const group = Object.assign(document.createElement("optgroup"), { label: field.name });
-      for (const name of Object.keys(COMPONENTS[field.kind]))
-        group.append(Object.assign(element("option", [field.name, name].filter(Boolean).join(", ")), { value: `${i}:${name}` }));
+      for (const name of Object.keys(COMPONENTS[field.kind])) {
+        const option = element("option", named(field, name));
+        option.value = `${i}:${name}`;
+        group.append(option);
+      }
       $("field").append(group);
     });
     $("field").value = data.shown;
     $("frame").max = data.frames.length - 1;
     $("of-frame").hidden = data.frames.length < 2;
     $("of-frame").firstChild.data = data.kind === "modes" ? "Mode " : "State ";
+    $("hollow").hidden = data.cells.length > 0;
     $("edges").checked = this.edges.visible = data.edged;
     this.on("field", "change", () => this.choose());
     this.on("refit", "click", () => this.fit());
     for (const id of ["low", "high"]) this.on(id, "change", () => this.setRange());
-    this.on("frame", "input", () => this.show(Number($("frame").value)));
+    this.on("frame", "input", () => this.turnTo(Number($("frame").value)));
     this.on("scale", "input", () => this.update());
     this.on("play", "click", () => this.play());
     for (const id of ["axis", "flip", "depth"]) this.on(id, "input", () => this.update());
@@ -58,6 +61,7 @@ class Page {
       button.addEventListener("click", () => this.stage.look(button.dataset.view.split(",").map(Number)));
     this.on("picture", "click", () => this.save());
     this.on("view", "pointermove", (event) => this.point(event));
+    this.on("view", "click", (event) => this.point(event));  // a finger has no other way
     this.on("view", "pointerleave", () => this.unpoint());
     this.on("view", "pointerdown", () => this.unpoint());
     this.stage.onDrawn = () => this.drawTriad();
@@ -87,13 +91,20 @@ class Page {
     this.frame = frame;
     $("frame").value = frame;
     $("frame-name").textContent = this.data.frames[frame].name;
-    const [first, second] = this.data.frames[frame].values.map((packed) => this.data.read(packed));
-    this.displacement = first;
-    this.later = this.data.kind === "modes" && second;  // of a complex mode, a quarter period later
+    const { data } = this, { values } = data.frames[frame];
+    this.displacement = data.read(values[0]);
+    // Of a complex mode there is a part that comes a quarter period later.
+    this.later = data.kind === "modes" && values[1] && data.read(values[1]);
     this.values = this.valuesOf(frame);
     if (this.field.at === "element") spreadOfElements(this.surface, this.values, this.surface.values);
     else spread(this.surface, this.values, 1, this.surface.values);
     if (draw) this.update();
+  }
+
+  turnTo(frame) {
+    if (this.playing) this.play(false);
+    this.show(frame);
+    if (this.data.kind === "modes") this.fit();
   }
 
   fit() {
@@ -112,7 +123,7 @@ class Page {
   }
 
   setRange() {
-    const [low, high] = ["low", "high"].map((id) => Number($(id).value.replace(",", ".")) * 10 ** this.power);
+    const [low, high] = ["low", "high"].map((id) => this.legend.read($(id).value));
     if (Number.isFinite(low) && Number.isFinite(high) && low < high) this.range = [low, high];
     this.update();
   }
@@ -128,9 +139,10 @@ class Page {
     spread(surface, this.positions, 3, surface.positions);
     this.body.geometry.attributes.position.needsUpdate = true;
     colored(this.body, surface.values, this.range);
-    $("scale-name").textContent = data.kind === "modes" ? `${Number($("scale").value)}` : `× ${Number(scale.toPrecision(3))}`;
+    const factor = data.kind === "modes" ? Number($("scale").value) : Number(scale.toPrecision(3));
+    $("scale-name").textContent = data.kind === "modes" ? `${factor}` : `× ${factor}`;
     this.cut();
-    this.drawLegend();
+    this.legend.show(named(this.field, this.chosen[1]), this.field.unit, this.range);
     this.unpoint();
     this.stage.draw();
   }
@@ -147,30 +159,13 @@ class Page {
     this.capLines.visible = hasSection && this.edges.visible;
     if (!hasSection) return;
     const ofElements = this.field.at === "element" ? this.values : null;
-    this.section = cut(this.data.cells, this.positions, ofElements ? null : this.values, ofElements, this.normal, this.offset);
-    const positions = Float32Array.from(this.section.positions), values = Float32Array.from(this.section.values);
-    this.section.positions = positions;
-    this.section.values = values;
-    this.stage.reshape(this.cap, positions);
-    colored(this.cap, values, this.range);
-    this.stage.reshape(this.capLines, Float32Array.from(this.section.lines));
-  }
-
-  drawLegend() {
-    const [low, high] = this.range, largest = Math.max(Math.abs(low), Math.abs(high));
-    this.power = this.field.unit ? prefixOf(largest) : 0;
-    const [index, name] = this.chosen, shown = (value) => `${Number((value / 10 ** this.power).toPrecision(4))}`;
-    $("quantity").textContent = [this.data.fields[index].name, name].filter(Boolean).join(", ");
-    $("unit").textContent = PREFIXES[this.power] + this.field.unit;
-    $("ramp").style.background = `linear-gradient(to top, ${RAMP.join(", ")})`;
-    $("ticks").replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((share) => {
-      const tick = element("span", shown(low + share * (high - low)));
-      tick.style.top = `${100 * (1 - share)}%`;
-      return tick;
-    }));
-    $("low").value = shown(low);
-    $("high").value = shown(high);
-    $("legend").hidden = false;
+    const nodal = ofElements ? null : this.values;
+    const found = cut(this.data.cells, this.positions, nodal, ofElements, this.normal, this.offset);
+    for (const name of ["positions", "values", "lines"]) found[name] = Float32Array.from(found[name]);
+    this.section = found;
+    this.stage.reshape(this.cap, found.positions);
+    colored(this.cap, found.values, this.range);
+    this.stage.reshape(this.capLines, found.lines);
   }
 
   drawTriad() {
@@ -179,8 +174,10 @@ class Page {
       const axis = new THREE.Vector3().setComponent(i, 1).transformDirection(camera.matrixWorldInverse);
       return [axis, name, ["#c33", "#293", "#24c"][i]];
     }).sort(([one], [other]) => one.z - other.z);
-    $("triad").innerHTML = ends.map(([{ x, y }, name, color]) =>
-      `<line x2="${34 * x}" y2="${-34 * y}" stroke="${color}" stroke-width="3"/><text x="${44 * x}" y="${-44 * y}" fill="${color}">${name}</text>`).join("");
+    const drawn = ([{ x, y }, name, color]) =>
+      `<line x2="${34 * x}" y2="${-34 * y}" stroke="${color}" stroke-width="3"/>`
+      + `<text x="${44 * x}" y="${-44 * y}" fill="${color}">${name}</text>`;
+    $("triad").innerHTML = ends.map(drawn).join("");
   }
 
   // ---- animation ---------------------------------------------------------------------------------
@@ -224,7 +221,7 @@ class Page {
     const [x, y] = [event.clientX - box.left + 14, event.clientY - box.top + 14];
     label.style.left = `${Math.max(0, Math.min(x, box.width - label.offsetWidth - 4))}px`;
     label.style.top = `${Math.max(0, Math.min(y, box.height - label.offsetHeight - 4))}px`;
-    this.mark.geometry.setAttribute("position", new THREE.BufferAttribute(this.positions.slice(3 * found.node, 3 * found.node + 3), 3));
+    this.stage.reshape(this.mark, this.positions.slice(3 * found.node, 3 * found.node + 3));
     this.mark.visible = true;
     this.stage.draw();
   }
@@ -260,7 +257,8 @@ class Page {
   }
 
   described({ value, node, element }) {
-    const { data, field } = this, place = [0, 1, 2].map((i) => this.rounded(data.points[3 * node + i] + data.center[i]));
+    const { data, field } = this;
+    const place = data.center.map((middle, i) => this.rounded(data.points[3 * node + i] + middle));
     const lines = [written(value, field.unit, 5)];
     lines.push(`node ${data.node_ids[node]} at (${place.join(", ")}) m`);
     if (field.at !== "element") lines[1] += `: ${written(this.values[node], field.unit, 5)}`;
@@ -274,36 +272,18 @@ class Page {
     return Number((Math.round(x / unit) * unit).toPrecision(7));
   }
 
-  // Return a canvas with the body and the legend.
-  picture() {
-    const { domElement: body } = this.stage.renderer, canvas = document.createElement("canvas");
-    const pen = canvas.getContext("2d"), size = body.height / body.clientHeight;
-    [canvas.width, canvas.height] = [body.width, body.height];
-    pen.drawImage(body, 0, 0);
-    pen.scale(size, size);
-    pen.fillStyle = getComputedStyle($("view")).color;
-    pen.font = getComputedStyle($("legend")).font;
-    const origin = $("view").getBoundingClientRect(), write = (text, box, down) => pen.fillText(text, box.left - origin.left, box.top - origin.top + down);
-    for (const line of [$("quantity"), $("unit"), ...$("ticks").children]) write(line.textContent, line.getBoundingClientRect(), 15);
-    const ramp = $("ramp").getBoundingClientRect(), [x, y] = [ramp.left - origin.left, ramp.top - origin.top];
-    const gradient = pen.createLinearGradient(0, y + ramp.height, 0, y);
-    RAMP.forEach((color, i) => gradient.addColorStop(i / (RAMP.length - 1), color));
-    pen.fillStyle = gradient;
-    pen.fillRect(x, y, ramp.width, ramp.height);
-    return canvas;
-  }
-
   save() {
-    this.picture().toBlob((blob) => {
-      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "picture.png" });
+    this.legend.over(this.stage.renderer.domElement).toBlob((blob) => {
+      const link = document.createElement("a");
+      [link.href, link.download] = [URL.createObjectURL(blob), `${this.data.title}.png`];
       link.click();
       URL.revokeObjectURL(link.href);
     });
   }
 }
 
-function element(name, text) {
-  return Object.assign(document.createElement(name), { textContent: text });
+function named(field, component) {
+  return component ? `${field.name}, ${component}` : field.name;
 }
 
 try {

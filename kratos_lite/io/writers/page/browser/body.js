@@ -70,8 +70,7 @@ function faceOf(surface, triangle) {
 function cut(cells, positions, nodal, ofElements, normal, offset) {
   const section = { positions: [], values: [], lines: [], elements: [], cells: [] };
   const distances = new Float32Array(positions.length / 3);
-  for (let i = 0; i < distances.length; i++)
-    distances[i] = normal[0] * positions[3 * i] + normal[1] * positions[3 * i + 1] + normal[2] * positions[3 * i + 2] - offset;
+  for (let i = 0; i < distances.length; i++) distances[i] = dot(normal, positions, 3 * i) - offset;
   for (const block of cells) {
     const k = widthOf(block), weights = sparse(block.N), count = block.nodes.length / k;
     for (let cell = 0; cell < count; cell++) {
@@ -83,6 +82,10 @@ function cut(cells, positions, nodal, ofElements, normal, offset) {
     }
   }
   return section;
+}
+
+function dot([x, y, z], array, at) {
+  return x * array[at] + y * array[at + 1] + z * array[at + 2];
 }
 
 // Whether there are nodes on both sides of the plane.
@@ -140,12 +143,13 @@ function hit(positions, corners, origin, direction, isHidden) {
   for (let t = 0; t < n; t += 3) {
     const i = 3 * (corners ? corners[t] : t), j = 3 * (corners ? corners[t + 1] : t + 1);
     const k = 3 * (corners ? corners[t + 2] : t + 2);
-    const ax = positions[j] - positions[i], ay = positions[j + 1] - positions[i + 1], az = positions[j + 2] - positions[i + 2];
-    const bx = positions[k] - positions[i], by = positions[k + 1] - positions[i + 1], bz = positions[k + 2] - positions[i + 2];
+    const x = positions[i], y = positions[i + 1], z = positions[i + 2];
+    const ax = positions[j] - x, ay = positions[j + 1] - y, az = positions[j + 2] - z;
+    const bx = positions[k] - x, by = positions[k + 1] - y, bz = positions[k + 2] - z;
     const px = dy * bz - dz * by, py = dz * bx - dx * bz, pz = dx * by - dy * bx;
     const determinant = ax * px + ay * py + az * pz;
     if (determinant === 0) continue;
-    const sx = ox - positions[i], sy = oy - positions[i + 1], sz = oz - positions[i + 2];
+    const sx = ox - x, sy = oy - y, sz = oz - z;
     const u = (sx * px + sy * py + sz * pz) / determinant;
     if (u < 0 || u > 1) continue;
     const qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
@@ -163,7 +167,8 @@ function hit(positions, corners, origin, direction, isHidden) {
 function nearestNode(nodes, positions, [x, y, z]) {
   let best = nodes[0], least = Infinity;
   for (const node of nodes) {
-    const away = (positions[3 * node] - x) ** 2 + (positions[3 * node + 1] - y) ** 2 + (positions[3 * node + 2] - z) ** 2;
+    const [dx, dy, dz] = [positions[3 * node] - x, positions[3 * node + 1] - y, positions[3 * node + 2] - z];
+    const away = dx * dx + dy * dy + dz * dz;
     if (away < least) [best, least] = [node, away];
   }
   return best;

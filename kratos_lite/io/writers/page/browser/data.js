@@ -1,6 +1,6 @@
 // What Python has packed: arrays are bytes sorted by significance, whole numbers differences along the rows.
 
-const TYPES = { f4: Float32Array, i4: Int32Array, i2: Int16Array };
+const TYPES = { f4: Float32Array, i8: BigInt64Array, i4: Int32Array, i2: Int16Array };
 
 async function unpacked() {
   const packed = Uint8Array.from(atob(document.getElementById("data").textContent), (c) => c.charCodeAt(0));

@@ -1,7 +1,10 @@
 // The stage: camera, light, the body's triangles and lines, drawn when something has changed.
 
 // Colors of low to high values, as in matplotlib's viridis (CC0).
-const RAMP = ["#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"];
+const RAMP = [
+  "#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c",
+  "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725",
+];
 
 class Stage {
   constructor(target, radius) {
@@ -35,8 +38,8 @@ class Stage {
     const { clientWidth: width, clientHeight: height } = this.target;
     if (!width || !height) return;
     this.renderer.setSize(width, height);
-    const half = 1.15 * this.radius / Math.min(1, width / height);
-    Object.assign(this.camera, { left: -half * width / height, right: half * width / height, top: half, bottom: -half });
+    const top = 1.15 * this.radius / Math.min(1, width / height), right = top * width / height;
+    Object.assign(this.camera, { left: -right, right, top, bottom: -top });
     this.camera.updateProjectionMatrix();
     this.controls.handleResize();
     this.draw();
@@ -86,12 +89,20 @@ class Stage {
     return this.add(new THREE.LineSegments(new THREE.BufferGeometry(), material));
   }
 
+  mark(color, size) {
+    const material = new THREE.PointsMaterial({ color, size, sizeAttenuation: false, depthTest: false });
+    const points = this.add(new THREE.Points(new THREE.BufferGeometry(), material));
+    points.visible = false;
+    return points;
+  }
+
   // Give triangles or lines their points, new ones in place of those they had.
   reshape(thing, positions, corners = null) {
     thing.geometry.dispose();
     thing.geometry = new THREE.BufferGeometry();
     thing.geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
-    if (thing.isMesh) thing.geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(positions.length / 3 * 2), 2));
+    const places = new Float32Array(positions.length / 3 * 2);
+    if (thing.isMesh) thing.geometry.setAttribute("uv", new THREE.BufferAttribute(places, 2));
     if (corners) thing.geometry.setIndex(new THREE.BufferAttribute(corners, 1));
   }
 
@@ -117,6 +128,7 @@ function rampTexture() {
 
 function colored(mesh, values, [low, high]) {
   const uv = mesh.geometry.attributes.uv;
-  for (let i = 0; i < values.length; i++) uv.array[2 * i] = Math.min(1, Math.max(0, (values[i] - low) / (high - low)));
+  for (let i = 0; i < values.length; i++)
+    uv.array[2 * i] = Math.min(1, Math.max(0, (values[i] - low) / (high - low)));
   uv.needsUpdate = true;
 }
