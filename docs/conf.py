@@ -3,7 +3,7 @@
 It works offline: fonts, search and formulas are in the site itself.
 """
 
-import logging
+import os
 import sys
 from importlib.metadata import files
 from pathlib import Path
@@ -12,6 +12,8 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "extensions")]
 
 import kratos_lite  # noqa: E402
+
+os.environ["KRATOS_LITE_PROGRESS"] = "off"  # pages show what stays, not what passes
 
 project = "kratos_lite"
 author = "The kratos_lite developers"
@@ -27,6 +29,8 @@ extensions = [
     "sphinx_design",
     "command_line",
     "docstrings",
+    "browser_pages",
+    "gallery",
     "known_words",
     "public_names",
 ]
@@ -35,7 +39,7 @@ nitpicky = True
 
 # ---- pages and notebooks ---------------------------------------------------------------------------
 
-myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_in_temp = True
@@ -81,6 +85,3 @@ html_css_files = ["site.css"]
 linkcheck_timeout = 20
 linkcheck_retries = 2
 linkcheck_anchors = False
-
-# folders that wait for their first page
-logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob" not in record.msg)

@@ -5,6 +5,8 @@
 # -ρ g L² / (2 M) with the confined modulus M = E (1 - ν) / ((1 + ν)(1 - 2ν)): -0.1322 mm.
 
 # %%
+import sys
+
 import kratos_lite as kl
 
 soil = kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0)  # Pa (210 N/mm²), –, kg/m³
@@ -21,3 +23,7 @@ result = model.solve()
 top = result.displacement("z+")[:, 2].mean()
 print(f"top: {top * 1e3:.10f} mm")
 print(result)
+
+# %%
+if len(sys.argv) > 1:
+    result.plot(sys.argv[1], values="uz", view=(30, 20), size=(6, 5))

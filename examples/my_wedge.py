@@ -3,8 +3,11 @@
 Check it with ``kratos-lite check examples/my_wedge.py``.
 """
 
+import sys
+
 import numpy as np
 
+import kratos_lite as kl
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.quadrature import wedge
 from kratos_lite.shapes import Shape
@@ -40,3 +43,7 @@ class MyWedge3D6N(KinematicLinear):
 
     shape = MyWedge
     rule = wedge(degree=2)
+
+
+if __name__ == "__main__" and len(sys.argv) > 1:
+    kl.plot(MyWedge3D6N, sys.argv[1])

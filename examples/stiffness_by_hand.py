@@ -4,8 +4,11 @@
 # The class that solves a million elements is the class studied here: one element, X (8, 3).
 
 # %%
+import sys
+
 import numpy as np
 
+import kratos_lite as kl
 from kratos_lite import Isotropic3D, KinematicLinear3D8N
 
 X = 0.5 * KinematicLinear3D8N.nodes  # (8, 3) m: a unit cube
@@ -26,3 +29,7 @@ np.testing.assert_allclose(K, element.stiffness(C), rtol=1e-12, atol=1e-12 * K.m
 eigenvalues = np.linalg.eigvalsh(K)
 print(f"largest entry of K: {K.max():.6e} N/m")
 print(f"rigid motions: {(eigenvalues < 1e-9 * eigenvalues[-1]).sum()}")
+
+# %%
+if len(sys.argv) > 1:
+    kl.plot(KinematicLinear3D8N, sys.argv[1])

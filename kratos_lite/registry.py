@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -13,7 +15,7 @@ from kratos_lite.errors import InputError, nearest
 T = TypeVar("T")
 P = ParamSpec("P")
 R = TypeVar("R")
-FEW = 12
+FEW = 24
 """Names that are all listed where none is near to an unknown one."""
 
 
@@ -45,11 +47,29 @@ class Registry(Generic[T]):
         self._aliases.update(dict.fromkeys(aliases, name))
 
     def add(self, name: str, item: T, aliases: Iterable[str] = ()) -> None:
-        """Register `item`; a later one of the same name replaces it (a script may be run twice)."""
-        if name in self._expected and item.__module__ != self._expected[name]:
-            self._import(name)  # so that it is not the later one
+        """Register `item`; one of the same name and file is replaced, as a script or a cell may be run twice.
+
+        Raises
+        ------
+        InputError
+            There is one of this name or alias from another file.
+        """
+        aliases = list(aliases)
+        for word in (name, *aliases):
+            self._refuse_taken(word, item)
         self._items[name] = item
         self._aliases.update(dict.fromkeys(aliases, name))
+
+    def _refuse_taken(self, word: str, item: T) -> None:
+        """Raise InputError if a word means an item from another file."""
+        name = word if self._has(word) else self._aliases.get(word, word)
+        if self._expected.get(name, item.__module__) != item.__module__:
+            self._import(name)
+        if name in self._items and (first := _home(self._items[name])) != (second := _home(item)):
+            raise InputError(
+                f"there are two classes of the {self.kind} {word}: one in {first}, one in {second}; give one "
+                "another name"
+            )
 
     def _import(self, *names: str) -> None:
         """Import the modules of items that are expected."""
@@ -61,8 +81,9 @@ class Registry(Generic[T]):
         if name not in self:
             known = [*self, *self._aliases]
             hint = nearest(name, known) if isinstance(name, str) else ""
-            if not hint and 0 < len(known) <= FEW:
-                hint = f" There are {', '.join(known)}"
+            shown = known if len(known) <= FEW else list(self)
+            if not hint and 0 < len(shown) <= FEW:
+                hint = f" There are {', '.join(shown)}"
             raise InputError(f"unknown {self.kind} {name!r}.{hint}")
         key = name if self._has(name) else self._aliases[name]
         self._import(key)
@@ -104,3 +125,10 @@ class Registry(Generic[T]):
             yield
         finally:
             self._items, self._aliases = items, aliases
+
+
+def _home(item: object) -> str:
+    """Return the file that an item comes from, or the module of one that is not from a file."""
+    module = getattr(item, "__module__", "")
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return os.path.realpath(file) if file else f"the session ({module})"

@@ -71,11 +71,40 @@ def test_own_items_stand_among_the_values_whatever_they_are_called(colors):
     assert colors.values("ue")[-1] is own
 
 
-def test_an_own_item_replaces_an_expected_one_even_if_its_module_comes_later(colors):
-    own = type("Red", (), {})
-    colors.add("Red", own)
-    __import__("module_of_Red")
-    assert colors["Red"] is own
+def test_two_classes_of_one_name_are_an_error_that_names_both_files(colors):
+    match = r"two classes of the color Red: one in .*module_of_Red\.py, one in .*test_registry\.py"
+    with pytest.raises(InputError, match=match):
+        colors.add("Red", type("Red", (), {}))
+    assert colors["Red"].__module__ == "module_of_Red"
+
+
+@pytest.mark.parametrize(("name", "aliases"), [("azure", ()), ("Own", ["bleu"]), ("Own", ["Blue"])])
+def test_names_and_aliases_of_others_are_taken(colors, name, aliases):
+    assert colors["Blue"]
+    word = aliases[0] if aliases else name
+    with pytest.raises(InputError, match=f"two classes of the color {word}: one in .*module_of_Blue"):
+        colors.add(name, type(name, (), {}), aliases)
+    assert colors[word].__name__ == "Blue"
+
+
+def test_a_class_of_a_script_or_a_cell_that_is_run_twice_is_replaced(colors):
+    for module in (__name__, "no_module"):
+        first, second = (type("Own", (), {"__module__": module}) for _ in range(2))
+        with colors.temporary():
+            colors.add("Own", first)
+            colors.add("Own", second)
+            assert colors["Own"] is second
+
+
+def test_a_class_of_a_cell_and_one_of_a_file_are_two(colors):
+    colors.add("Own", type("Own", (), {}))
+    with pytest.raises(InputError, match=r"one in .*test_registry\.py, one in the session \(no_module\)"):
+        colors.add("Own", type("Own", (), {"__module__": "no_module"}))
+
+
+def test_a_few_names_are_all_listed_where_none_is_near(colors):
+    with pytest.raises(InputError, match=r"unknown color 'xyz'\. There are Red, Blue"):
+        colors["xyz"]
 
 
 def test_what_was_imported_in_between_is_not_forgotten_with_temporary_items(colors):

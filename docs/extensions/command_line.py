@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -71,4 +72,5 @@ def _words(action: argparse.Action) -> str:
 
 def _text(action: argparse.Action) -> str:
     """Return the help of an option, as one cell of a table."""
-    return (action.help or "").replace("%%", "%").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+    text = (action.help or "").replace("%%", "%").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+    return re.sub(r"(?<![\w-])(--\w[\w-]*)", r"`\1`", text)

@@ -8,7 +8,7 @@ from typing import Any
 from sphinx.util.docutils import SphinxDirective
 
 from kratos_lite.bodies import BODIES
-from kratos_lite.io.formats.mdpa.scan import INSIDE, LISTS, TOP
+from kratos_lite.io.formats.mdpa.scan import LISTS, TOP
 from kratos_lite.io.kratos import (
     expected_values,
     expressions,
@@ -46,12 +46,6 @@ def _table(*rows: tuple[str, ...], head: str) -> list[str]:
     return [head, "| --- " * len(rows[0]) + "|", *("| " + " | ".join(row) + " |" for row in rows)]
 
 
-def _blocks() -> list[str]:
-    inside = {name: [word for word in INSIDE[name] if word != name] for name in INSIDE}
-    rows = [(f"`{name}`", _code(inside.get(name, []))) for name in TOP]
-    return _table(*rows, head="| block | may hold |")
-
-
 def _of_registry(registry: Any, head: str) -> list[str]:
     rows = [(f"`{name}`", _code(registry.aliases(name))) for name in registry]
     return _table(*rows, head=f"| {head} | also called |")
@@ -75,7 +69,7 @@ def _of_body(kinds: Any) -> list[str]:
 
 
 TABLES: dict[str, Callable[[], list[str]]] = {
-    "blocks": _blocks,
+    "blocks": lambda: [_code(TOP)],
     "lists": lambda: [_code(LISTS)],
     "laws": lambda: _of_registry(MATERIALS, "law"),
     "bodies": lambda: _of_registry(BODIES, "body"),

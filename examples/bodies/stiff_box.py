@@ -7,19 +7,27 @@
 
 # %%
 import logging
+import sys
 
 import numpy as np
 
 import kratos_lite as kl
 
 logging.getLogger("kratos_lite").setLevel(logging.ERROR)  # DEF_LIM would warn
-shape = kl.MassProperties.box((0.4, 0.6, 1.0), density=1000.0)
+mesh = kl.box((0.4, 0.6, 1.0))
 steel = kl.Isotropic3D(E=2e11, nu=0.3, density=1000.0)
 
 for integrator in ("DEF_LIM", "ENERGY_MOMENTUM"):
-    box = kl.PseudoRigidBody(material=steel, mass_properties=shape, integrator=integrator)
+    box = kl.PseudoRigidBody(mesh, steel, integrator=integrator)
     box.set_velocity(angular=(0.05, 10.0, 0.05))
     energy, momentum = box.energy(), box.angular_momentum()
-    drift = [abs(box.energy() / energy - 1) for _ in kl.integrate(box, dt=1e-3, steps=500)]
+    states, drift = [], []
+    for state in kl.integrate(box, dt=1e-3, steps=500):
+        states.append(state)
+        drift.append(abs(box.energy() / energy - 1))
     turn = np.linalg.norm(box.angular_momentum() - momentum) / np.linalg.norm(momentum)
     print(f"{integrator}: energy drift {max(drift):.1e}, angular momentum drift {turn:.1e}")
+
+# %%
+if len(sys.argv) > 1:
+    kl.plot(box, sys.argv[1], states=states[:300], title="energy_momentum", size=(6, 6))

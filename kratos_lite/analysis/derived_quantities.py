@@ -131,10 +131,7 @@ def result_of(
         force_error=None,
         moment_error=None,
         seconds={},
-        warnings=[
-            *e.warnings,
-            *check_deformation(model.mesh, at.u, model.supports.values, model.initial_displacement),
-        ],
+        warnings=[*e.warnings, *check_deformation(model, e.groups, at.u)],
         notes=model.remarks(),
         formulation=model.chosen(e.groups),
     )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.checks import young_moduli
+from kratos_lite.model.structure import Structure
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array, Ints
 
@@ -16,20 +20,18 @@ STRAINED = 0.05
 """Strain from which it is not small."""
 SAMPLE = 500
 """Elements whose strain is looked at, spread over the mesh."""
+UNITLESS = 10.0
+"""Young's modulus in Pa below all materials, gels included, so that models with it are without units."""
 GOLDEN = (5**0.5 - 1) / 2
 UNITS = "is E in Pa (steel: 210e9), are lengths in m, forces in N and pressures in Pa?"
 
 
-def check_deformation(mesh: Mesh, u: Array, prescribed: Array, start: Array | None = None) -> list[str]:
-    """Warn of displacements or strains that are too large for linear theory.
+def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array) -> list[str]:
+    """Warn of displacements u (n, 3) in m, or their strains, that are too large for linear theory.
 
-    Parameters
-    ----------
-    mesh : points and elements.
-    u : (n, 3) m.
-    prescribed : (n, 3) m, displacements of supports; large ones are meant.
-    start : (n, 3) m, displacement without stress, or None.
+    Those of a model without units, softer than everything there is, are whatever they are.
     """
+    mesh, start, prescribed = model.mesh, model.initial_displacement, model.supports.values
     moved = u if start is None else u - start
     if not moved.any():
         return []
@@ -44,7 +46,7 @@ def check_deformation(mesh: Mesh, u: Array, prescribed: Array, start: Array | No
         found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
     if strain > STRAINED:
         found.append(f"strains reach at least {strain:.0%}")
-    if not found:
+    if not found or all(young_moduli(group.material)[1] < UNITLESS for group in groups):
         return []
     meant = prescribed.any() and _diagonal(prescribed) > 0.5 * largest
     limits = f"linear theory holds up to about {LARGE:.0%} of the size and strains of {STRAINED:.0%}"

@@ -255,7 +255,7 @@ class StaticAnalysis:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
-            warnings += check_deformation(model.mesh, u, model.supports.values, model.initial_displacement)
+            warnings += check_deformation(model, self.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = _Origin(self, case.loads, model.version)

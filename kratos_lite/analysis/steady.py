@@ -47,8 +47,7 @@ def solve_steady(
         solution = equations.solve(forces, tolerance, progress)
     with phase("verify"):
         u = solution.x
-        moved, rest = e.system.scatter(u), model.initial_displacement
-        warnings += check_deformation(model.mesh, moved, model.supports.values, rest)
+        warnings += check_deformation(model, e.groups, e.system.scatter(u))
         left = e.system.scatter(A @ u - forces)
         reactions = model.supports.supported(left)
         inner = e.system.scatter(e.times_stiffness(u, 0.0) - e.K @ u)  # what the motion adds is a force, too

@@ -220,7 +220,7 @@ def _phase(
     size = np.linalg.norm(shapes, axis=2).max(axis=1)
     subjects = []
     for shape, largest, title in zip(u, size, titles, strict=True):
-        values = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
+        values: Values | None = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
         if given["values"] is not None:
             values = _values(None, mesh, shape / (largest or 1.0), given)
         subjects.append(Subject(mesh, shape, values, title))

@@ -108,10 +108,10 @@ def _take_modes(case: Case, options: Namespace) -> None:
     """Ask a case for natural frequencies, whatever its file says of time and outputs."""
     if options.time is not None:
         raise InputError("--modes and --time: give one of them")
-    if options.output or options.json or options.picture or options.state:
-        raise InputError("--modes prints a table; it writes no files")
+    refuse(options, ("json", "state"), "does not hold modes; -o OUT.pvd or OUT.html does")
     refuse(options, ("error",), "is for statics; modes are those of the mesh as it is")
-    case.modes, case.time, case.outputs = whole_number(options.modes, "--modes"), None, Outputs()
+    case.modes, case.time = whole_number(options.modes, "--modes"), None
+    case.outputs = Outputs(options.output, picture=options.picture, mode=options.vtu)
 
 
 def _set_outputs(outputs: Outputs, options: Namespace) -> None:

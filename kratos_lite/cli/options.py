@@ -24,7 +24,7 @@ EXAMPLES = {
     "solve": """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve examples/cantilever --json result.json
   kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
-  kratos-lite solve bridge.mdpa --modes 10
+  kratos-lite solve bridge.mdpa --modes 10 -o modes.pvd --picture modes.png
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
   kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
   kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
@@ -41,6 +41,10 @@ EXAMPLES = {
 INTEGRATORS = (
     "newmark, newmark:BETA,GAMMA, hht[:ALPHA], bossak[:ALPHA], generalized_alpha[:RHO] or "
     "central_difference (newmark, the trapezoidal rule)"
+)
+MODES = (
+    "find the N lowest natural frequencies instead; their modes go to -o OUT.pvd or OUT.html, the first of "
+    "them to --picture"
 )
 RESTART = (
     "go on from a state that --state wrote; series and picture then hold the rest of the run only, and "
@@ -110,7 +114,7 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_motion(command)
     _add_time(command)
     how = command.add_argument_group("solver")
-    how.add_argument("--modes", type=int, metavar="N", help="print the N lowest natural frequencies instead")
+    how.add_argument("--modes", type=int, metavar="N", help=MODES)
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
     how.add_argument(
         "--error",
@@ -153,12 +157,16 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes); in time: .pvd "
-        "for ParaView, .html, .csv or .npz; may be given several times",
+        "for ParaView, .html, .csv or .npz; of modes: .pvd or .html; may be given several times",
     )
     _add_options(
         out,
         ("--json", "OUT.json", "summary, displacements and reactions by node id"),
-        ("--picture", "OUT.png", "picture of the deformed model, or of a body along its path"),
+        (
+            "--picture",
+            "OUT.png",
+            "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film",
+        ),
         ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
     )
     out.add_argument(

@@ -10,7 +10,8 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
-from kratos_lite.io.writers.endings import check_ending, check_result, check_series
+from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
+from kratos_lite.io.writers.pictures import check_picture, write_picture
 from kratos_lite.io.writers.results import write_result
 
 
@@ -23,21 +24,22 @@ def check_outputs(case: Case) -> None:
     read = [*case.files, *([Path(restart)] if restart else [])]
     check_targets(read, outputs.paths(), new_folders=case.time is not None)
     for path in outputs.results:
-        if case.time is None:
+        if case.modes:
+            check_modes(path)
+        elif case.time is None:
             check_result(path, outputs.mode)
         else:
             check_series(path)
+    of_many = bool(case.time or case.modes)
     if outputs.mode and not outputs.results:
-        kind = "OUT.vtu" if case.time is None else "OUT.pvd"
+        kind = "OUT.pvd" if of_many else "OUT.vtu"
         raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o {kind}")
-    if outputs.mode and case.time and not any(ending(path) == ".pvd" for path in outputs.results):
+    if outputs.mode and of_many and not any(ending(path) == ".pvd" for path in outputs.results):
         raise InputError(f"--vtu {outputs.mode}: there is no output to write so; add -o OUT.pvd")
     for single, wanted in ((outputs.json, ".json"), (outputs.state, ".npz")):
         if single is not None:
             check_ending(single, wanted)
     if outputs.picture is not None:
-        from kratos_lite.view.canvas import check_picture  # rarely needed
-
         check_picture(outputs.picture)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
@@ -52,7 +54,7 @@ def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
     for path in outputs.results:
         write_result(path, result, outputs.mode)
     if outputs.picture is not None:
-        result.plot(outputs.picture)
+        write_picture(outputs.picture, result)
 
 
 def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: bool = False) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import is_unnamed
+from kratos_lite.elements.kinematic_linear import UNNAMED
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import SIDES, Mesh, Part
 from kratos_lite.mesh.centers import raise_order
@@ -75,10 +76,21 @@ def _check_size(counts: Sequence[int], shape: type[Shape]) -> None:
     fits_memory(60.0 * cells * len(shape.nodes), what, "take fewer cells")
 
 
+def _full_name(element: str) -> str:
+    """Return the name that a number of nodes means.
+
+    >>> _full_name("20N"), _full_name("3D20N"), _full_name("BBar3D8N")
+    ('Element3D20N', 'Element3D20N', 'BBar3D8N')
+    """
+    nodes = element.upper().removeprefix("3D")
+    return f"{UNNAMED}{nodes[:-1]}N" if nodes[-1:] == "N" and nodes[:-1].isdigit() else element
+
+
 def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:
     """Return points and cells of the unit cube."""
     if not isinstance(element, str):
         raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
+    element = _full_name(element)
     kind = ELEMENTS[element]
     shape = kind.shape
     if shape.cell not in SPLITS:
@@ -109,7 +121,8 @@ def box(
     ----------
     size : edge lengths in m, > 0.
     cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
-    element : name of the element; ``Element3D8N`` and its kin are computed by one that does not lock.
+    element : name of the element, or its number of nodes, ``"20N"``, which means ``Element3D20N``: it and its
+        kin are computed by one that does not lock.
     origin : the corner with the smallest coordinates, m.
 
     Returns

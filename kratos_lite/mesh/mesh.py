@@ -175,13 +175,13 @@ class Mesh(Cells, Tabular):
 
         Parameters
         ----------
-        name : of the new part; a part of that name is replaced.
+        name : of the new part.  A part does not change, as supports and loads may rely on it.
         where : part name, point (x, y, z) in m, predicate on the points (n, 3), mask (n,) or rows.
 
         Raises
         ------
         MeshError
-            If no node is chosen.
+            If no node is chosen, or there is a part of this name with other nodes.
 
         Examples
         --------
@@ -195,6 +195,13 @@ class Mesh(Cells, Tabular):
         rows = self.nodes(where)
         if not len(rows):
             raise MeshError(f"no node is chosen for part {name!r}")
+        if name in self._parts:
+            if set(self._parts[name].nodes.tolist()) != set(rows.tolist()):
+                raise MeshError(
+                    f"there is a part {name!r} with other nodes already, on which supports and loads may "
+                    "rely; take another name, or make the mesh anew"
+                )
+            return
         self._parts[name] = Part(nodes=rows)
 
     def nodes(self, where: Where) -> Ints:

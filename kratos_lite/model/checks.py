@@ -195,7 +195,7 @@ def check_wave_speeds(materials: Iterable[LinearMaterial]) -> list[str]:
     for material in materials:
         if not material.density > 0:
             continue
-        E = _moduli(material)[1]
+        E = young_moduli(material)[1]
         speed = float(np.sqrt(E) / np.sqrt(material.density))  # E/ρ may be too large
         if not SLOWEST <= speed <= QUICKEST:
             warnings.append(
@@ -209,7 +209,7 @@ def unusual_constants(materials: Iterable[LinearMaterial]) -> list[str]:
     """Return notes of constants far from those of all engineering materials, so that units may be wrong."""
     notes = []
     for material in materials:
-        (low, high), density = _moduli(material), material.density
+        (low, high), density = young_moduli(material), material.density
         soft = high < SOFTEST * (1 - 1e-9)
         if soft or low > STIFFEST:
             notes.append(
@@ -229,7 +229,7 @@ def unusual_constants(materials: Iterable[LinearMaterial]) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def _moduli(material: LinearMaterial) -> tuple[float, float]:
+def young_moduli(material: LinearMaterial) -> tuple[float, float]:
     """Return the smallest and the largest of Young's moduli along the axes, in Pa."""
     flexible = np.linalg.inv(material.C).diagonal()[:3]
     return 1 / float(flexible.max()), 1 / float(flexible.min())

@@ -57,23 +57,25 @@ class Fixing:
     where : nodes by part name or predicate, or None where rows were given.
     rows : the nodes.
     axes : such as ``"xz"``.
-    value : m; as given, or a function of time; None where it was released.
+    value : m; as given, or a function of time.
     field : function of places, or None.
     override : whether it won over earlier ones.
     name : of the support, or None.
+    released : whether the nodes were released along the axes instead.
     """
 
     where: Selected
     rows: Ints
     axes: str
-    value: ArrayLike | Callable[[float], float] | None
+    value: ArrayLike | Callable[[float], float]
     field: Callable[[Array], ArrayLike] | None
     override: bool
     name: str | None = None
+    released: bool = False
 
     def __str__(self) -> str:
         where = self.where if isinstance(self.where, str) else f"{len(self.rows)} nodes"
-        if self.value is None:
+        if self.released:
             return f"{where}: {self.axes} released"
         value = "by a field" if self.field is not None else "as a function of time"
         if not callable(self.value) and self.field is None:

@@ -99,7 +99,7 @@ def _refixed(fixing: Fixing, finer: Finer) -> Fixing:
     mesh, old = finer.mesh, finer.coarse.n_nodes
     rows = mesh.nodes(finer.grown(fixing.rows) if fixing.where is None else fixing.where)
     value = fixing.value
-    if value is None or fixing.field is not None or callable(value) or np.ndim(value) < 2:
+    if fixing.field is not None or callable(value) or np.ndim(value) < 2:
         return replace(fixing, rows=rows, override=True)
     nodal = np.full((old, np.shape(value)[1]), np.nan)
     nodal[fixing.rows] = value

@@ -73,7 +73,7 @@ class Supports:
             As by `fix` and `prescribe_motion`.
         """
         rows, value = fixing.rows, fixing.value
-        if value is None:
+        if fixing.released:
             self._free(rows, fixing.axes)
             self.fixings.append(fixing)
             return
@@ -114,7 +114,7 @@ class Supports:
         """Release nodes along axes, whatever has prescribed them; ModelError if nothing has."""
         if not self.fixed[np.ix_(rows, np.array(axis_numbers(axes)))].any():
             raise ModelError(f"nothing is prescribed along {axes} there, so that nothing is released")
-        self.apply(Fixing(where, rows, axes, None, None, True))
+        self.apply(Fixing(where, rows, axes, 0.0, None, True, released=True))
 
     def _free(self, rows: Ints, axes: str) -> None:
         numbers = axis_numbers(axes)

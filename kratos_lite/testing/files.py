@@ -57,12 +57,11 @@ def run_file(path: str | Path) -> list[tuple[str, list[Finding]]]:
         for registry in REGISTRIES:
             stack.enter_context(registry.temporary())
         stack.enter_context(beside(Path(path)))
-        library = _registered()
         defined = vars(run_module(Path(path)))
         kinds = [v for v in list(defined.values()) if isinstance(v, type) and v.__module__ == MODULE]
         found = _check_all(defined, kinds)
         for kind in kinds:
-            extra = _forgotten(kind) + _replaced(kind, library, Path(path))
+            extra = _forgotten(kind)
             same = [f for name, f in found if name == kind.__name__ or name.endswith(f" ({kind.__name__})")]
             if same:
                 same[0].extend(extra)
@@ -135,27 +134,6 @@ def run_module(path: Path) -> ModuleType:
 
 
 # ---- mistakes that Python lets pass ------------------------------------------------------------------
-
-
-def _registered() -> dict[tuple[str, str], Any]:
-    """Return what stands in the registries: (kind, name or alias) to class."""
-    return {
-        (registry.kind, name): registry[name]
-        for registry in REGISTRIES
-        for own in registry
-        for name in (own, *registry.aliases(own))
-    }
-
-
-def _replaced(kind: type, library: dict[tuple[str, str], Any], path: Path) -> list[Finding]:
-    """Return a finding if a class took names of the library; its own file may define it."""
-    now = _registered()
-    lost = {name: old for (of, name), old in library.items() if now[of, name] is kind is not old}
-    homes = {Path(sys.modules[old.__module__].__file__ or "").resolve() for old in lost.values()}
-    if not lost or homes == {path.resolve()}:
-        return []
-    text = f"the library has {', '.join(lost)} already; importing this file would replace it: "
-    return [Finding("name", False, inf, 0, text + "choose another name")]
 
 
 def _forgotten(kind: type) -> list[Finding]:

@@ -103,6 +103,15 @@ def test_displacement_counts_from_the_state_without_stress():
     assert not told(model.solve().report.warnings)
 
 
+def test_models_without_units_are_not_asked_for_them():
+    model = kl.Model(kl.box(), kl.Isotropic3D(1.0, 0.3))
+    model.fix("z-")
+    model.add(kl.Traction("z+", (0, 0, 1.0)))
+    result = model.solve()
+    assert np.abs(result.u).max() > 0.5
+    assert not told(result.report.warnings)
+
+
 def test_transients_are_warned_of_and_modes_are_not():
     model = cantilever(210e3)
     transient = model.transient()

@@ -366,6 +366,51 @@ def test_wrong_options_are_explained(run, folder, words, fragments):
     assert [path.name for path in folder.iterdir()] == ["tower.mdpa"]
 
 
+def test_modes_are_written_as_a_series_and_a_picture(run, folder):
+    meshio = pytest.importorskip("meshio")
+    more = ("--modes", "3", "-o", "a.pvd", "--picture", "a.png", "--vtu", "ascii")
+    told = run("solve", "tower.mdpa", *WORDS, *more)
+    assert (told.code, told.err) == (0, "")
+    assert told.rows["written"] == "a.png"  # the last of its lines
+    assert (folder / "a.png").read_bytes()[:4] == b"\x89PNG"
+    index = (folder / "a.pvd").read_text()
+    assert re.findall(r'timestep="(\S+)" part="0" file="(\S+)"', index) == [
+        (f"{i}.0", f"a_0000{i}.vtu") for i in (1, 2, 3)
+    ]
+    _, shapes = tower().modes(3)
+    for i, shape in enumerate(shapes, 1):
+        data = meshio.read(f"a_0000{i}.vtu").point_data["DISPLACEMENT"]
+        expected = shape / np.linalg.norm(shape, axis=1).max()
+        sign = np.sign((data * expected).sum())  # an eigenvector has none
+        assert np.abs(data - sign * expected).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "a.vtu"), "a.vtu: modes are written as .pvd (for ParaView) or .html"),
+        (("--json", "a.json"), "--json does not hold modes; -o OUT.pvd or OUT.html does"),
+        (("--vtu", "ascii"), "--vtu ascii: there is no output to write so; add -o OUT.pvd"),
+        (("--picture", "a.xyz"), "a.xyz: pictures cannot be written as .xyz"),
+    ],
+)
+def test_files_that_hold_no_modes_are_refused_before_the_search(run, folder, words, said):
+    assert run("solve", "tower.mdpa", *WORDS, "--modes", "2", *words).refuses(said)
+
+
+def test_complex_modes_are_written_with_both_parts(run, folder):
+    meshio = pytest.importorskip("meshio")
+    kl.write("bar.mdpa", kl.box((4, 1, 1), (4, 1, 1)))
+    motion = ("--translation", "x:10", "--boundaries", "fixed", "--material", "E=1e6,nu=0,density=1000")
+    more = ("--fix", "z-:xyz", "--modes", "2", "-o", "a.pvd", "--picture", "a.png")
+    told = run("solve", "bar.mdpa", *motion, *more)
+    assert (told.code, told.err) == (0, "")
+    data = meshio.read("a_00002.vtu").point_data
+    both = data["DISPLACEMENT"] + 1j * data["DISPLACEMENT_IMAGINARY"]
+    assert np.linalg.norm(both, axis=1).max() == pytest.approx(1.0)
+    assert np.abs(both.imag).max() > 1e-3
+
+
 def test_modes_of_a_file_in_time_are_those_of_its_model(run, folder):
     write()
     told = run("solve", "run.json", "--modes", "2")

@@ -102,6 +102,43 @@ def test_parts_are_given_by_places_and_written_by_their_names(tmp_path):
         mesh.part(3)
 
 
+def test_a_part_stays_what_it_is():
+    mesh = kl.box(cells=(2, 1, 1))
+    mesh.add_part("tip", "x+")
+    mesh.add_part("tip", lambda X: X[:, 0] > 0.9)  # the same again, as a cell that is run twice
+    with pytest.raises(kl.MeshError, match="there is a part 'tip' with other nodes already"):
+        mesh.add_part("tip", "x-")
+    assert mesh.nodes("tip").tolist() == mesh.nodes("x+").tolist()
+
+
+@pytest.mark.parametrize(
+    ("cells", "name"),
+    [
+        ([[0, 1, 2, 3]], "KinematicLinear3D4N"),
+        (np.arange(8)[None], "KinematicLinear3D8N"),
+        ([0, 1, 2, 3, 4, 5], "KinematicLinear3D6N"),
+        ([[0, 1, 2, 3], [1, 2]], "KinematicLinear3D8N"),
+        (3, "KinematicLinear3D8N"),
+    ],
+)
+def test_rows_of_nodes_without_a_name_are_refused_with_the_call_that_is_meant(cells, name):
+    with pytest.raises(kl.MeshError, match=rf"kl\.Mesh\(points, \{{'{name}': nodes\}}\)"):
+        kl.Mesh(kl.box().points, cells)
+
+
+@pytest.mark.parametrize("word", ["20N", "3D20N", "3d20n"])
+def test_a_number_of_nodes_names_the_element_that_does_not_lock(word):
+    for mesh in (kl.box(element=word), kl.annulus(1, 2, 1, element=word)):
+        assert [block.name for block in mesh.blocks] == ["Element3D20N"]
+
+
+def test_unknown_elements_are_answered_with_all_names_or_the_nearest():
+    with pytest.raises(kl.InputError, match=r"unknown element 'Hex8'\. There are .*KinematicLinear3D8N, "):
+        kl.box(element="Hex8")
+    with pytest.raises(kl.InputError, match="Did you mean Element3D8N"):
+        kl.box(element="9N")
+
+
 DUPLICATES = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,

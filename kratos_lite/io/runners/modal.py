@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
+
+import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.io.writers.modes import names_of_modes, write_modes
+from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.typing import Progress
+
+DRAWN = 6
+"""Modes in a picture."""
 
 
 def check(case: Case) -> list[str]:
@@ -16,19 +24,33 @@ def check(case: Case) -> list[str]:
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
-    """Find the lowest natural frequencies; with a motion of the material the eigenvalues λ.
+    """Find the lowest natural frequencies and write their modes; with a motion the eigenvalues λ.
 
     Frequency is Im λ, of conjugate pairs once, and growth Re λ, which is not positive where motion is stable.
     """
     model, count = case.model, case.modes
     head = f"{'mode':>4}  {'frequency Hz':>14}  {'rad/s':>14}"
     if model.motion is None:
-        omega = model.modes(count, progress=progress)[0].tolist()
-        rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(omega, 1)]
-        return Outcome(case, [], lines=[head, *rows])
-    values = [z for z in model.complex_modes(2 * count, progress=progress)[0].tolist() if z.imag >= 0][:count]
-    rows = [
-        f"{i:>4}  {z.imag / (2 * pi):>14.8g}  {z.imag:>14.8g}  {z.real:>14.3g}"
-        for i, z in enumerate(values, 1)
-    ]
-    return Outcome(case, [], lines=[f"{head}  {'growth 1/s':>14}", *rows])
+        values, shapes = model.modes(count, progress=progress)
+        rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(values.tolist(), 1)]
+    else:
+        head += f"  {'growth 1/s':>14}"
+        pairs, both = model.complex_modes(2 * count, progress=progress)
+        chosen = np.flatnonzero(pairs.imag >= 0)[:count]
+        values, shapes = pairs[chosen], both[chosen]
+        rows = [
+            f"{i:>4}  {z.imag / (2 * pi):>14.8g}  {z.imag:>14.8g}  {z.real:>14.3g}"
+            for i, z in enumerate(values.tolist(), 1)
+        ]
+    _write(case, values, shapes)
+    return Outcome(case, [], lines=[head, *rows])
+
+
+def _write(case: Case, values: Any, shapes: Any) -> None:
+    """Write the modes and their picture, which shows the first ones side by side."""
+    outputs, mesh = case.outputs, case.model.mesh
+    for path in outputs.results:
+        write_modes(path, mesh, values, shapes, mode=outputs.mode or "binary")
+    if outputs.picture is not None:
+        names = names_of_modes(values[:DRAWN].tolist())
+        write_picture(outputs.picture, case.model, modes=shapes[:DRAWN], titles=names)

@@ -11,6 +11,9 @@ RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv")
 SERIES = (".pvd", ".html", ".csv", ".npz")
 """Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
 
+MODES = (".pvd", ".html")
+"""Formats of modes: for ParaView, a page for the browser that lets them swing."""
+
 
 def check_result(path: str | Path, mode: str | None = None) -> None:
     """Raise InputError for a format that cannot hold a result, or that has no such mode of .vtu files."""
@@ -39,6 +42,14 @@ def check_series(path: str | Path) -> None:
     ending = Path(path).suffix.lower()
     if ending not in SERIES:
         raise InputError(f"{path}: states in time are written as .pvd (for ParaView), .html, .csv or .npz")
+    _check_page(ending)
+
+
+def check_modes(path: str | Path) -> None:
+    """Raise InputError for a format that cannot hold modes."""
+    ending = Path(path).suffix.lower()
+    if ending not in MODES:
+        raise InputError(f"{path}: modes are written as .pvd (for ParaView) or .html")
     _check_page(ending)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 from pathlib import Path
 
@@ -9,26 +10,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import InputError
-from kratos_lite.io.writers.endings import check_ending
+from kratos_lite.io.formats.vtu import write_pvd, write_vtu
+from kratos_lite.io.writers.endings import check_modes
 from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array, Complexes
 from kratos_lite.validation import instance, path_of
 
 
-def write_modes(path: str | Path, mesh: Mesh, values: ArrayLike, shapes: ArrayLike) -> None:
-    """Write modes as a page for the browser, which lets them swing.
+def write_modes(
+    path: str | Path, mesh: Mesh, values: ArrayLike, shapes: ArrayLike, *, mode: str = "binary"
+) -> None:
+    """Write modes as a page for the browser, which lets them swing, or as a series for ParaView.
 
     Parameters
     ----------
-    path : the file, .html.
+    path : the file, .html; or .pvd, an index, and beside it ``NAME_00001.vtu`` … of each mode with
+        DISPLACEMENT, of a complex mode also DISPLACEMENT_IMAGINARY.
     mesh : of n nodes.
     values : (k,) frequencies ω in rad/s as of ``model.modes``, or complex λ in 1/s as of
         ``model.complex_modes``.
     shapes : (k, n, 3) of any size, real or complex; each is shown with the largest displacement 1.
+    mode : of ``.vtu`` files: ``binary``, ``compressed`` or ``ascii``.
 
     Raises
     ------
     InputError
-        Another ending, arrays of other shapes or not finite, or the file cannot be written.
+        Another ending or mode, arrays of other shapes or not finite, or the file cannot be written.
     KratosLiteError
         three.js is missing, which a page needs.
 
@@ -37,10 +44,10 @@ def write_modes(path: str | Path, mesh: Mesh, values: ArrayLike, shapes: ArrayLi
     >>> import kratos_lite as kl
     >>> beam = kl.Model(kl.box((5, 1, 1), (5, 1, 1)), kl.Isotropic3D(E=2e11, nu=0.3, density=7800.0))
     >>> beam.fix("x-")
-    >>> write_modes(getfixture("tmp_path") / "beam.html", beam.mesh, *beam.modes(3))
+    >>> write_modes(getfixture("tmp_path") / "beam.pvd", beam.mesh, *beam.modes(3))
     """
     path = path_of(path)
-    check_ending(path, ".html")
+    check_modes(path)
     instance(mesh, "the mesh of modes", Mesh, "model.mesh")
     found, forms = np.asarray(values), np.asarray(shapes)
     if found.ndim != 1 or forms.shape != (len(found), mesh.n_nodes, 3) or not len(found):
@@ -50,9 +57,35 @@ def write_modes(path: str | Path, mesh: Mesh, values: ArrayLike, shapes: ArrayLi
         )
     if not (np.isfinite(found).all() and np.isfinite(forms).all()):
         raise InputError(f"{path}: not written: modes are not finite everywhere")
+    if path.suffix.lower() == ".pvd":
+        _write_frames(path, mesh, forms, mode)
+        return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
-    write_modes_page(path, mesh, [f"{i}: {_name(value)}" for i, value in enumerate(found.tolist(), 1)], forms)
+    write_modes_page(path, mesh, names_of_modes(found.tolist()), forms)
+
+
+def _write_frames(path: Path, mesh: Mesh, shapes: Array | Complexes, mode: str) -> None:
+    """Write a file for each mode, and their index by the numbers of the modes."""
+    frames = []
+    for i, shape in enumerate(shapes, 1):
+        scaled = shape / (np.linalg.norm(shape, axis=1).max() or 1.0)
+        points = {"DISPLACEMENT": scaled.real, "NODE_ID": mesh.node_ids}
+        if np.iscomplexobj(shape):
+            points["DISPLACEMENT_IMAGINARY"] = scaled.imag
+        name = f"{path.stem}_{i:05d}.vtu"
+        write_vtu(path.with_name(name), mesh, points, {}, mode=mode)
+        frames.append((float(i), name))
+    write_pvd(path, frames)
+
+
+def names_of_modes(values: Sequence[complex]) -> list[str]:
+    """Return the numbers of modes with their frequencies.
+
+    >>> names_of_modes([2 * pi, 4 * pi])
+    ['1: 1 Hz', '2: 2 Hz']
+    """
+    return [f"{i}: {_name(value)}" for i, value in enumerate(values, 1)]
 
 
 def _name(value: complex) -> str:

@@ -31,5 +31,5 @@ def library() -> str:
         return text[start : text.index(THREE[1], start) + len(THREE[1])]
     except (OSError, KeyError, ValueError, BadZipFile) as error:
         raise KratosLiteError(
-            f"{template}: no three.js is found there; pip install 'trimesh>=4.8,<6' brings it"
+            f"{template}: no three.js is found there; pip install 'trimesh>=4.8.3,<6' brings it"
         ) from error
