@@ -3,7 +3,6 @@
 It works offline: fonts, search and formulas are in the site itself.
 """
 
-import logging
 import os
 import sys
 from importlib.metadata import files
@@ -86,6 +85,3 @@ html_css_files = ["site.css"]
 linkcheck_timeout = 20
 linkcheck_retries = 2
 linkcheck_anchors = False
-
-# folders that wait for their first page
-logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob" not in record.msg)

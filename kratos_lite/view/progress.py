@@ -60,11 +60,12 @@ class Cell:
         """Show a text in place of the last one."""
         from IPython.display import display  # whoever comes here has imported it
 
+        show: Any = display
         data = {"text/plain": text}
         if self._shown is not None:
             self._shown.update(data, raw=True)
         elif text:
-            self._shown = display(data, raw=True, display_id=True)
+            self._shown = show(data, raw=True, display_id=True)
 
 
 class Terminal:
