@@ -156,8 +156,8 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         default=[],
-        help="static: .vtu for ParaView, .html for the browser, .vtk or .json; in time: .pvd for ParaView, "
-        ".html, .csv or .npz; of modes: .pvd or .html; may be given several times",
+        help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes); in time: .pvd "
+        "for ParaView, .html, .csv or .npz; of modes: .pvd or .html; may be given several times",
     )
     _add_options(
         out,
