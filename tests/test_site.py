@@ -1,8 +1,13 @@
 """The documentation site: every public name is there, and the built pages work in a browser and offline."""
 
+import json
 import re
 import shutil
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -38,13 +43,29 @@ def test_every_public_name_is_in_the_reference():
 # ---- in a browser ------------------------------------------------------------------------------------
 
 
+class Handler(SimpleHTTPRequestHandler):
+    """Serves the site without a word."""
+
+    def log_message(self, *words):
+        pass
+
+
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
+def site():
+    if not (SITE / "index.html").exists():
+        pytest.skip("the site is not built: python -m sphinx -W docs build/site")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(SITE)))
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture(scope="module")
+def browser(site, tmp_path_factory):
     webdriver = pytest.importorskip("selenium.webdriver")
     if not (CHROMIUM and DRIVER):
         pytest.skip("Chromium or its driver is not installed")
-    if not (SITE / "index.html").exists():
-        pytest.skip("the site is not built: python -m sphinx -W docs build/site")
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('browser')}"):
@@ -67,13 +88,18 @@ def sound(browser):
     """Assert that nothing failed and nothing was asked of another host."""
     errors = [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
     assert errors == []
-    sent = "".join(entry["message"] for entry in browser.get_log("performance"))
-    assert set(re.findall(r'"url":"(\w+)://[^"]', sent)) <= {"file"}
+    sent = [json.loads(entry["message"])["message"]["params"] for entry in browser.get_log("performance")]
+    own = [
+        part["request"]["url"]
+        for part in sent
+        if "127.0.0.1" in part.get("documentURL", "") and "request" in part
+    ]
+    assert {urlsplit(url).hostname for url in own if url.startswith("http")} == {"127.0.0.1"}
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_pages_load_without_errors_and_from_the_site_alone(browser, page):
-    browser.get((SITE / page).as_uri())
+def test_pages_load_without_errors_and_from_the_site_alone(browser, site, page):
+    browser.get(site + page)
     wait(browser, "document.readyState === 'complete'")
     assert browser.find_element("tag name", "h1").text
     if browser.execute_script("return document.querySelector('.math') !== null"):
@@ -87,8 +113,8 @@ def test_pages_load_without_errors_and_from_the_site_alone(browser, page):
     ("words", "page"),
     [("hourglass", "tutorials/"), ("formulation", "choose-an-element"), ("reaction_resultant", "results")],
 )
-def test_the_search_finds_pages(browser, words, page):
-    browser.get((SITE / "search.html").as_uri() + f"?q={words}")
+def test_the_search_finds_pages(browser, site, words, page):
+    browser.get(f"{site}search.html?q={words}")
     wait(browser, "document.querySelectorAll('#search-results li a').length > 0")
     wait(browser, "/found \\d+|\\d+ page/.test(document.querySelector('#search-results').innerText)")
     links = [
@@ -98,12 +124,12 @@ def test_the_search_finds_pages(browser, words, page):
     sound(browser)
 
 
-def test_a_phone_shows_pages_in_its_width(browser):
+def test_a_phone_shows_pages_in_its_width(browser, site):
     size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
         for page in ("index.html", "reference/models.html", "gallery/index.html"):
-            browser.get((SITE / page).as_uri())
+            browser.get(site + page)
             assert wait(browser, "document.documentElement.scrollWidth") <= 400, page
     finally:
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

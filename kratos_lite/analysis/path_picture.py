@@ -14,8 +14,8 @@ from kratos_lite.bodies import Body, RigidLink
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
 from kratos_lite.validation import short, whole_number
-from kratos_lite.view.figure import Subject
 from kratos_lite.view.marks import Marks
+from kratos_lite.view.scene import Subject
 from kratos_lite.view.trajectory import Path, trajectory_figure
 
 SHOWN = 6

@@ -15,7 +15,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.records import replace
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
-from kratos_lite.view.figure import Options, Subject, Values, factor_of
+from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"
 """What colors a result."""

@@ -13,7 +13,8 @@ from kratos_lite.atomic import replacing
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.typing import Numbers
 from kratos_lite.view import canvas
-from kratos_lite.view.figure import Options, Subject, compose, draw_body, scene_of
+from kratos_lite.view.figure import compose, draw_body
+from kratos_lite.view.scene import Options, Subject, scene_of
 
 ENDINGS = (".gif", ".mp4")
 WHITE = 248
