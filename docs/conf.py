@@ -3,7 +3,7 @@
 It works offline: fonts, search and formulas are in the site itself.
 """
 
-import logging
+import os
 import sys
 from importlib.metadata import files
 from pathlib import Path
@@ -12,6 +12,8 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "extensions")]
 
 import kratos_lite  # noqa: E402
+
+os.environ["KRATOS_LITE_PROGRESS"] = "off"  # pages show what stays, not what passes
 
 project = "kratos_lite"
 author = "The kratos_lite developers"
@@ -42,7 +44,7 @@ myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
-nb_execution_timeout = 60
+nb_execution_timeout = 300
 nb_execution_show_tb = True
 nb_merge_streams = True
 nb_ipywidgets_js = {}
@@ -61,7 +63,9 @@ toc_object_entries_show_parents = "hide"
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kratos_lite"
+html_favicon = "_static/mark.svg"
 html_theme_options = {
+    "logo": {"text": "kratos_lite", "image_light": "_static/mark.svg", "image_dark": "_static/mark.svg"},
     "navbar_align": "left",
     "header_links_before_dropdown": 7,
     "show_toc_level": 2,
@@ -83,6 +87,3 @@ html_css_files = ["site.css"]
 linkcheck_timeout = 20
 linkcheck_retries = 2
 linkcheck_anchors = False
-
-# folders that wait for their first page
-logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob" not in record.msg)

@@ -1,7 +1,10 @@
 """What describes the library in several files is the same in all of them."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,4 +58,18 @@ def test_requirements_are_the_same_everywhere(project):
     bounds = dict(line.split(">=") for line in (*required, *project["optional-dependencies"]["view"]))
     for name, version in bounds.items():
         assert f"{oldest.pop(name)}.".startswith(f"{version}.")
-    assert not oldest
+    assert list(oldest) == ["pyparsing"]  # which matplotlib needs
+
+
+def test_an_unknown_kind_of_build_is_refused():
+    pytest.importorskip("setuptools")
+    run = subprocess.run(
+        [sys.executable, "setup.py", "--version"],
+        cwd=ROOT,
+        env={**os.environ, "KRATOS_LITE_BUILD": "fast"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode
+    assert run.stderr == "KRATOS_LITE_BUILD='fast'; expected compiled or pure, or nothing\n"

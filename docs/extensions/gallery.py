@@ -1,6 +1,6 @@
 """Pages of examples: the directive ``example`` shows a script, its picture and what it prints.
 
-``gallery`` shows thumbnails. The examples that the pages of ``docs/gallery`` name run once, before the pages are read.
+``gallery`` shows thumbnails. What the pages of ``docs/gallery`` name runs once, before the pages are read.
 """
 
 from __future__ import annotations

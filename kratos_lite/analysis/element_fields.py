@@ -46,7 +46,7 @@ class ElementFields:
     def _field(self, at: str, stress: bool) -> Any:
         if not isinstance(at, str):
             raise InputError(
-                f"at says where by a word, one of {', '.join(PLACES)}; values at points are those of "
+                f"at must be one of {', '.join(PLACES)}; values at points are those of "
                 "result.at(points), such as result.at(points).stress"
             )
         place = choice(at, "at", PLACES)

@@ -11,6 +11,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.typing import Array, Complexes, Progress
+from kratos_lite.view.progress import watched
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -92,23 +93,24 @@ class Model(Structure):
         SolveError
             If the accuracy asked for cannot be reached.
         """
-        if error is not None:
-            from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
-
-            most = UNKNOWNS if most_unknowns is None else most_unknowns
-            return solve_to(self, error, solver, tolerance, progress, most, geometry, quantity)
         unused = {"most_unknowns": most_unknowns, "geometry": geometry, "quantity": quantity}
         for name, value in unused.items():
-            if value is not None:
+            if value is not None and error is None:
                 raise InputError(f"{name} belongs to a requested error; give error, such as error=0.01, too")
-        if self.motion is not None:
-            from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
+        with watched(progress) as shown:
+            if error is not None:
+                from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
-            return solve_steady(self, solver, tolerance, progress)
-        analysis = StaticAnalysis(self, solver, tolerance, progress)
-        result = analysis.solve()
-        analysis.release()  # the result keeps the analysis, which would keep the matrix
-        return result
+                most = UNKNOWNS if most_unknowns is None else most_unknowns
+                return solve_to(self, error, solver, tolerance, shown, most, geometry, quantity)
+            if self.motion is not None:
+                from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
+
+                return solve_steady(self, solver, tolerance, shown)
+            analysis = StaticAnalysis(self, solver, tolerance, shown)
+            result = analysis.solve()
+            analysis.release()  # the result keeps the analysis, which would keep the matrix
+            return result
 
     def static(
         self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
@@ -167,10 +169,11 @@ class Model(Structure):
         MeshError, ModelError, InputError, SolveError
             As for `solve`.
         """
-        analysis = StaticAnalysis(self, solver, tolerance, progress)
-        results = analysis.solve_cases(cases)
-        analysis.release()
-        return results
+        with watched(progress) as shown:
+            analysis = StaticAnalysis(self, solver, tolerance, shown)
+            results = analysis.solve_cases(cases)
+            analysis.release()
+            return results
 
     def transient(self, **options: Any) -> TransientAnalysis:
         """Return the transient analysis of the model.
@@ -225,7 +228,8 @@ class Model(Structure):
         """
         from kratos_lite.analysis.modal import natural_modes
 
-        return natural_modes(self, count, lumped, progress)
+        with watched(progress) as shown:
+            return natural_modes(self, count, lumped, shown)
 
     def complex_modes(
         self, count: int = 6, *, progress: Progress | None = None
@@ -251,7 +255,8 @@ class Model(Structure):
         """
         from kratos_lite.analysis.modal import complex_modes
 
-        return complex_modes(self, count, progress)
+        with watched(progress) as shown:
+            return complex_modes(self, count, shown)
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """Draw the body; a notebook shows it, and it is written if a path is given.

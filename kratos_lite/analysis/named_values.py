@@ -10,7 +10,7 @@ from kratos_lite import voigt
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
-from kratos_lite.view.figure import Values
+from kratos_lite.view.scene import Values
 
 SIZES = ("largest", "middle", "smallest")
 NAMES = {

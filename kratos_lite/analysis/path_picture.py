@@ -14,8 +14,8 @@ from kratos_lite.bodies import Body, RigidLink
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.typing import Array
 from kratos_lite.validation import short, whole_number
-from kratos_lite.view.figure import Subject
 from kratos_lite.view.marks import Marks
+from kratos_lite.view.scene import Subject
 from kratos_lite.view.trajectory import Path, trajectory_figure
 
 SHOWN = 6
@@ -80,6 +80,8 @@ def _row(body: Body, state: State) -> Array:
 def moving_subjects(body: Body, states: Any, most: int, title: str | None) -> list[Subject]:
     """Return a body in its states, at most so many, with their times as titles."""
     found = states_of(body, states)
+    if len(found) < 2:
+        raise InputError("nothing moves here: give more than one state of the body")
     assert body.mesh is not None
     X, chosen = body.mesh.points, [found[row] for row in evenly(len(found), most)]
     return [

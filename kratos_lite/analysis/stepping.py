@@ -16,6 +16,7 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.typing import Progress
 from kratos_lite.validation import function_or_none, positive_step, short, takes, whole_number
+from kratos_lite.view.progress import watched
 
 _log = logging.getLogger("kratos_lite")
 SAFETY = 0.95
@@ -135,18 +136,19 @@ def _states(
     progress: Progress | None,
 ) -> Iterator[State]:
     done = 0
-    while count is None or done < count:
-        chunk = every if count is None else min(every, count - done)
-        stepper.advance(h, chunk)
-        done += chunk
-        if stepper.diverged():
-            raise _divergence(stepper, h)
-        if progress and count:
-            progress("integrate", done / count)
-        state = stepper.state()
-        yield state
-        if until and _ends(until(state)):
-            return
+    with watched(progress, "integrate") as shown:
+        while count is None or done < count:
+            chunk = every if count is None else min(every, count - done)
+            stepper.advance(h, chunk)
+            done += chunk
+            if stepper.diverged():
+                raise _divergence(stepper, h)
+            if shown and count:
+                shown("integrate", done / count)
+            state = stepper.state()
+            yield state
+            if until and _ends(until(state)):
+                return
 
 
 def _divergence(stepper: Stepper, h: float) -> SolveError:

@@ -15,7 +15,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.records import replace
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
-from kratos_lite.view.figure import Options, Subject, Values, factor_of
+from kratos_lite.view.scene import Options, Subject, Values, factor_of
 
 DEFAULT = "von_mises"
 """What colors a result."""
@@ -220,7 +220,7 @@ def _phase(
     size = np.linalg.norm(shapes, axis=2).max(axis=1)
     subjects = []
     for shape, largest, title in zip(u, size, titles, strict=True):
-        values = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
+        values: Values | None = Values(np.linalg.norm(shape, axis=1) / (largest or 1.0))
         if given["values"] is not None:
             values = _values(None, mesh, shape / (largest or 1.0), given)
         subjects.append(Subject(mesh, shape, values, title))

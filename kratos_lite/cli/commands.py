@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.cli.progress import TerminalProgress
+from kratos_lite.cli.progress import shown
 from kratos_lite.errors import InputError, ModelError, SolveError
 
 if TYPE_CHECKING:
@@ -63,16 +63,14 @@ def _solve(options: Namespace, clock: float) -> int:
     reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
-    with TerminalProgress(options.progress) as progress:
-        progress("read", 0.0)
+    with shown("read", options.progress) as progress:
         case = case_of(options)
         seconds["read"] = perf_counter() - clock
         outcome = run(case, progress)
     if outcome.result is not None:
         outcome.result.report.seconds = {**seconds, **outcome.result.report.seconds}
     try:  # a file that fails loses no summary, and a terminal that fails loses no file
-        with TerminalProgress(options.progress) as progress:
-            progress("evaluate", 0.0)
+        with shown("evaluate", options.progress):
             summary = [] if options.quiet else outcome.summary(verbose=options.verbose)
         _print(summary)
     except OSError:
@@ -83,8 +81,7 @@ def _solve(options: Namespace, clock: float) -> int:
 
 def _write(outcome: Outcome, options: Namespace) -> int:
     """Write what the end gives, compare it with expected values, and say both; return the exit code."""
-    with TerminalProgress(options.progress) as progress:
-        progress("write", 0.0)
+    with shown("write", options.progress):
         written, expected = outcome.write(), outcome.compare()
     _print([] if options.quiet else [f"{'written':<22}{path}" for path in written])
     _print(expected)

@@ -156,13 +156,17 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         default=[],
-        help="static: .vtu for ParaView, .html for the browser, .vtk or .json; in time: .pvd for ParaView, "
-        ".html, .csv or .npz; of modes: .pvd or .html; may be given several times",
+        help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes); in time: .pvd "
+        "for ParaView, .html, .csv or .npz; of modes: .pvd or .html; may be given several times",
     )
     _add_options(
         out,
         ("--json", "OUT.json", "summary, displacements and reactions by node id"),
-        ("--picture", "OUT.png", "picture of the deformed model, of its modes, or of a body along its path"),
+        (
+            "--picture",
+            "OUT.png",
+            "picture of the deformed model, of its modes, or of a body along its path; .gif, .mp4: film",
+        ),
         ("--state", "OUT.npz", "the last state in time, for --restart; written after Ctrl-C too"),
     )
     out.add_argument(

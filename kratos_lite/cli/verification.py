@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 from kratos_lite.atomic import write_whole
-from kratos_lite.cli.progress import TerminalProgress
+from kratos_lite.cli.progress import shown
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.testing.files import MODULE, REGISTRIES, beside, run_module
@@ -58,12 +58,12 @@ def _printed(names: list[str], elements: list[str]) -> list[Row]:
     rows: list[Row] = []
     print(page.HEADER)
     try:
-        with TerminalProgress() as progress:
+        with shown() as progress:
             for row in verify(names, elements, progress):
                 rows.append(row)
                 if row.failed:
-                    progress.close()
-                    print(page.line(row), flush=True)
+                    with progress.hidden() if progress else nullcontext():
+                        print(page.line(row), flush=True)
     finally:
         for row in rows:
             if not row.failed:

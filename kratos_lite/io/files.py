@@ -10,6 +10,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.formats import ending, input_file, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
 from kratos_lite.validation import path_of
+from kratos_lite.view.progress import watched
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.model import Model
@@ -78,17 +79,18 @@ def read_case(
         With file, line and cure of everything that is wrong.
     """
     path = input_file(path_of(path))
-    if ending(path) == ".json":
-        from kratos_lite.io.settings import read_settings
+    with watched(None, "read"):
+        if ending(path) == ".json":
+            from kratos_lite.io.settings import read_settings
 
-        return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement)
-    if ending(path) == ".py":
-        from kratos_lite.io.readers.script import read_script
+            return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement)
+        if ending(path) == ".py":
+            from kratos_lite.io.readers.script import read_script
 
-        return read_script(path)
-    document = read_document(path, strict=strict)
-    model = model_from(document, materials=materials, initial_displacement=initial_displacement)
-    return Case(model, files=[path])
+            return read_script(path)
+        document = read_document(path, strict=strict)
+        model = model_from(document, materials=materials, initial_displacement=initial_displacement)
+        return Case(model, files=[path])
 
 
 def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool) -> Case:

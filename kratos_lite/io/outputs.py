@@ -11,6 +11,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, Outputs
 from kratos_lite.io.formats import ELEM_SET, ending
 from kratos_lite.io.writers.endings import check_ending, check_modes, check_result, check_series
+from kratos_lite.io.writers.pictures import check_picture, write_picture
 from kratos_lite.io.writers.results import write_result
 
 
@@ -39,8 +40,6 @@ def check_outputs(case: Case) -> None:
         if single is not None:
             check_ending(single, wanted)
     if outputs.picture is not None:
-        from kratos_lite.view.canvas import check_picture  # rarely needed
-
         check_picture(outputs.picture)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
@@ -55,7 +54,7 @@ def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:
     for path in outputs.results:
         write_result(path, result, outputs.mode)
     if outputs.picture is not None:
-        result.plot(outputs.picture)
+        write_picture(outputs.picture, result)
 
 
 def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: bool = False) -> None:

@@ -13,6 +13,7 @@ from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import aligned
 from kratos_lite.typing import Progress
+from kratos_lite.view.progress import watched
 
 ANALYSES = {
     "static": "at_rest",
@@ -56,8 +57,9 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     """
     check_case(case)
     check_outputs(case)
-    outcome: Outcome = runner_of(case).run(case, progress)
-    return outcome
+    with watched(progress) as shown:
+        outcome: Outcome = runner_of(case).run(case, shown)
+        return outcome
 
 
 def check(case: Case) -> list[str]:

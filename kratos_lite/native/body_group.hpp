@@ -14,6 +14,17 @@ namespace kl {
 constexpr int LANES = 8;
 typedef double Pack[LANES];
 
+// Clang forgets that a vec may lie anywhere where it is a type parameter of a template: there it takes vectors that
+// are aligned to their size. Groups, whose packs they are loaded from, are aligned to a pack.
+template <int V>
+struct lanes_of {
+#if defined(__clang__)
+    typedef double type __attribute__((vector_size(V * sizeof(double))));
+#else
+    typedef vec<double, V> type;
+#endif
+};
+
 // In what follows D is a vector of doubles, matrices are row-major and results come last.
 
 template <int K, class D>

@@ -11,7 +11,7 @@ namespace kl {
 
 enum PseudoIntegrator { EXPLICIT, LINEARLY_IMPLICIT, ENERGY_MOMENTUM };
 
-struct PseudoGroup {
+struct alignas(sizeof(Pack)) PseudoGroup {
     Pack q[12], u[12], load[12], euler[9], mass[1], volume[1], C[36], damping[1];
     Pack acceleration[3], spatial[12];  // of loads that stay constant
     Pack work[1], flaw[1];
@@ -166,7 +166,7 @@ KL_INLINE void energy_momentum(const PseudoGroup& g, int at, const D* F, const D
 
 template <int V>
 KL_INLINE void pseudo_finish_body(PseudoGroup& g) {
-    typedef vec<double, V> D;
+    typedef typename lanes_of<V>::type D;
     const double h = g.h;
     for (int at = 0; at < g.count; at += V) {
         D q[12], u[12], f[12], change[12], m, work, flaw = {};

@@ -10,7 +10,7 @@ namespace kl {
 
 enum RigidIntegrator { RIGID_POSITIVE, RIGID_NEGATIVE, RIGID_IMPLICIT };
 
-struct RigidGroup {
+struct alignas(sizeof(Pack)) RigidGroup {
     Pack q[12], u[6], qh[12], load[6], inertia[9], inverse[9], mass[1];
     Pack acceleration[3], spatial[6], convected[6];  // of loads that stay constant
     Pack work[1], flaw[1];                           // work of the loads; not 0 where the step failed
@@ -40,7 +40,7 @@ KL_INLINE void add_flaw(const D* x, D& flaw) {
 // Rh = R exp(h/2 W), xh = x + h/2 v
 template <int V>
 KL_INLINE void rigid_half_body(RigidGroup& g) {
-    typedef vec<double, V> D;
+    typedef typename lanes_of<V>::type D;
     const double half = g.h / 2;
     for (int at = 0; at < g.count; at += V) {
         D R[9], E[9], Rh[9], u[6], x[3];
@@ -58,7 +58,7 @@ KL_INLINE void rigid_half_body(RigidGroup& g) {
 // The load at mid-step of an acceleration, a spatial torque and force, a referential torque and a convected force.
 template <int V>
 KL_INLINE void rigid_load_body(RigidGroup& g) {
-    typedef vec<double, V> D;
+    typedef typename lanes_of<V>::type D;
     for (int at = 0; at < g.count; at += V) {
         D R[9], a[3], spatial[6], convected[6], m, total[6];
         load_rotation(g.qh, at, R);
@@ -116,7 +116,7 @@ KL_INLINE void implicit_velocity(const D* J, const D* A, double h, double tolera
 
 template <int V>
 KL_INLINE void rigid_finish_body(RigidGroup& g) {
-    typedef vec<double, V> D;
+    typedef typename lanes_of<V>::type D;
     const double h = g.h;
     for (int at = 0; at < g.count; at += V) {
         D Rh[9], R[9], J[9], inverse[9], u[6], next[6], load_[6], m, x[3], work, flaw = {};

@@ -13,9 +13,12 @@ from kratos_lite.atomic import replacing
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.typing import Numbers
 from kratos_lite.view import canvas
-from kratos_lite.view.figure import Options, Subject, compose, draw_body, scene_of
+from kratos_lite.view.figure import compose, draw_body
+from kratos_lite.view.scene import Options, Subject, scene_of
 
 ENDINGS = (".gif", ".mp4")
+WHITE = 248
+"""Red, green and blue from which a color is taken for white."""
 FACETS = 5000
 """Facets of a frame to aim at."""
 
@@ -69,8 +72,10 @@ def _write_gif(file: Path, pictures: Iterator[Numbers], fps: float) -> None:
 
     images = [Image.fromarray(pixels) for pixels in pictures]
     sample = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: -(-len(images) // 4)]]))
-    palette = sample.quantize(255, Image.Quantize.MEDIANCUT)
-    palette.putpalette([*(palette.getpalette() or [])[: 3 * 255], 255, 255, 255])  # the paper stays white
+    palette = sample.quantize(256, Image.Quantize.MEDIANCUT)
+    colors = np.reshape(palette.getpalette() or [255, 255, 255], (-1, 3))
+    colors[(colors >= WHITE).all(axis=1)] = 255  # the paper stays white
+    palette.putpalette(colors.ravel().tolist())
     flat = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     options: dict[str, Any] = {"duration": max(round(1000 / fps), 20), "loop": 0, "optimize": False}
     flat[0].save(file, format="GIF", save_all=True, append_images=flat[1:], **options)

@@ -21,8 +21,10 @@ LIGHT: Array = np.array([0.35, -0.65, 0.67])
 INK = (0.1, 0.1, 0.15, 0.55)
 MANY = 20000
 """Faces from which their edges are no longer drawn, and facets to aim at."""
-FINEST = 40
-"""Parts of an edge at most."""
+EDGE_ON = 1e-9
+"""Cosine between normal and view of a facet that is seen from the side."""
+FINEST, SHADES = 40, 8
+"""Parts of an edge at most, with and without values that vary along it."""
 
 
 @record(eq=False)
@@ -66,6 +68,8 @@ def facets_of(
     """
     faces = [_inside(block, x, rows, window) for block in mesh.boundary]
     n, edged = fineness(sum(map(len, faces)), most)
+    if values is None or len(values) != mesh.n_nodes:
+        n = min(n, SHADES)  # as fine as shape and order in depth need
     parts = [_of_block(block, mesh, x, values, rows, plane, n) for block in faces]
     if plane is not None:
         parts += [_of_cut(block, start, mesh, x, values, rows, plane) for block, start in _blocks(mesh)]
@@ -108,7 +112,7 @@ def _of_block(
     N = block.shape.N(xi)
     P = np.einsum("pa,mad->mpd", N, x[block.nodes])[:, corners].reshape(-1, 4, 3)
     normal = _normals(P)
-    front = normal @ rows[2] > 0
+    front = normal @ rows[2] > EDGE_ON
     light, value = (
         _light(normal[front]),
         _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front],

@@ -220,6 +220,16 @@ def test_frames_table_and_picture(run, folder):
     assert [float(line.split(",")[0]) for line in lines[1:]] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
 
 
+def test_a_film_shows_all_states_and_needs_a_known_ending(run, folder):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
+    write(picture="out/swing.gif")
+    assert run("solve", "run.json").code == 0
+    with image.open(folder / "out" / "swing.gif") as film:
+        assert film.n_frames == 5
+    assert run("solve", "run.json", "--picture", "swing.avi").refuses(r"pictures cannot be written as .avi")
+
+
 def test_info_and_check_know_the_steps(run, folder):
     write(time={**TIME, "integrator": "bossak"})
     assert "20 steps of 0.001 s by bossak(-0.3)" in run("info", "run.json").out

@@ -93,7 +93,8 @@ def timed(what: str, step: Callable[..., object], *arguments: object) -> object:
     """Return what a step returns, and say how long it took."""
     start = time.monotonic()
     found = step(*arguments)
-    size = f", {found.stat().st_size / 2**20:.2f} MiB" if isinstance(found, Path) and found.is_file() else ""
+    made = isinstance(found, Path) and found.suffix == ".whl"
+    size = f", {found.stat().st_size / 2**20:.2f} MiB" if made else ""
     sys.stdout.write(f"{what}: {time.monotonic() - start:.0f} s{size}\n")
     sys.stdout.flush()
     return found

@@ -32,7 +32,7 @@ def gravity_cube(folder: Path, element: str, solver: str) -> None:
     assert 0 <= result.error().relative < 1
     path = folder / f"{element}.vtu"
     kl.write(path, result)
-    assert len(kl.read(path).points) == len(model.mesh.points)
+    assert len(kl.read(path).mesh.points) == len(model.mesh.points)
 
 
 def motion() -> None:
@@ -42,10 +42,12 @@ def motion() -> None:
         body = kind(kl.box(cells=(1, 1, 2)), rubber)
         body.add(kl.Gravity((0.0, 0.0, -9.81)))
         *_, last = kl.integrate(body, dt=0.001, steps=100)
-        assert abs(last.t - 0.1) < 1e-12
+        assert abs(last.time - 0.1) < 1e-12
     column = kl.Model(kl.box((1.0, 1.0, 5.0), cells=(1, 1, 5), element="KinematicLinear3D20N"), rubber)
     column.fix("z-", "xyz")
-    assert (np.diff(column.modes(4).frequencies) > -1e-6).all()
+    frequencies, _ = column.modes(4)
+    assert frequencies[0] > 0
+    assert (np.diff(frequencies) > -1e-6).all()
 
 
 def command_line(folder: Path, model: Path) -> None:
@@ -60,7 +62,7 @@ def command_line(folder: Path, model: Path) -> None:
 def main(computes: str, home: str = "") -> None:
     """Try everything."""
     logging.basicConfig(level=logging.ERROR)
-    assert Path(kl.__file__).is_relative_to(Path(home).resolve() if home else sys.prefix), kl.__file__
+    assert Path(kl.__file__).resolve().is_relative_to(Path(home or sys.prefix).resolve()), kl.__file__
     missing = [name for name in KERNELS if kernels(name) is None]
     assert missing == ([] if computes == "compiled" else list(KERNELS)), missing
     assert described().startswith(computes), described()

@@ -226,10 +226,9 @@ CASES: Case = {
         3.0,
     ),
     ("Model.local_system", "u"): (lambda v: static().local_system(1, v)[0], U),
-    **{
-        (f"Result.{name}", "at"): (lambda v, name=name: getattr(RESULT, name)(at=v), [POINT])
-        for name in ("displacement", "stress", "strain", "von_mises")
-    },
+    ("Result.at", "points"): (lambda v: list(RESULT.at(v).columns().values()), [POINT]),
+    ("Result.along", "a"): (lambda v: RESULT.along(v, (0.9, 0.9, 0.9), n=3).linear, POINT),
+    ("Result.along", "b"): (lambda v: RESULT.along((0.9, 0.9, 0.9), v, n=3).linear, POINT),
 }
 for kind in KINDS:
     own = kind.__name__

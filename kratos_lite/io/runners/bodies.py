@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.plot import plot
 from kratos_lite.analysis.state import State
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.bodies import Body
@@ -16,6 +15,7 @@ from kratos_lite.bodies.deformable import Deformable
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.io.writers.series import SeriesWriter
 from kratos_lite.typing import Array, Progress
 
@@ -49,7 +49,7 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     seconds = perf_counter() - clock
     if case.outputs.picture is not None:
         title = case.files[0].stem.replace("_", " ") if case.files else ""
-        plot(body, case.outputs.picture, states=summary.kept, title=title)
+        write_picture(case.outputs.picture, body, states=summary.kept, title=title)
     return Outcome(case, [*rows_of(body), *summary.rows(seconds)])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case, TimeIntegration
+from kratos_lite.io.writers.pictures import is_film
 from kratos_lite.io.writers.recorded import recorded
 from kratos_lite.io.writers.series import SeriesWriter, make_folder
 from kratos_lite.io.writers.state import read_state, write_state
@@ -76,7 +77,7 @@ def check_room(case: Case, subject: Any, start: Any) -> None:
     cure = "keep fewer of them, with every or --time STEP:STEPS:EVERY"
     size = float(sum(np.asarray(values).nbytes for values in start.values.values()) + STATE)
     of_memory = sum(path.lower().endswith((".npz", ".html")) for path in outputs.results)
-    of_memory += outputs.picture is not None and not case.is_of_model
+    of_memory += is_film(outputs.picture) or (outputs.picture is not None and not case.is_of_model)
     fits_memory(kept * (of_memory * size + STATE), f"a series of {kept} states", cure)
     for path in outputs.results:
         if path.lower().endswith(".pvd"):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
-from kratos_lite.analysis.plot import plot
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.io.writers.modes import names_of_modes, write_modes
+from kratos_lite.io.writers.pictures import write_picture
 from kratos_lite.typing import Progress
 
 DRAWN = 6
@@ -53,4 +53,4 @@ def _write(case: Case, values: Any, shapes: Any) -> None:
         write_modes(path, mesh, values, shapes, mode=outputs.mode or "binary")
     if outputs.picture is not None:
         names = names_of_modes(values[:DRAWN].tolist())
-        plot(case.model, outputs.picture, modes=shapes[:DRAWN].real, titles=names)
+        write_picture(outputs.picture, case.model, modes=shapes[:DRAWN], titles=names)

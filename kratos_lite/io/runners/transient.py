@@ -16,6 +16,7 @@ from kratos_lite.analysis.transient import TransientAnalysis
 from kratos_lite.io.case import Case
 from kratos_lite.io.runners.in_time import follow, placed, restart
 from kratos_lite.io.runners.outcome import Outcome
+from kratos_lite.io.writers.pictures import is_film, write_picture
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.model.structure import Structure
@@ -59,27 +60,32 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Take the steps of a model; its result is that of the end."""
     transient, states = prepare(case, progress)
     start = transient.state()
-    summary, clock = _Summary(transient), perf_counter()
+    picture = case.outputs.picture
+    summary, clock = _Summary(transient, keep=is_film(picture)), perf_counter()
     follow(case, transient, start, states, summary)
     rows, result = summary.rows(case, perf_counter() - clock), transient.result(summary.last)
-    if case.outputs.picture is not None:
+    if picture is not None and is_film(picture):
+        write_picture(picture, transient, states=summary.states)
+    elif picture is not None:
         title = f"displacement at t = {summary.last.time:g} s"
-        result.plot(case.outputs.picture, "displacement", title=title)
+        write_picture(picture, result, values="displacement", title=title)
     return Outcome(case, rows, result)
 
 
 class _Summary:
     """What the summary says of a transient: its start, its last state and the one that moved farthest."""
 
-    def __init__(self, transient: TransientAnalysis) -> None:
+    def __init__(self, transient: TransientAnalysis, keep: bool) -> None:
         self.transient, self.energy = transient, transient.energy()
-        self.kept = 0
+        self.kept, self.keep, self.states = 0, keep, list[State]()
         self.largest, self.row = 0.0, 0
         self.start = self.last = self.farthest = transient.state()
 
     def add(self, state: State) -> None:
         """Take a state."""
         self.last, self.kept = state, self.kept + 1
+        if self.keep:
+            self.states.append(state)
         length = np.linalg.norm(state.u, axis=1)
         row = int(length.argmax())
         if length[row] > self.largest:

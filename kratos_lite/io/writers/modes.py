@@ -44,7 +44,7 @@ def write_modes(
     >>> import kratos_lite as kl
     >>> beam = kl.Model(kl.box((5, 1, 1), (5, 1, 1)), kl.Isotropic3D(E=2e11, nu=0.3, density=7800.0))
     >>> beam.fix("x-")
-    >>> write_modes(getfixture("tmp_path") / "beam.html", beam.mesh, *beam.modes(3))
+    >>> write_modes(getfixture("tmp_path") / "beam.pvd", beam.mesh, *beam.modes(3))
     """
     path = path_of(path)
     check_modes(path)

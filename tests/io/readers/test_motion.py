@@ -168,7 +168,7 @@ def test_the_section_stands_in_run_files_of_kratos_too(folder):
         (("--rotation", "-z:30"), "--rotation -z:30: an axis is 'x', 'y', 'z' or a vector; got '-z'"),
         (("--rotation", "z:1", "--damping", "-2"), "a damping must be one number ≥ 0, in 1/s; got -2.0"),
         (("--damping", "2"), "--damping belongs to --rotation or --translation"),
-        (("--modes", "3", "--json", "a.json"), "--modes prints a table; it writes no files"),
+        (("--modes", "3", "--json", "a.json"), "does not hold modes; -o OUT.pvd or OUT.html does"),
     ],
 )
 def test_options_that_are_wrong_end_in_one_line(folder, capsys, words, message):

@@ -255,7 +255,7 @@ def test_modes_of_another_mesh_are_refused(tmp_path):
         kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.zeros((1, 7, 3)))
     with pytest.raises(InputError, match=r"not finite"):
         kl.write_modes(tmp_path / "m.html", kl.box(), [1.0], np.full((1, 8, 3), np.nan))
-    with pytest.raises(InputError, match=r"the ending must be .html"):
+    with pytest.raises(InputError, match=r"modes are written as .pvd"):
         kl.write_modes(tmp_path / "m.txt", kl.box(), [1.0], np.zeros((1, 8, 3)))
     assert not list(tmp_path.iterdir())
 

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no chromium w
 FLAGS = (
     *("headless", "no-sandbox", "disable-gpu", "enable-unsafe-swiftshader", "disable-quic", "no-first-run"),
     *("disable-background-networking", "disable-component-update", "disable-sync", "disable-extensions"),
-    *("hide-scrollbars", "window-size=700,500"),
+    *("hide-scrollbars", "disable-dev-shm-usage", "window-size=700,500"),
 )
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 

@@ -1,0 +1,187 @@
+"""Scenes: what is drawn side by side, with one camera, one window and one scale of colors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.errors import InputError
+from kratos_lite.mesh import Mesh
+from kratos_lite.records import record
+from kratos_lite.typing import Array
+from kratos_lite.view import canvas
+from kratos_lite.view.camera import View, box_corners, rows_of, window_of
+from kratos_lite.view.marks import Marks
+from kratos_lite.view.plane import Plane, plane_of
+from kratos_lite.view.rulers import rounded
+
+DECADES = 4
+"""Powers of ten that a logarithmic scale of colors shows."""
+
+
+@record(frozen=True, eq=False)
+class Values:
+    """Numbers that color a body.
+
+    Attributes
+    ----------
+    numbers : (n,) of nodes or (m,) of elements.
+    title : what they are.
+    unit : at the color bar.
+    log : whether their powers of ten matter.
+    """
+
+    numbers: Array
+    title: str = ""
+    unit: str = ""
+    log: bool = False
+
+
+@record(frozen=True, eq=False)
+class Subject:
+    """What is drawn of a body.
+
+    Attributes
+    ----------
+    mesh : the undeformed body.
+    u : (n, 3) m, displacement; None of what has none.
+    values : what colors it.
+    title : above the picture.
+    marks : what holds it.
+    moving : whether it moves through space, so that its first place is none to show.
+    """
+
+    mesh: Mesh
+    u: Array | None = None
+    values: Values | None = None
+    title: str = ""
+    marks: Marks | None = None
+    moving: bool = False
+
+
+@record(eq=False)
+class Options:
+    """How it is drawn; see `kratos_lite.plot`."""
+
+    view: View | None = None
+    clim: tuple[float, float] | None = None
+    scale: float | None = None
+    zoom: Any = None
+    clip: Any = None
+    size: tuple[float, float] = (8, 6)
+    title: str = ""
+
+
+@record(eq=False)
+class Scene:
+    """Subjects with what they share.
+
+    Attributes
+    ----------
+    subjects : side by side.
+    rows : of the camera.
+    scale : factor on displacements.
+    window : lower left and upper right of what is shown, in m in the picture.
+    colors : scale of colors, or None.
+    plane : that cuts the bodies, or None.
+    zoomed : whether the window cuts them off.
+    """
+
+    subjects: Sequence[Subject]
+    rows: Array
+    scale: float
+    window: tuple[Array, Array]
+    colors: Any
+    plane: Plane | None
+    zoomed: bool = False
+
+    def place(self, subject: Subject) -> Array:
+        """Return where the nodes of a subject are drawn, (n, 3) m."""
+        return subject.mesh.points if subject.u is None else subject.mesh.points + self.scale * subject.u
+
+
+def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
+    """Return subjects with one camera, one factor on displacements, one window and one scale of colors."""
+    for subject in subjects:
+        if not subject.mesh.boundary:
+            raise InputError("there is nothing to draw: the mesh has no element of a known shape")
+    points = np.concatenate([subject.mesh.points for subject in subjects])
+    rows = rows_of(options.view, points)
+    plane = plane_of(options.clip, rows[2])
+    scale = factor_of(subjects, options.scale)
+    scene = Scene(
+        subjects,
+        rows,
+        scale,
+        window_of(points[:, :2]),
+        colors_of(subjects, options.clim),
+        plane,
+        options.zoom is not None,
+    )
+    scene.window = window_of(np.concatenate([drawn_points(scene, subject) for subject in subjects]))
+    if options.zoom is not None:
+        scene.window = _zoomed(scene, options.zoom)
+    if plane is not None:
+        plane.check(points)
+    return scene
+
+
+def drawn_points(scene: Scene, subject: Subject) -> Array:
+    """Return the nodes of a subject in the picture, (k, 2), deformed and not."""
+    points = [scene.place(subject)] if subject.moving else [subject.mesh.points, scene.place(subject)]
+    if subject.marks is not None:
+        points.append(subject.marks.points())
+    return np.concatenate(points) @ scene.rows[:2].T
+
+
+def factor_of(subjects: Sequence[Subject], wanted: float | None) -> float:
+    """Return the factor on displacements: by default at least 1, the largest being a tenth of the body."""
+    if wanted is not None:
+        return wanted
+    return min(
+        (exaggeration(s.mesh.points, s.u) for s in subjects if s.u is not None and s.u.any()), default=1.0
+    )
+
+
+def exaggeration(X: Array, u: Array) -> float:
+    """Return 1, 2 or 5 times a power of ten, at least 1, that makes the displacement a tenth of the body."""
+    wanted = 0.1 * np.linalg.norm(np.ptp(X, axis=0)) / np.linalg.norm(u, axis=1).max()
+    return max(1.0, rounded(float(wanted)))
+
+
+def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> Any:
+    """Return the scale of colors of all subjects, or None."""
+    values = [subject.values for subject in subjects if subject.values is not None]
+    if not values:
+        return None
+    log = all(v.log for v in values)
+    if clim is None:
+        numbers = np.concatenate([v.numbers for v in values])
+        low, high = float(numbers.min()), float(numbers.max())
+        if log:
+            low = max(low, high * 10.0**-DECADES)
+            log = high > 0
+    else:
+        low, high = clim
+        log = log and low > 0
+    return canvas.color_scale(low, high, log=log)
+
+
+def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
+    """Return the window around the middle for a factor, or that of a part or a box."""
+    low, high = scene.window
+    if isinstance(zoom, (float, int)):
+        middle, half = (low + high) / 2, (high - low) / 2 / zoom
+        return middle - half, middle + half
+    found = []
+    for subject in scene.subjects:
+        if isinstance(zoom, str):
+            chosen = scene.place(subject)[subject.mesh.nodes(zoom)]
+        else:
+            chosen = box_corners(*np.asarray(zoom, dtype=float))
+        found.append(chosen @ scene.rows[:2].T)
+    low, high = window_of(np.concatenate(found))
+    margin = 0.05 * (high - low).max()
+    return low - margin, high + margin

@@ -1,0 +1,388 @@
+"""kl.plot and its options: values by name, views, limits, scale, zoom, cut, several side by side."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.shapes import SHAPES
+from kratos_lite.view.camera import VIEWS, rows_of, window_of
+from kratos_lite.view.facets import facets_of
+from kratos_lite.view.plane import clip_facets, cut_cells, plane_of
+from kratos_lite.view.rulers import extent
+
+matplotlib = pytest.importorskip("matplotlib")
+STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
+
+
+def bent(size=(4, 1, 1), cells=(4, 1, 1), element="KinematicLinear3D8N"):
+    model = kl.Model(kl.box(size, cells, element), STEEL)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (0.0, 0.0, -1e6)))
+    return model.solve()
+
+
+@pytest.fixture(scope="module")
+def result():
+    return bent()
+
+
+def bar(figure):
+    """Return limits, unit and numbers of the color bar."""
+    axes = figure.axes[-1]
+    upright = axes.get_position().height > axes.get_position().width
+    limits = axes.get_ylim() if upright else axes.get_xlim()
+    return np.array(limits), axes.get_ylabel() if upright else axes.get_xlabel()
+
+
+def body(axes):
+    """Return corners of the polygons of a body in the picture."""
+    drawn = [c for c in axes.collections if type(c).__name__ == "PolyCollection"]
+    return np.concatenate([path.vertices for path in drawn[-1].get_paths()])
+
+
+def words(figure):
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+# ---- values ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "numbers"),
+    [
+        ("von_mises", "MPa", lambda r: r.von_mises("node") / 1e6),
+        ("sxx", "MPa", lambda r: r.stress("node")[:, 0] / 1e6),
+        ("syy", "MPa", lambda r: r.stress("node")[:, 1] / 1e6),
+        ("s1", "MPa", lambda r: eigenvalues(r.stress("node"))[:, 2] / 1e6),
+        ("s3", "MPa", lambda r: eigenvalues(r.stress("node"))[:, 0] / 1e6),
+        ("tresca", "MPa", lambda r: np.ptp(eigenvalues(r.stress("node")), axis=1) / 1e6),
+        ("exy", "", lambda r: r.strain("node")[:, 3]),
+        ("e2", "", lambda r: eigenvalues(r.strain("node") * [1, 1, 1, 0.5, 0.5, 0.5])[:, 1]),
+        ("uz", "µm", lambda r: r.u[:, 2] * 1e6),
+        ("displacement", "µm", lambda r: np.linalg.norm(r.u, axis=1) * 1e6),
+        ("reaction", "MN", lambda r: np.linalg.norm(r.reactions, axis=1) / 1e6),
+    ],
+)
+def test_values_by_name(result, name, unit, numbers):
+    figure = result.plot(values=name)
+    expected = numbers(result)
+    limits, label = bar(figure)
+    scale = {"MPa": 1e6, "µm": 1e-6, "MN": 1e6, "": 1.0}[unit]
+    assert label.endswith(unit)
+    if unit:
+        assert label == unit
+    assert np.abs(limits / scale - [expected.min(), expected.max()]).max() < 1e-9 * np.abs(expected).max()
+
+
+def eigenvalues(voigt):
+    return np.linalg.eigvalsh(voigt[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]])
+
+
+def test_the_error_of_elements_has_a_logarithmic_scale_and_one_color_an_element(result):
+    figure = result.plot(values="error")
+    assert figure.axes[-1].get_xscale() == "log" or figure.axes[-1].get_yscale() == "log"
+    assert bar(figure)[1] in ("√J", "m√J")
+    error = result.error().per_element
+    assert np.abs(bar(figure)[0] / [error.min(), error.max()] - 1).max() < 1e-9
+
+
+def test_own_values_of_nodes_and_of_elements(result):
+    mesh = result.mesh
+    of_nodes, of_elements = np.arange(mesh.n_nodes) + 5.0, np.arange(mesh.n_elements) + 2.0
+    assert np.abs(bar(kl.plot(mesh, values=of_nodes, unit="K"))[0] - [5, 4 + mesh.n_nodes]).max() == 0
+    figure = kl.plot(mesh, values=of_elements, view="y-")
+    colors = figure.axes[0].collections[-1].get_facecolors()
+    assert len(np.unique(colors.round(6), axis=0)) == mesh.n_elements + 1  # and that of edges
+    with pytest.raises(kl.InputError, match=r"values must have shape \(20,\), .*, or \(4,\), .*; got \(3,\)"):
+        kl.plot(mesh, values=[1, 2, 3])
+
+
+@pytest.mark.parametrize("given", ["von_mise", "sxz", "VON_MISES_STRESS"])
+def test_an_unknown_name_of_values_is_refused_with_all_names(result, given):
+    with pytest.raises(kl.InputError, match=r"there are no values .*; there are displacement, ux, .*, error"):
+        result.plot(values=given)
+    with pytest.raises(kl.InputError, match="a mesh or a model has no values 'sxx'"):
+        kl.plot(result.mesh, values="sxx")
+
+
+def test_displacements_of_a_mesh_have_names(result):
+    u = np.zeros((result.mesh.n_nodes, 3))
+    u[:, 1] = np.linspace(0, 2e-3, len(u))
+    assert np.abs(bar(kl.plot(result.mesh, displacement=u, values="uy"))[0] - [0, 2e-3]).max() < 1e-15
+
+
+# ---- camera ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("view", [*VIEWS, (30, 20), (120, -40), (0, 90), (1, 2, 3), (0, 0, -1)])
+def test_cameras_are_right_handed_with_z_up(view):
+    rows = rows_of(view, np.eye(3))
+    assert np.abs(rows @ rows.T - np.eye(3)).max() < 1e-15
+    assert abs(np.linalg.det(rows) - 1) < 1e-14
+    assert rows[1, 2] >= 0
+
+
+def test_a_side_is_seen_from_outside():
+    assert np.abs(rows_of("x+", np.eye(3)) - [[0, 1, 0], [0, 0, 1], [1, 0, 0]]).max() == 0
+    assert np.abs(rows_of("y-", np.eye(3)) - [[1, 0, 0], [0, 0, 1], [0, -1, 0]]).max() == 0
+    assert np.abs(rows_of("z+", np.eye(3)) - np.eye(3)).max() == 0
+    azimuth, elevation = np.radians((-45, np.degrees(np.arctan(1 / np.sqrt(2)))))
+    angles = rows_of(np.degrees((azimuth, elevation)), np.eye(3))
+    assert np.abs(angles - rows_of("iso", np.eye(3))).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("view", "message"),
+    [
+        ("top", "view must be one of iso, x-, x.*got 'top'"),
+        ((0, 0, 0), "a view is one of iso"),
+        ((1, 2, 3, 4), "a view is one of iso"),
+        ((0, 100), "the elevation of a view lies from -90 to 90 degrees"),
+    ],
+)
+def test_wrong_views_are_refused(result, view, message):
+    with pytest.raises(kl.InputError, match=message):
+        result.plot(view=view)
+
+
+@pytest.mark.parametrize("view", [None, *VIEWS])
+@pytest.mark.parametrize(
+    "size", [(1, 1, 1), (100, 1, 1), (1, 100, 1), (1, 1, 100), (10, 10, 0.1), (0.1, 10, 10)]
+)
+def test_the_body_fills_the_picture(size, view):
+    mesh = kl.box(size)
+    figure = kl.plot(mesh, view=view)
+    axes = figure.axes[0]
+    drawn = np.ptp(body(axes), axis=0)
+    window = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
+    assert (drawn / window).max() > 0.9
+    if view is None:
+        assert (drawn / window).min() > 0.6
+    width, height = figure.get_size_inches()
+    assert width <= 8.1
+    assert height <= 6.1
+    assert max(width / 8, height / 6) > 0.9
+
+
+def test_the_sizes_of_the_body_are_readable():
+    ring = kl.annulus(0.1, 0.45, 0.1, cells=(1, 12, 1))
+    assert {"x  -0.45 … 0.45 m", "y  -0.45 … 0.45 m", "z  0 … 0.1 m"} <= set(words(kl.plot(ring)))
+    assert {"x  0 … 2 mm", "y  0 … 1 mm"} <= set(words(kl.plot(kl.box((0.002, 0.001, 0.001)))))
+    assert extent(-1.225e-17, 1.0) == "0 … 1"
+    assert extent(0.1 + 0.2, 0.7) == "0.3 … 0.7"
+
+
+@pytest.mark.parametrize("size", [(100, 1, 1), (1, 1, 1), (10, 10, 0.1), (1, 0.01, 1)])
+def test_texts_lie_on_no_other_and_within_the_figure(size):
+    figure = kl.plot(kl.box(size), values=np.arange(8.0), title="a title", unit="Pa")
+    figure.canvas.draw()
+    texts = [t for axes in figure.axes for t in (*axes.texts, axes.title) if t.get_text()]
+    boxes = [text.get_window_extent() for text in texts]
+    for i, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:i])
+        assert box.x0 >= 0
+        assert box.y0 >= 0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y1 <= figure.bbox.y1
+
+
+# ---- limits, scale, zoom ---------------------------------------------------------------------------
+
+
+def test_limits_of_the_colors(result):
+    assert np.abs(bar(result.plot(clim=(0, 2e7)))[0] - [0, 2e7]).max() == 0
+    for clim in ((2, 1), (1, 1), (1,), (0, np.nan)):
+        with pytest.raises(kl.InputError, match="clim"):
+            result.plot(clim=clim)
+
+
+def test_scale_of_the_displacement(result):
+    figures = [result.plot(scale=scale, view="y-") for scale in (0, 1, 100, "auto")]
+    assert [f.axes[0].get_title().splitlines()[1] for f in figures] == [
+        "deformation × 0",
+        "deformation × 1",
+        "deformation × 100",
+        "deformation × 500",
+    ]
+    low = [body(f.axes[0])[:, 1].min() for f in figures]
+    tip = result.u[:, 2].min()
+    assert abs(low[0]) < 1e-12
+    assert abs(low[2] / (100 * tip) - 1) < 1e-9
+    with pytest.raises(kl.InputError, match="scale must be made of real numbers"):
+        result.plot(scale="big")
+
+
+def test_zoom_to_a_factor_a_part_or_a_box(result):
+    whole = result.plot(scale=0, view="y-").axes[0]
+    for zoom in (4, "x+", ((3, 0, 0), (4, 1, 1))):
+        axes = result.plot(scale=0, view="y-", zoom=zoom).axes[0]
+        assert np.ptp(axes.get_xlim()) < 0.4 * np.ptp(whole.get_xlim())
+        assert axes.collections[-1].get_clip_on()
+    assert axes.get_xlim()[0] < 3
+    assert axes.get_xlim()[1] > 4
+    for zoom in (0, -1, (1, 2)):
+        with pytest.raises(kl.InputError, match="zoom, a factor, a part or a box"):
+            result.plot(zoom=zoom)
+    with pytest.raises(kl.MeshError, match="hole"):
+        result.plot(zoom="hole")
+
+
+# ---- cuts ------------------------------------------------------------------------------------------
+
+
+def area(polygons):
+    """Return the area of flat polygons (m, 4, 3)."""
+    a, b, c, d = np.moveaxis(polygons, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a) + np.cross(c - a, d - a), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize("element", ["4N", "5N", "6N", "8N", "10N", "13N", "15N", "20N", "27N"])
+def test_a_section_has_the_area_and_the_values_of_the_body(element):
+    mesh = kl.box((1, 2, 3), (2, 2, 2), f"KinematicLinear3D{element}")
+    normal = np.array([1.0, 2.0, 0.0]) / np.sqrt(5)
+    distance = (mesh.points - [0.5, 1.0, 0.0]) @ normal
+    found = 0.0
+    for block in mesh.blocks:
+        _, corners, values, edges = cut_cells(block, distance, mesh.points, mesh.points[:, 2])
+        found += area(corners)
+        assert np.abs((corners - [0.5, 1.0, 0.0]) @ normal).max() < 1e-12
+        assert np.abs((edges - [0.5, 1.0, 0.0]) @ normal).max() < 1e-12
+        assert np.abs(values - corners[:, :, 2].mean(axis=1)).max() < 1e-12
+    assert abs(found - 3 * np.sqrt(1 + 0.25)) < 1e-12  # a rectangle from y = 0.75 to 1.25
+
+
+def test_facets_are_clipped_exactly():
+    square = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    for normal, offset, kept in (((1, 0), 0.25, 0.25), ((1, 1), 0.5, 0.125), ((-1, -1), -0.5, 0.875)):
+        d = square[..., :2] @ np.array(normal, dtype=float) - offset
+        parts, owners = clip_facets(square, d)
+        assert abs(area(parts) - kept) < 1e-15
+        assert set(owners) == {0}
+    assert len(clip_facets(square, d + 10)[0]) == 0
+
+
+@pytest.mark.parametrize("name", [name for name in SHAPES if SHAPES[name].nodes.shape[1] == 3])
+def test_a_cut_takes_away_what_lies_towards_the_viewer(name):
+    shape = SHAPES[name]
+    rows = np.arange(len(shape.nodes))[None]
+    mesh = kl.Mesh(shape.nodes, [kl.Block("X", rows, shape=shape)])
+    z = 0.6 * shape.nodes[:, 2].min() + 0.4 * shape.nodes[:, 2].max()
+    for view, kept in (((-60, 30), -1), ((-60, -30), 1), ("y-", -1)):
+        camera = rows_of(view, mesh.points)
+        plane = plane_of(((0, 0, 2), 2 * z), camera[2])
+        corners = facets_of(mesh, mesh.points, None, camera, plane).corners
+        assert (kept * (corners[..., 2] - z)).min() > -1e-12
+        assert (np.abs(corners[..., 2] - z) < 1e-12).all(axis=1).any()
+
+
+def test_a_cut_beside_the_body_and_no_plane_are_refused(result):
+    with pytest.raises(kl.InputError, match=r"clip leaves nothing .* at -1 m, the body spans 0 … 4 m"):
+        result.plot(clip=("x", -1.0))
+    for clip, message in (
+        ("x", "clip is a plane, such as"),
+        (("w", 1), "clip: an axis is x, y or z; got 'w'"),
+        (((0, 0, 0), 1), "the normal of clip must not be zero"),
+        (("x", "left"), "the offset of clip"),
+    ):
+        with pytest.raises(kl.InputError, match=message):
+            result.plot(clip=clip)
+
+
+# ---- several ---------------------------------------------------------------------------------------
+
+
+def test_several_results_have_one_scale_one_camera_and_their_titles(result):
+    other = bent(cells=(8, 2, 2), element="KinematicLinear3D20N")
+    figure = kl.plot([result, other], values="sxx", titles=["coarse", "fine"])
+    first, second, _ = figure.axes
+    assert (first.get_title(), second.get_title()) == ("coarse", "fine")
+    assert first.get_xlim() == second.get_xlim()
+    assert first.get_ylim() == second.get_ylim()
+    stresses = np.concatenate([r.stress("node")[:, 0] for r in (result, other)])
+    assert np.abs(bar(figure)[0] - [stresses.min(), stresses.max()]).max() < 1e-3
+    same = kl.plot({"coarse": result, "fine": other}, values="sxx")
+    assert [axes.get_title() for axes in same.axes[:2]] == ["coarse", "fine"]
+    with pytest.raises(kl.InputError, match="titles: one for each of 2 pictures"):
+        kl.plot([result, other], titles=["coarse"])
+    with pytest.raises(kl.InputError, match="nothing to draw in an empty list"):
+        kl.plot([])
+
+
+def test_panels_and_their_titles_are_apart(result):
+    figure = kl.plot({f"a long title of the number {i}": result for i in range(5)})
+    figure.canvas.draw()
+    titles = [axes.title.get_window_extent() for axes in figure.axes[:-1]]
+    panels = [axes.get_window_extent() for axes in figure.axes[:-1]]
+    for boxes in (titles, panels):
+        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_modes_are_drawn_side_by_side_with_one_amplitude():
+    model = kl.Model(kl.box((4, 1, 1), (4, 1, 1)), STEEL)
+    model.fix("x-")
+    omega, shapes = model.modes(3)
+    figure = model.plot(modes=shapes, titles=[f"{w:.0f} rad/s" for w in omega])
+    assert len(figure.axes) == 4
+    assert np.abs(bar(figure)[0] - [0, 1]).max() < 1e-15
+    assert model.plot(modes=1000 * shapes[0], title="first").axes[0].get_title() == "first"
+    moved = model.plot(modes=shapes[0], view="z+").axes[0]
+    assert 0.05 * np.sqrt(18) < max(body(moved).max(axis=0) - [4, 1]) + 1 < 0.2 * np.sqrt(18) + 1
+    with pytest.raises(kl.InputError, match=r"modes must have shape \(20, 3\) or \(k, 20, 3\)"):
+        model.plot(modes=shapes[0][:5])
+
+
+# ---- things ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("thing", [3, "a.png", None, object(), [1, 2]])
+def test_what_cannot_be_drawn_is_refused(thing):
+    with pytest.raises(kl.InputError, match=r"a mesh, a model, a result, .* can be drawn; got"):
+        kl.plot(thing)
+
+
+def test_options_of_another_thing_are_refused(result):
+    with pytest.raises(kl.InputError, match="points belongs to an element"):
+        result.plot(points=[[0, 0, 0]])
+    with pytest.raises(kl.InputError, match="states belong to a body"):
+        result.plot(states=[])
+    with pytest.raises(kl.InputError, match="clip does not belong to the picture of an element"):
+        kl.plot(kl.KinematicLinear3D8N, clip=("x", 0))
+    with pytest.raises(kl.InputError, match="the class of an element or a shape can be drawn"):
+        kl.plot(int)
+
+
+def test_nothing_is_written_where_the_picture_fails(result, tmp_path):
+    with pytest.raises(kl.InputError):
+        result.plot(tmp_path / "a.png", "nonsense")
+    with pytest.raises(kl.InputError, match=r"no folder .*missing"):
+        result.plot(tmp_path / "missing" / "a.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_notebook_shows_the_figure_once_with_and_without_pyplot():
+    interactive = pytest.importorskip("IPython.core.interactiveshell")
+    code = """
+from IPython.core.interactiveshell import InteractiveShell
+from IPython.core.pylabtools import select_figure_formats
+import kratos_lite as kl
+shell = InteractiveShell.instance()
+for inline in (False, True):
+    if inline:  # as %matplotlib inline does
+        select_figure_formats(shell, {"png"})
+        import matplotlib.pyplot
+    shown, _ = shell.display_formatter.format(kl.plot(kl.box(), size=(2, 2)))
+    print([kind for kind in shown if kind.startswith("image/")])
+import matplotlib.pyplot as plt
+print(plt.get_fignums())
+"""
+    assert interactive is not None
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["['image/png']", "['image/png']", "[]"]
+
+
+def test_a_window_has_an_area_whatever_lies_in_it():
+    low, high = window_of(np.array([[1.0, 2.0], [1.0, 5.0]]))
+    assert ((high - low) > 0).all()
