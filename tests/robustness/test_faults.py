@@ -80,7 +80,10 @@ PHASES = {
     "assembling": ("kratos_lite.solvers.constrained_system:assemble_stiffness", STATIC),
     "factorizing": ("kratos_lite.solvers.direct:factorize", (*STATIC, "--solver", "direct")),
     "multigrid set-up": ("kratos_lite.solvers.multigrid:multigrid", (*STATIC, "--solver", "amg")),
-    "multigrid iterations": ("kratos_lite.solvers.iteration:Share.__call__", (*STATIC, "--solver", "amg")),
+    "multigrid iterations": (
+        "kratos_lite.solvers.linear_solver:LinearSolver._iterate",
+        (*STATIC, "--solver", "amg"),
+    ),
     "frequencies": ("kratos_lite.solvers.eigen:modes", (*STATIC, "--modes", "3")),
     "stresses": ("kratos_lite.io.runners.outcome:Outcome.summary", STATIC),
     "writing": ("os:fsync", STATIC),

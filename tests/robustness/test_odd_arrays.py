@@ -5,6 +5,8 @@ import re
 import warnings
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -63,6 +65,11 @@ def released(where):
     model.fix(range(8))
     model.release(where)
     return model.supports.fixed.astype(float)
+
+
+def written_modes(values, shapes):
+    with TemporaryDirectory() as folder:
+        kl.write_modes(Path(folder) / "modes.pvd", CUBE, values, shapes)
 
 
 def element(name, *arguments):
@@ -229,6 +236,8 @@ CASES: Case = {
     ("Result.at", "points"): (lambda v: list(RESULT.at(v).columns().values()), [POINT]),
     ("Result.along", "a"): (lambda v: RESULT.along(v, (0.9, 0.9, 0.9), n=3).linear, POINT),
     ("Result.along", "b"): (lambda v: RESULT.along((0.9, 0.9, 0.9), v, n=3).linear, POINT),
+    ("write_modes", "values"): (lambda v: written_modes(v, np.ones((1, 8, 3))), [1.0]),
+    ("write_modes", "shapes"): (lambda v: written_modes([1.0], v), np.ones((1, 8, 3))),
 }
 for kind in KINDS:
     own = kind.__name__

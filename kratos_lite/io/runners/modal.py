@@ -30,6 +30,8 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     """
     model, count = case.model, case.modes
     head = f"{'mode':>4}  {'frequency Hz':>14}  {'rad/s':>14}"
+    values: Any
+    shapes: Any
     if model.motion is None:
         values, shapes = model.modes(count, progress=progress)
         rows = [f"{i:>4}  {w / (2 * pi):>14.8g}  {w:>14.8g}" for i, w in enumerate(values.tolist(), 1)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from math import pi
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from kratos_lite.io.formats.vtu import write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_modes
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array, Complexes
-from kratos_lite.validation import instance, path_of
+from kratos_lite.validation import finite, instance, path_of
 
 
 def write_modes(
@@ -49,20 +50,25 @@ def write_modes(
     path = path_of(path)
     check_modes(path)
     instance(mesh, "the mesh of modes", Mesh, "model.mesh")
-    found, forms = np.asarray(values), np.asarray(shapes)
-    if found.ndim != 1 or forms.shape != (len(found), mesh.n_nodes, 3) or not len(found):
-        wanted = f"(k,) and (k, {mesh.n_nodes}, 3)"
-        raise InputError(
-            f"{path}: values and shapes of modes are {wanted}; got {found.shape} and {forms.shape}"
-        )
-    if not (np.isfinite(found).all() and np.isfinite(forms).all()):
-        raise InputError(f"{path}: not written: modes are not finite everywhere")
+    forms = _numbers(shapes, "shapes of modes", ("k", mesh.n_nodes, 3))
+    found = _numbers(values, "values of modes, one for each shape,", (len(forms),))
+    if not len(forms):
+        raise InputError(f"{path}: not written: there are no modes")
     if path.suffix.lower() == ".pvd":
         _write_frames(path, mesh, forms, mode)
         return
     from kratos_lite.io.writers.page.write import write_modes_page  # rarely needed
 
     write_modes_page(path, mesh, names_of_modes(found.tolist()), forms)
+
+
+def _numbers(value: ArrayLike, what: str, shape: tuple[int | str, ...]) -> Array | Complexes:
+    """Return finite numbers, real or complex."""
+    with suppress(ValueError):  # lists of unequal lengths
+        array = np.asarray(value)
+        if array.dtype.kind == "c":
+            return finite(array.real, what, shape) + 1j * finite(array.imag, what, shape)
+    return finite(value, what, shape)
 
 
 def _write_frames(path: Path, mesh: Mesh, shapes: Array | Complexes, mode: str) -> None:
