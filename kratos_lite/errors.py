@@ -123,10 +123,12 @@ def nearest(name: str, known: Iterable[str], count: int = 3) -> str:
     ' Did you mean KinematicLinear3D8N?'
     >>> nearest("HHT", ["hht"])
     ' Did you mean hht?'
+    >>> nearest("z++", ["z+", "z+"])
+    ' Did you mean z+?'
     """
     from difflib import get_close_matches
 
-    known = list(known)
+    known = list(dict.fromkeys(known))
     if RENAMED.get(name) in known:
         return f" It is called {RENAMED[name]} here."
     close = get_close_matches(name, known, n=count, cutoff=0.6)

@@ -135,7 +135,8 @@ def whole_numbers(
         return array
     low, high = (int(array.min()), int(array.max())) if array.size else (0, -1)
     if size is not None and not 0 <= low <= high + 1 <= size:
-        raise error(f"{what} must lie in 0 … {size - 1}; got {low} … {high}")
+        found = f"{low}" if low == high else f"{low} … {high}"
+        raise error(f"{what} must lie in 0 … {size - 1}; got {found}")
     ends = np.iinfo(dtype)
     if low < ends.min or high > ends.max:
         raise error(f"{what} must be below 2^{ends.bits - 1}; got {high}")

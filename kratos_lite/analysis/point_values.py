@@ -30,6 +30,10 @@ class PointValues:
         self._located = located
         self._recovered = recovered
 
+    def __repr__(self) -> str:
+        name, shape = type(self).__name__, self.points.shape
+        return f"{name} at points {shape}: displacement, strain, stress, von_mises, ..."
+
     @property
     def points(self) -> Array:
         """The points (..., 3) in m."""

@@ -163,6 +163,8 @@ class Result(ElementFields, Tabular):
         >>> beam.fix("x-", "xyz")
         >>> beam.fix("x+", "x", 1e-3 * (y[beam.mesh.nodes("x+"), None] - 0.25))
         >>> line = beam.solve().along((0.5, 0, 0.5), (0.5, 1, 0.5), n=3)
+        >>> line
+        LineValues at points (3, 3): displacement, strain, stress, von_mises, ...
         >>> line.distance.tolist(), line.stress[:, 0].round(6).tolist()
         ([0.0, 0.5, 1.0], [-250.0, 250.0, 750.0])
         >>> line.membrane[0].round(6).tolist(), line.bending[0].round(6).tolist()

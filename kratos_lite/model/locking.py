@@ -156,7 +156,7 @@ def _place(mesh: Mesh, walls: Walls, size: Array) -> str:
     worst = int(np.argmax(size))
     return (
         f"such as element {mesh.element_ids[walls.element[worst]]} ({walls.length[worst]:.3g} m long, "
-        f"{walls.layers[worst]} through {walls.thickness[worst]:.3g} m)"
+        f"{walls.layers[worst]} of them through the thickness of {walls.thickness[worst]:.3g} m)"
     )
 
 

@@ -45,6 +45,8 @@ WRONG = {
     "where float": (lambda: model().fix(1.5), "nodes are chosen by part name"),
     "where row": (lambda: model().fix([99]), "node rows must lie in 0 … 26"),
     "where negative": (lambda: model().fix([-1]), "node rows must lie in 0 … 26"),
+    "where slip": (lambda: model().fix("Z++"), r"Did you mean z\+\?"),
+    "gravity number": (lambda: model().add(kl.Gravity(9.81)), "in m/s².*; got the number 9.81"),
     "where mask": (lambda: model().fix(np.ones(5, bool)), r"a node mask must have shape \(27,\)"),
     "where nothing": (lambda: model().fix(np.zeros(27, bool)), "cannot fix xyz: no node is chosen"),
     "where unknown": (lambda: model().fix("top"), "there is no part 'top'"),

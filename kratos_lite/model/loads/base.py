@@ -225,5 +225,6 @@ def vectors(values: ArrayLike, what: str, shapes: str, dimensions: tuple[int, ..
     """Return vectors of the right shape."""
     array = finite(values, what)
     if array.ndim not in dimensions or array.shape[-1] != 3:
-        raise InputError(f"{what} must be {shapes}; got shape {array.shape}")
+        found = f"shape {array.shape}" if array.ndim else f"the number {array}"
+        raise InputError(f"{what} must be {shapes}; got {found}")
     return array

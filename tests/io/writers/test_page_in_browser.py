@@ -196,6 +196,11 @@ def test_the_legend_has_unit_and_range(page, result):
     assert page("return page.range[1] > 7.6e6")
 
 
+def test_what_rounding_leaves_is_0_in_the_legend(page):
+    page.set("low", "1e-14")
+    assert page("return [low.value, ticks.children[0].textContent]") == ["0", "0"]
+
+
 def test_deformation_moves_the_surface(page, result):
     base = page("return page.data.scale")
     for share in (0, 0.5, 2):

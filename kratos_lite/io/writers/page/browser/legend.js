@@ -7,8 +7,11 @@ class Legend {
 
   // Show a quantity, its unit and the lowest and highest value, with one prefix for all numbers.
   show(name, unit, [low, high]) {
-    this.power = unit ? prefixOf(Math.max(Math.abs(low), Math.abs(high))) : 0;
-    const shown = (value) => `${Number((value / 10 ** this.power).toPrecision(4))}`;
+    const largest = Math.max(Math.abs(low), Math.abs(high));
+    this.power = unit ? prefixOf(largest) : 0;
+    // What rounding leaves is 0.
+    const shown = (value) => Math.abs(value) < 1e-9 * largest ? "0"
+      : `${Number((value / 10 ** this.power).toPrecision(4))}`;
     $("quantity").textContent = name;
     $("unit").textContent = PREFIXES[this.power] + unit;
     $("ticks").replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((share) => {
