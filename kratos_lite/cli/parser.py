@@ -61,7 +61,7 @@ class Parser(argparse.ArgumentParser):
             for of, parser in self._commands().items()
         }
         homes = [of for of, names in options.items() if name in names]
-        hint = nearest(name, options[command]).replace("called ", "called --").replace("mean ", "mean --")
+        hint = re.sub(r"\b(called|mean|or) ", r"\1 --", nearest(name, options[command]))
         if homes and not hint:
             hint = f" {command} does not take it; {' and '.join(homes)} {'does' if len(homes) == 1 else 'do'}"
         return f"{word}: there is no such option.{hint}" if not homes else f"{word}:{hint}"
