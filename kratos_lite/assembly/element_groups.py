@@ -23,7 +23,7 @@ from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
-from kratos_lite.quadrature import Rule, by_order
+from kratos_lite.quadrature import Rule, by_order, rule_for
 from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
@@ -200,7 +200,9 @@ def element_groups_of(
             materials[material].check_stress()
             element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + mine
-            chosen = _rule(element, rules[rule]) if rules and rule >= 0 else element.rule
+            chosen = rules[rule] if rules and rule >= 0 else element.rule
+            if rule >= 0 or not is_of_library(element):
+                chosen = _fitting(element, chosen)
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
             stress = None if prestress is None else prestress[rows]
             found.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
@@ -242,11 +244,16 @@ def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[i
     return [(int(material[mine[0]]), int(rule[mine[0]]), mine) for mine in alike]
 
 
-def _rule(element: type[KinematicLinear], chosen: Rule | int) -> Rule:
+def _fitting(element: type[KinematicLinear], chosen: Rule | int) -> Rule:
     """Return a rule or an order of integration as a rule that fits an element."""
-    rule = by_order(element.shape.cell, chosen) if isinstance(chosen, int) else chosen
-    if abs(rule.weights.sum() / element.rule.weights.sum() - 1) > 1e-9:
-        raise InputError(f"{rule} does not fit {element.__name__}: its weights miss the volume of the cell")
+    cell = element.shape.cell
+    rule = by_order(cell, chosen) if isinstance(chosen, int) else chosen
+    total, volume = float(rule.weights.sum()), float(rule_for(cell, 1).weights.sum())
+    if not abs(total / volume - 1) <= 1e-9:
+        raise InputError(
+            f"{rule} does not fit {element.__name__}: its weights miss the volume of the cell, a {cell}: "
+            f"they sum to {total:g}, expected {volume:g}; take kratos_lite.quadrature.{cell}(degree=…)"
+        )
     return rule
 
 

@@ -112,6 +112,9 @@ class KinematicLinear(CellMass):
         super().__init_subclass__(**kwargs)
         if not (hasattr(cls, "shape") and hasattr(cls, "rule")):
             return  # a family of elements, not an element
+        if not isinstance(cls.rule, Rule):
+            expected = f"kratos_lite.quadrature.{cls.shape.cell}(degree=3)"
+            raise InputError(f"{cls.__name__}.rule must be a Rule, such as {expected}; got {short(cls.rule)}")
         cls.nodes = cls.shape.nodes
         ELEMENTS.add(cls.__name__, cls, [*cls.__dict__.get("aliases", ()), *same_names(cls.__name__)])
 

@@ -48,7 +48,8 @@ class LinearMaterial:
     Raises
     ------
     MaterialError
-        If a constant is not a finite number, the density is negative or C is not positive definite.
+        If a constant is not a finite number, the density is negative, or C is not (6, 6), symmetric and
+        positive definite.
     """
 
     density: float
@@ -84,8 +85,11 @@ class LinearMaterial:
         Raises
         ------
         MaterialError
-            If it is not.
+            If it is not, or not (6, 6) and finite.
         """
+        if self.C.shape != (6, 6) or not np.isfinite(self.C).all():
+            found = f"got shape {self.C.shape}" if self.C.shape != (6, 6) else "it holds nan or inf"
+            raise MaterialError(f"{type(self).__name__}: C must be (6, 6), finite; {found}")
         scale = np.sqrt(np.abs(np.diag(self.C)))
         scales = np.outer(scale, scale)  # a C that was turned has round-off in place of zeros
         if not (np.abs(self.C - self.C.T) <= 1e-10 * scales).all():
@@ -127,10 +131,13 @@ class LinearMaterial:
         Raises
         ------
         MaterialError
-            If the compliance is singular.
+            If the compliance is singular, or not (6, 6).
         """
+        S = np.asarray(self.compliance(), dtype=float)
+        if S.shape != (6, 6):
+            raise MaterialError(f"{type(self).__name__}: the compliance must be (6, 6); got shape {S.shape}")
         try:
-            return np.asarray(np.linalg.inv(self.compliance()), dtype=float)
+            return np.linalg.inv(S)
         except np.linalg.LinAlgError:
             raise MaterialError(f"{type(self).__name__}: the compliance is singular") from None
 

@@ -40,3 +40,27 @@ def test_more_than_round_off_is_refused(row, column):
     C[row, column] = 1e4
     with pytest.raises(MaterialError, match="not symmetric"):
         law(C)
+
+
+@pytest.mark.parametrize(
+    ("C", "told"),
+    [
+        (np.eye(3), r"\(6, 6\), finite; got shape \(3, 3\)"),
+        (np.full((6, 6), np.nan), r"\(6, 6\), finite; it holds nan"),
+    ],
+)
+def test_a_C_of_another_shape_or_without_numbers_is_refused(C, told):
+    with pytest.raises(MaterialError, match=rf"^Given3D: C must be \(6, 6\), finite; {told}"):
+        law(C)
+
+
+def test_a_compliance_of_another_shape_is_refused():
+    @dataclass(frozen=True)
+    class Thin3D(LinearMaterial):
+        density: float = 0.0
+
+        def compliance(self):
+            return np.eye(3)
+
+    with pytest.raises(MaterialError, match=r"^Thin3D: the compliance must be \(6, 6\); got shape \(3, 3\)"):
+        Thin3D()

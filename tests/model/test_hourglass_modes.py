@@ -5,7 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.model import hourglass_modes
-from kratos_lite.quadrature import hexahedron, tetrahedron
+from kratos_lite.quadrature import hexahedron, tetrahedron, wedge
 from kratos_lite.records import replace
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
@@ -134,3 +134,16 @@ def test_elements_of_the_library_are_not_checked(monkeypatch):
     for name in kl.ELEMENTS:
         if name.startswith("KinematicLinear3D"):
             cantilever(kl.ELEMENTS[name], (2, 1, 1)).check()
+
+
+@pytest.mark.parametrize("rule", [wedge(degree=2), tetrahedron(degree=2)])
+def test_an_own_rule_of_another_cell_is_refused_with_both_volumes(rule):
+    element = own(kl.KinematicLinear3D8N, rule=rule)
+    with pytest.raises(kl.InputError, match=r"^Rule.* does not fit Own: .* sum to .*, expected 8; take "):
+        cantilever(element).solve()
+
+
+@pytest.mark.parametrize("rule", [None, (np.zeros((1, 3)), np.array([8.0])), hexahedron])
+def test_an_own_rule_that_is_none_is_refused_with_its_class(rule):
+    with pytest.raises(kl.InputError, match=r"^Own\.rule must be a Rule, .*hexahedron\(degree=3\); got"):
+        own(kl.KinematicLinear3D8N, rule=rule)
