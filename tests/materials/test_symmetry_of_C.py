@@ -45,8 +45,8 @@ def test_more_than_round_off_is_refused(row, column):
 @pytest.mark.parametrize(
     ("C", "told"),
     [
-        (np.eye(3), r"\(6, 6\), finite; got shape \(3, 3\)"),
-        (np.full((6, 6), np.nan), r"\(6, 6\), finite; it holds nan"),
+        (np.eye(3), r"got shape \(3, 3\)"),
+        (np.full((6, 6), np.nan), "it holds nan"),
     ],
 )
 def test_a_C_of_another_shape_or_without_numbers_is_refused(C, told):
