@@ -164,7 +164,9 @@ def check_picture(path: str | Path) -> str:
 
     Raises InputError for a type that cannot be written, KratosLiteError where matplotlib is missing.
     """
-    kind, known = Path(path).suffix[1:].lower() or "png", file_types()
+    kind, known = Path(path).suffix[1:].lower(), file_types()
+    if not kind:
+        raise InputError(f"{path}: give the picture an ending that says its format, such as .png")
     if kind not in known:
         raise InputError(f"{path}: pictures cannot be written as .{kind}; known are {' '.join(known)}")
     return kind

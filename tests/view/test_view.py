@@ -120,6 +120,9 @@ def test_a_mesh_without_surface_is_refused(tmp_path):
 def test_an_unknown_ending_names_the_known_ones(cube, tmp_path):
     with pytest.raises(InputError, match=r"cannot be written as \.bmpx; known are .*pdf.* png"):
         kl.plot(cube, tmp_path / "a.bmpx")
+    with pytest.raises(InputError, match=r"an ending that says its format, such as \.png"):
+        kl.plot(cube, tmp_path / "a")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_matplotlib_the_cure_is_named(cube, tmp_path, monkeypatch):
