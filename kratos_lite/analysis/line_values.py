@@ -122,12 +122,12 @@ class LineValues(PointValues):
         Raises
         ------
         InputError
-            There are no such values, or the file cannot be written.
+            There are no such values, the size is none, or the file cannot be written.
         KratosLiteError
             matplotlib is missing.
         """
         from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
-        from kratos_lite.view.canvas import save
+        from kratos_lite.view.canvas import checked_size, save
         from kratos_lite.view.curves import curves_figure
 
         choice(values, "values", [name for name in NAMES if name not in ("reaction", "error")])
@@ -140,7 +140,9 @@ class LineValues(PointValues):
             i = COMPONENTS.index(values[1:])
             curves["membrane and bending"] = self.linear[:, i]
             curves["membrane"] = np.full(len(self.distance), self.membrane[i])
-        figure = curves_figure(self.distance, curves, unit=shown.unit, title=title, size=size)
+        figure = curves_figure(
+            self.distance, curves, unit=shown.unit, title=title, size=checked_size(size) or (6, 4)
+        )
         if path is not None:
             save(figure, path)
         return figure

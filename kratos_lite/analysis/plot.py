@@ -111,7 +111,7 @@ def plot(
     if path is not None:
         canvas.check_picture(path)
     given = {name: value for name, value in locals().items() if name not in ("thing", "path")}
-    figure = _figure(thing, given)
+    figure = _figure(thing, {**given, "size": canvas.checked_size(size)})
     if path is not None:
         canvas.save(figure, path)
     return figure
@@ -175,6 +175,7 @@ def animate(
     from kratos_lite.view.animation import check_animation, write_animation  # still pictures need none
 
     check_animation(path)
+    given["size"] = canvas.checked_size(size)
     number(fps, "fps", above=0, unit="1/s")
     most = whole_number(OF_STATES if frames is None else frames, "frames", least=2)
     if isinstance(thing, Body):

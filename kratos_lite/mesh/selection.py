@@ -23,6 +23,8 @@ WhereElements: TypeAlias = "str | int | ArrayLike | None"
 
 AT_NODE = 1e-6
 """Distance from a point up to which a node lies at it, as share of the size of the mesh."""
+ONE_PLACE = 1e-9
+"""Distance between nodes at one place, as share of the size of the mesh."""
 SIDES = {letter + sign: (axis, end) for axis, letter in enumerate("xyz") for end, sign in enumerate("-+")}
 """Names of the sides of the bounding box: axis and end."""
 
@@ -107,8 +109,9 @@ def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
     if not len(points):
         return NO_ROWS, "there are no nodes"
     distance = np.linalg.norm(points - point, axis=1)
-    rows = np.flatnonzero(distance <= AT_NODE * float(np.linalg.norm(np.ptp(points, axis=0))))
-    near = int(distance.argmin())
+    near, size = int(distance.argmin()), float(np.linalg.norm(np.ptp(points, axis=0)))
+    # all at one place, but not the other side of a thin plate
+    rows = np.flatnonzero(distance <= min(AT_NODE * size, distance[near] + ONE_PLACE * size))
     text = f"the nearest node is that at {points[near].tolist()} m (row {near}), {distance[near]:.3g} m away"
     return rows[np.argsort(distance[rows], kind="stable")], text
 

@@ -12,7 +12,7 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import ELEMENTS
 from kratos_lite.elements.overridden_steps import MECHANICS, brought
 from kratos_lite.elements.tables import tabulate
-from kratos_lite.errors import MeshError, ModelError
+from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.spurious_modes import has_chains
@@ -36,7 +36,12 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
     cells = (X, X + np.random.default_rng(3).uniform(-size, size, X.shape))
     found = []
     for cell in cells:
-        K = element(cell, rule).stiffness(C)
+        K = np.asarray(element(cell, rule).stiffness(C))
+        if K.shape != (X.size, X.size):
+            raise InputError(
+                f"{element.__name__}.stiffness must return shape {(X.size, X.size)} here; got {K.shape}; "
+                "see docs/howto/own-element.md"
+            )
         if not np.isfinite(K).all():
             return 0  # what is no number is found by other checks
         values = np.linalg.eigvalsh((K + K.T) / 2)

@@ -95,6 +95,6 @@ def box_corners(low: Array, high: Array) -> Array:
 def window_of(points: Any) -> tuple[Array, Array]:
     """Return lower left and upper right of points (n, 2), never without area."""
     low, high = points.min(axis=0), points.max(axis=0)
-    size = max(float((high - low).max()), 1e-300)
+    size = max(float((high - low).max()), 1e-12 * float(np.abs(points).max()), 1e-300)
     thin = np.maximum(0.004 * size - (high - low), 0.0) / 2
     return low - thin - 0.002 * size, high + thin + 0.002 * size

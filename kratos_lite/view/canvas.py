@@ -12,9 +12,12 @@ from kratos_lite.atomic import write_whole
 from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array
+from kratos_lite.validation import finite, short
 
 DPI = 150
 """Dots per inch."""
+LARGEST = 100
+"""Width and height of a figure in inches."""
 
 
 def _canvas() -> Any:
@@ -149,6 +152,16 @@ def pixels(figure: Any) -> Any:
     """Return a figure as an array (height, width, 3) uint8, a copy."""
     figure.canvas.draw()
     return np.array(figure.canvas.buffer_rgba())[..., :3]
+
+
+def checked_size(size: Any) -> tuple[float, float] | None:
+    """Return the width and height in inches that were given, if any."""
+    if size is None:
+        return None
+    width, height = finite(size, "size, width and height in inches,", (2,)).tolist()
+    if not (0 < width <= LARGEST and 0 < height <= LARGEST):
+        raise InputError(f"size: width and height are > 0 and up to {LARGEST} inches; got {short(size)}")
+    return width, height
 
 
 # ---- files -----------------------------------------------------------------------------------------

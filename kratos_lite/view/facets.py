@@ -117,7 +117,7 @@ def _of_block(
         _light(normal[front]),
         _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front],
     )
-    facing = front.reshape(len(block), -1).any(axis=1)
+    facing = front.reshape(len(block), len(corners)).any(axis=1)
     N_rim = block.shape.N(_rim(block.shape, n))
     E = np.einsum("spa,mad->mspd", N_rim, x[block.nodes[facing]]).reshape(-1, 2, 3)
     P = P[front]

@@ -122,7 +122,13 @@ def scene_of(subjects: Sequence[Subject], options: Options) -> Scene:
     )
     scene.window = window_of(np.concatenate([drawn_points(scene, subject) for subject in subjects]))
     if options.zoom is not None:
-        scene.window = _zoomed(scene, options.zoom)
+        whole, scene.window = scene.window, _zoomed(scene, options.zoom)
+        if ((scene.window[0] > whole[1]) | (scene.window[1] < whole[0])).any():
+            low, high = points.min(axis=0), points.max(axis=0)
+            raise InputError(
+                "zoom leaves nothing to draw: seen from there, it lies beside the body, which spans "
+                f"{_place(low)} … {_place(high)} m"
+            )
     if plane is not None:
         plane.check(points)
     return scene
@@ -167,6 +173,10 @@ def colors_of(subjects: Sequence[Subject], clim: tuple[float, float] | None) -> 
         low, high = clim
         log = log and low > 0
     return canvas.color_scale(low, high, log=log)
+
+
+def _place(point: Array) -> str:
+    return f"({', '.join(f'{x:.5g}' for x in point)})"
 
 
 def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:

@@ -64,3 +64,9 @@ def test_a_support_and_a_displacement_at_a_point():
     model.fix("x-")
     model.fix((2.0, 0.0, 0.0), "z", 1e-3)
     assert model.solve().displacement((2.0, 0.0, 0.0))[0, 2] == 1e-3
+
+
+def test_a_point_on_a_thin_plate_does_not_choose_its_other_side():
+    plate = kl.box((1e3, 1e3, 1e-3), cells=(2, 2, 2))
+    for row, point in enumerate(plate.points):
+        assert plate.nodes(tuple(map(float, point))).tolist() == [row]

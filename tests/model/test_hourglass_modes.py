@@ -147,3 +147,14 @@ def test_an_own_rule_of_another_cell_is_refused_with_both_volumes(rule):
 def test_an_own_rule_that_is_none_is_refused_with_its_class(rule):
     with pytest.raises(kl.InputError, match=r"^Own\.rule must be a Rule, .*hexahedron\(degree=3\); got"):
         own(kl.KinematicLinear3D8N, rule=rule)
+
+
+def test_a_stiffness_of_another_shape_is_refused_by_its_name():
+    class Short(kl.KinematicLinear3D8N):
+        def stiffness(self, C):
+            return super().stiffness(C)[:5]
+
+    with pytest.raises(
+        kl.InputError, match=r"Short\.stiffness must return shape \(24, 24\) here; got \(5, 24\)"
+    ):
+        cantilever(Short).solve()

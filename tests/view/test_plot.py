@@ -386,3 +386,32 @@ print(plt.get_fignums())
 def test_a_window_has_an_area_whatever_lies_in_it():
     low, high = window_of(np.array([[1.0, 2.0], [1.0, 5.0]]))
     assert ((high - low) > 0).all()
+
+
+@pytest.mark.parametrize("size", [(0, 0), (1,), "a", (1e6, 1e6), (-1, 2), (np.nan, 1), 5])
+def test_a_size_that_is_none_is_refused(result, size, tmp_path):
+    with pytest.raises(kl.InputError, match="size"):
+        kl.plot(result, size=size)
+    with pytest.raises(kl.InputError, match="size"):
+        kl.animate(tmp_path / "a.gif", result, size=size)
+    with pytest.raises(kl.InputError, match="size"):
+        result.along((0, 0, 0), (1, 0, 0)).plot(size=size)
+
+
+def test_a_zoom_beside_the_body_is_refused_with_where_it_is(result):
+    with pytest.raises(kl.InputError, match=r"beside the body, which spans \(0, 0, 0\) … \(4, 1, 1\) m"):
+        kl.plot(result, zoom=((9, 9, 9), (10, 10, 10)))
+
+
+def test_a_window_on_a_gap_between_faces_is_empty(result):
+    window = (np.array([90.0, 90.0]), np.array([91.0, 91.0]))
+    found = facets_of(
+        result.mesh, result.mesh.points, None, rows_of("iso", result.mesh.points), None, 100, window
+    )
+    assert len(found.corners) == 0
+
+
+@pytest.mark.parametrize("place", [0.0, 1.0, 1e8])
+def test_a_mesh_collapsed_to_a_point_is_drawn(place):
+    mesh = kl.Mesh(np.full((8, 3), place), {"KinematicLinear3D8N": [list(range(8))]})
+    assert np.isfinite(kl.plot(mesh).get_size_inches()).all()
