@@ -200,8 +200,10 @@ def element_groups_of(
             materials[material].check_stress()
             element = element_of(block.name, formulation, materials[material].C, unnamed)
             rows = at.start + mine
-            chosen = rules[rule] if rules and rule >= 0 else element.rule
-            if rule >= 0 or not is_of_library(element):
+            chosen = element.rule
+            if rules and rule >= 0:
+                chosen = _fitting(element, rules[rule])
+            elif not is_of_library(element):
                 chosen = _fitting(element, chosen)
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
             stress = None if prestress is None else prestress[rows]

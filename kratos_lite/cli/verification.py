@@ -13,7 +13,8 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.errors import InputError
 from kratos_lite.testing.files import MODULE, REGISTRIES, beside, run_module
 from kratos_lite.verification import page
-from kratos_lite.verification.problem import Row
+from kratos_lite.verification.meshes import short
+from kratos_lite.verification.problem import ELEMENTS, Row
 from kratos_lite.verification.table import chosen, verify
 
 EXIT_FAILED = 1
@@ -56,18 +57,22 @@ def _elements_of(path: Path) -> list[str]:
 def _printed(names: list[str], elements: list[str]) -> list[Row]:
     """Print failures as they come and the other rows at the end, also after Ctrl-C."""
     rows: list[Row] = []
-    print(page.HEADER)
+    told: set[str] = set()
+    width = max([9, *(len(short(name)) + 1 for name in elements or ELEMENTS)])
+    print(page.header(width))
     try:
         with shown() as progress:
             for row in verify(names, elements, progress):
                 rows.append(row)
                 if row.failed:
                     with progress.hidden() if progress else nullcontext():
-                        print(page.line(row), flush=True)
+                        print(page.line(row, width, row.note in told), flush=True)
+                    told.add(row.note)
     finally:
         for row in rows:
             if not row.failed:
-                print(page.line(row))
+                print(page.line(row, width, row.note in told))
+                told.add(row.note)
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Quadrature: for each cell the rule with the fewest points that has at least a given degree."""
+"""Quadrature: for each cell a rule that has at least a given degree."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.quadrature import gauss
 from kratos_lite.quadrature.base import Rule
 from kratos_lite.typing import Array
+from kratos_lite.validation import whole_number
 
 __all__ = [
     "CELLS",
@@ -29,10 +30,18 @@ __all__ = [
     "wedge",
 ]
 
+MAX_DEGREE = 40
+"""Of the rules that there are."""
+
 
 def _points_for(degree: int) -> int:
     """Return how many Gauss points one direction needs for `degree`."""
-    return degree // 2 + 1
+    return _checked(degree) // 2 + 1
+
+
+def _checked(degree: int) -> int:
+    """Return a degree; raise InputError unless it is a whole number from 0 to 40."""
+    return whole_number(degree, "the degree of a rule", least=0, most=MAX_DEGREE)
 
 
 def _orbits(d: int, orbits: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[Array, Array]:
@@ -53,21 +62,68 @@ def point(degree: int = 0) -> Rule:
 
 @lru_cache
 def line(degree: int) -> Rule:
-    """Return the Gauss-Legendre rule on [-1, 1]."""
+    """Return the Gauss-Legendre rule on [-1, 1].
+
+    Parameters
+    ----------
+    degree : 0 … 40; n points have 2 n - 1.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
+    """
     n = _points_for(degree)
     return Rule(*gauss.tensor_product(n, 1), 2 * n - 1, f"Gauss-Legendre {n}")
 
 
 @lru_cache
 def quadrilateral(degree: int) -> Rule:
-    """Return the Gauss-Legendre product on [-1, 1]^2."""
+    """Return the Gauss-Legendre product on [-1, 1]^2.
+
+    Parameters
+    ----------
+    degree : 0 … 40; n² points have 2 n - 1 in each direction.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
+    """
     n = _points_for(degree)
     return Rule(*gauss.tensor_product(n, 2), 2 * n - 1, f"Gauss-Legendre {n}x{n}")
 
 
 @lru_cache
 def hexahedron(degree: int) -> Rule:
-    """Return the Gauss-Legendre product on [-1, 1]^3."""
+    """Return the Gauss-Legendre product on [-1, 1]^3.
+
+    Parameters
+    ----------
+    degree : 0 … 40; n³ points have 2 n - 1 in each direction.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
+
+    Examples
+    --------
+    >>> [len(hexahedron(degree)) for degree in (1, 3, 5)]
+    [1, 8, 27]
+    """
     n = _points_for(degree)
     return Rule(*gauss.tensor_product(n, 3), 2 * n - 1, f"Gauss-Legendre {n}x{n}x{n}")
 
@@ -78,8 +134,21 @@ def triangle(degree: int) -> Rule:
 
     Source: Dunavant, Int. J. Numer. Meth. Eng. 21 (1985) 1129-1148; closed forms after Radon
     (degree 5) and Lyness & Jespersen (degree 4).
+
+    Parameters
+    ----------
+    degree : 0 … 40; total, of r and s together.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
     """
-    if degree <= 1:
+    if _checked(degree) <= 1:
         return Rule(*_orbits(2, [(1.0, (1 / 3,) * 3)]), 1, "centroid")
     if degree <= 2:
         return Rule(*_orbits(2, [(1 / 3, (2 / 3, 1 / 6, 1 / 6))]), 2, "Strang-Fix 3")
@@ -106,8 +175,21 @@ def tetrahedron(degree: int) -> Rule:
 
     All weights are positive.  Source: Stroud, Approximate Calculation of Multiple Integrals
     (1971): T3:2-1, conical product, T3:5-1.
+
+    Parameters
+    ----------
+    degree : 0 … 40; total, of r, s and t together.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
     """
-    if degree <= 1:
+    if _checked(degree) <= 1:
         return Rule(*_orbits(3, [(1.0, (1 / 4,) * 4)]), 1, "centroid")
     if degree <= 2:
         a = (5 - sqrt(5)) / 20
@@ -128,7 +210,21 @@ def tetrahedron(degree: int) -> Rule:
 
 @lru_cache
 def wedge(degree: int) -> Rule:
-    """Return the product of a triangle rule and a Gauss-Legendre rule on t in [-1, 1]."""
+    """Return the product of a triangle rule and a Gauss-Legendre rule on t in [-1, 1].
+
+    Parameters
+    ----------
+    degree : 0 … 40; of the triangle, and along t.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
+    """
     return _prism(triangle(degree), line(degree))
 
 
@@ -141,7 +237,21 @@ def _prism(base: Rule, height: Rule) -> Rule:
 
 @lru_cache
 def pyramid(degree: int) -> Rule:
-    """Return the conical product on the pyramid with base [-1, 1]^2 at z = 0 and apex at z = 1."""
+    """Return the conical product on the pyramid with base [-1, 1]^2 at z = 0 and apex at z = 1.
+
+    Parameters
+    ----------
+    degree : 0 … 40; n³ points have 2 n - 1.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        The degree is no such number.
+    """
     n = _points_for(degree)
     ab, w = gauss.tensor_product(n, 2)
     z, v = gauss.jacobi(n, 2)
@@ -165,14 +275,28 @@ CELLS: dict[str, Callable[[int], Rule]] = {
 def rule_for(cell: str, degree: int) -> Rule:
     """Return the rule of a cell with at least this degree.
 
+    Parameters
+    ----------
+    cell : its name, such as ``"tetrahedron"``.
+    degree : 0 … 40.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        There is no such cell or degree.
+
+    Examples
+    --------
     >>> len(rule_for("tetrahedron", 2))
     4
     """
     if cell not in CELLS:
         raise InputError(f"there are no rules for cell {cell!r}; cells are {', '.join(CELLS)}")
-    if not 0 <= degree <= 40:
-        raise InputError(f"the degree of a rule must lie in 0 … 40; got {degree}")
-    return CELLS[cell](int(degree))
+    return CELLS[cell](_checked(degree))
 
 
 def by_order(cell: str, order: int) -> Rule:
@@ -180,6 +304,20 @@ def by_order(cell: str, order: int) -> Rule:
 
     Tetrahedra: degree = order.  Wedges: three points in each of `order` layers.  Hexahedra and
     pyramids: `order` points in each direction, degree 2·order - 1.
+
+    Parameters
+    ----------
+    cell : its name, such as ``"wedge"``.
+    order : 1 … 5.
+
+    Returns
+    -------
+    Rule
+
+    Raises
+    ------
+    InputError
+        There is no such cell or order.
     """
     if order not in (1, 2, 3, 4, 5):
         raise InputError(f"INTEGRATION_ORDER must be 1 … 5; got {order}")

@@ -125,7 +125,7 @@ def monomials(subject: CellRule) -> Measured:
         size = max(float(np.abs(rule.weights) @ np.abs(values)), abs(exact), 1e-300)
         errors[f"∫ {monomial(e)} gives {found:.17g}; exact is {exact:.17g}"] = abs(found - exact) / size
     error, text = worst(errors)
-    return Measured(error, 1e-14, f"{text} (degree claimed: {rule.degree})")
+    return Measured(error, 2e-14, f"{text} (degree claimed: {rule.degree})")
 
 
 def points_inside(subject: CellRule) -> Measured:

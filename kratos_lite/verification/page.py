@@ -66,17 +66,18 @@ def by_family(rows: Iterable[Row]) -> dict[str, list[Row]]:
 # ---- terminal ----------------------------------------------------------------------------------------
 
 
-HEADER = f"{'problem':<51} {'element':<9}{'value':>12}{'reference':>12}{'error':>11}  grade"
-"""The line above the rows in a terminal."""
+def header(width: int = 9) -> str:
+    """Return the line above the rows in a terminal; names of elements take a width."""
+    return f"{'problem':<51} {'element':<{width}}{'value':>12}{'reference':>12}{'error':>11}  grade"
 
 
-def line(row: Row) -> str:
-    """Return a row for a terminal."""
+def line(row: Row, width: int = 9, told: bool = False) -> str:
+    """Return a row for a terminal; a note that was told is not repeated."""
     error = "" if row.note else f"{row.error:9.1e}"
-    text = (
-        f"{row.problem.name:<51} {row.kind:<9}{found(row, row.value):>12}{number(row.problem.reference):>12}"
-    )
-    return f"{text}{error:>11}  {row.grade:<8}{row.note.splitlines()[0] if row.note else ''}".rstrip()
+    value, reference = found(row, row.value), number(row.problem.reference)
+    text = f"{row.problem.name:<51} {row.kind:<{width}}{value:>12}{reference:>12}{error:>11}  {row.grade:<8}"
+    note = row.note.splitlines()[0] if row.note else ""
+    return f"{text}{'as above' if told and note else note}".rstrip()
 
 
 def summary(rows: Sequence[Row]) -> str:

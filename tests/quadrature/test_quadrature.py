@@ -186,10 +186,12 @@ def test_an_integration_order_outside_one_to_five_is_refused(order):
         by_order("hexahedron", order)
 
 
-@pytest.mark.parametrize("degree", [-1, 41, float("nan")])
-def test_a_degree_outside_the_range_is_refused(degree):
-    with pytest.raises(InputError, match="the degree of a rule must lie in 0 … 40; got"):
-        rule_for("hexahedron", degree)
+@pytest.mark.parametrize("degree", [-1, 41, float("nan"), 2.5, "3", None])
+@pytest.mark.parametrize("cell", [cell for cell in CELLS if cell != "point"])
+def test_a_degree_outside_the_range_is_refused(cell, degree):
+    for rule in (CELLS[cell], lambda degree: rule_for(cell, degree)):
+        with pytest.raises(InputError, match="the degree of a rule must be a whole number from 0 to 40; got"):
+            rule(degree)
 
 
 def test_an_unknown_cell_is_refused_with_the_names_of_the_known_ones():

@@ -176,6 +176,7 @@ def test_an_error_of_the_library_is_a_row_that_fails_with_its_words():
     assert failed.failed
     assert "element 1 is inverted" in page.line(failed)
     assert "more" not in page.line(failed)
+    assert page.line(failed, told=True).endswith("FAIL    as above")
 
 
 def test_a_problem_needs_a_source_that_is_cited():
