@@ -111,7 +111,8 @@ def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
     distance = np.linalg.norm(points - point, axis=1)
     near, size = int(distance.argmin()), float(np.linalg.norm(np.ptp(points, axis=0)))
     # all at one place, but not the other side of a thin plate
-    rows = np.flatnonzero(distance <= min(AT_NODE * size, distance[near] + ONE_PLACE * size))
+    rows = np.flatnonzero(distance <= AT_NODE * size)
+    rows = rows[np.linalg.norm(points[rows] - points[near], axis=1) <= ONE_PLACE * size]
     text = f"the nearest node is that at {points[near].tolist()} m (row {near}), {distance[near]:.3g} m away"
     return rows[np.argsort(distance[rows], kind="stable")], text
 

@@ -70,3 +70,4 @@ def test_a_point_on_a_thin_plate_does_not_choose_its_other_side():
     plate = kl.box((1e3, 1e3, 1e-3), cells=(2, 2, 2))
     for row, point in enumerate(plate.points):
         assert plate.nodes(tuple(map(float, point))).tolist() == [row]
+    assert len(plate.nodes((500.0, 500.0, 2.5e-4))) == 1

@@ -70,3 +70,13 @@ def test_a_force_on_a_point_moves_a_body():
     body.add(kl.PointLoad((0.5, 0.5, 0.5), FORCE))
     (state,) = kl.integrate(body, dt=1e-3, steps=1)
     assert state is not None
+
+
+def test_a_force_within_a_thin_plate_acts_where_it_is():
+    plate = kl.box((1e3, 1e3, 1e-3), (2, 2, 1))
+    point = np.array([400.0, 500.0, 2e-4])
+    f = nodal(plate, tuple(point))
+    at_corner = nodal(plate, (500.0, 500.0, 2e-4))
+    assert abs(f.sum(axis=0) - FORCE).max() < 1e-12 * abs(FORCE).max()
+    assert abs(plate.points[:, 2] @ f - point[2] * FORCE).max() < 1e-9 * 1e-3 * abs(FORCE).max()
+    assert abs(plate.points[:, 2] @ at_corner - point[2] * FORCE).max() < 1e-9 * 1e-3 * abs(FORCE).max()

@@ -10,7 +10,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.mesh import Mesh, Where
-from kratos_lite.mesh.selection import nodes_at, point_of
+from kratos_lite.mesh.selection import ONE_PLACE, nodes_at, point_of
 from kratos_lite.model.loads.base import Load, vectors
 from kratos_lite.typing import Array, Ints
 
@@ -85,9 +85,12 @@ def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
     """Return the nodes (k,) on which a force on a point acts, and its share (k,) on each."""
     rows, nearby = nodes_at(point, mesh.points)
     rows = rows[mesh.used_nodes()[rows]][:1] if len(rows) else rows
-    if len(rows):
+    off = float(np.linalg.norm(mesh.points[rows] - point)) if len(rows) else np.inf
+    if off <= ONE_PLACE * float(np.linalg.norm(np.ptp(mesh.points, axis=0))):
         return rows, np.ones(1)
     found = mesh.locate(point)
+    if not found.inside and len(rows):
+        return rows, np.ones(1)
     if not found.inside:
         raise MeshError(f"a point load at {point.tolist()} m acts outside the mesh; {nearby}")
     return found.nodes_and_weights()
