@@ -29,10 +29,11 @@ class Registry(Generic[T]):
 
     Examples
     --------
-    >>> colors = Registry[int]("color")
-    >>> colors.add("red", 1, aliases=["rouge"])
-    >>> colors["rouge"], sorted(colors)
-    (1, ['red'])
+    >>> class Red: ...
+    >>> colors = Registry[type]("color")
+    >>> colors.add("red", Red, aliases=["rouge"])
+    >>> colors["rouge"].__name__, sorted(colors)
+    ('Red', ['red'])
     """
 
     def __init__(self, kind: str) -> None:
@@ -113,9 +114,10 @@ class Registry(Generic[T]):
     def temporary(self) -> Iterator[None]:
         """Forget, on leaving, whatever was registered or replaced inside the ``with`` block.
 
-        >>> colors = Registry[int]("color")
+        >>> class Red: ...
+        >>> colors = Registry[type]("color")
         >>> with colors.temporary():
-        ...     colors.add("red", 1)
+        ...     colors.add("red", Red)
         >>> "red" in colors
         False
         """

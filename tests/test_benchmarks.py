@@ -340,7 +340,7 @@ def test_command_writes_results_and_the_page(tmp_path, monkeypatch, capsys):
     page = (tmp_path / "p.md").read_text()
     assert "| manufactured | 1 % | " in page
     assert "- manufactured: " in page
-    assert "![manufactured: error over seconds](images/benchmarks/manufactured.png)" in page
+    assert "![manufactured: error over seconds](../images/benchmarks/manufactured.png)" in page
     assert (tmp_path / "manufactured.png").read_bytes().startswith(b"\x89PNG")
     assert "seconds" in capsys.readouterr().out.lower()
 

@@ -32,8 +32,8 @@ class PointLoad(Load):
     Examples
     --------
     >>> from kratos_lite import box
-    >>> PointLoad((0.5, 0.5, 1.0), (0, 0, -8.0)).forces(box(), [])[:, 2].tolist()
-    [0.0, -2.0, 0.0, -2.0, 0.0, -2.0, 0.0, -2.0]
+    >>> PointLoad((0.5, 0.5, 1.0), (0, 0, -8.0)).forces(box(), [])[:, 2].astype(int).tolist()
+    [0, -2, 0, -2, 0, -2, 0, -2]
     """
 
     def __init__(self, where: Where, force: ArrayLike) -> None:
