@@ -95,6 +95,16 @@ class Orthotropic3D(LinearMaterial):
         return S
 
     def elasticity(self) -> Array:
-        """Return the inverse of the compliance, made exactly symmetric."""
+        """Return the inverse of the compliance, made exactly symmetric.
+
+        Returns
+        -------
+        (6, 6) float, Pa
+
+        Raises
+        ------
+        MaterialError
+            If the compliance is singular.
+        """
         C = super().elasticity()
         return (C + C.T) / 2
