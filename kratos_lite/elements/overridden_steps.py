@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
 
@@ -75,7 +75,7 @@ def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Arr
 
     if not takes_many(cls):
         return np.stack([alone(e) for e in range(len(cells))]).reshape(*lead, *tail)
-    many = _checked(getattr(element, name)(*given), cls, name, (*lead, *tail))
+    many = _checked(_of_many(element, name, given), cls, name, (*lead, *tail))
     if name not in compared:
         compared.add(name)
         rows = many.reshape(-1, *tail)
@@ -85,6 +85,19 @@ def run_step(element: Any, name: str, tail: tuple[int, ...], *given: Any) -> Arr
                 "X (..., n, 3), or leave out batched = True"
             )
     return many
+
+
+def _of_many(element: Any, name: str, given: tuple[Any, ...]) -> Any:
+    """Return a step of a batched class; one that was written for one element may fail with NumPy's words."""
+    try:
+        return getattr(element, name)(*given)
+    except KratosLiteError:
+        raise
+    except (ValueError, IndexError, TypeError) as error:
+        raise InputError(
+            f"{type(element).__name__}.{name} fails for many elements: {error}; write it for X (..., n, 3), "
+            "or leave out batched = True"
+        ) from error
 
 
 def _by_element(value: Any, lead: tuple[int, ...]) -> Callable[[int], Any]:
@@ -176,8 +189,11 @@ def stiffness_of(element: Any, C: Any) -> Array:
     K = run_step(element, "stiffness_by_axis", (3, n, 3, n), C) if own else element.stiffness_by_axis(C)
     miss = np.abs(K - K.transpose(*range(K.ndim - 4), -2, -1, -4, -3)).max(initial=0.0)
     if not miss <= SYMMETRIC * np.abs(K).max(initial=0.0):
+        found = f"is not symmetric (by {miss:.1e} N/m), so that it has no energy"
+        if not np.isfinite(miss):
+            found = "holds nan or inf"
         raise ModelError(
-            f"the stiffness of {type(element).__name__} is not symmetric (by {miss:.1e} N/m), so that it has "
-            "no energy; check the steps that the class overrides with kratos-lite check"
+            f"the stiffness of {type(element).__name__} {found}; check the steps that the class overrides "
+            "with kratos-lite check"
         )
     return np.asarray(K)

@@ -353,6 +353,29 @@ def test_a_batched_step_that_is_not_one_is_refused():
         cantilever("First8N").solve()
 
 
+def test_a_batched_step_that_fails_for_many_elements_is_named_with_the_cure():
+    class Single8N(PLAIN):
+        batched = True
+
+        def B_at_gauss_points(self, C):
+            B = super().B_at_gauss_points(C)
+            return B * (np.tensordot(self.dV, B, axes=1) ** 0).mean()  # dV (8,) of one element alone
+
+    with pytest.raises(
+        kl.InputError, match=r"^Single8N\.B_at_gauss_points fails for many .*leave out batched"
+    ):
+        cantilever("Single8N").solve()
+
+
+def test_a_stiffness_that_is_no_number_is_named_so():
+    class Nothing8N(PLAIN):
+        def B(self, xi):
+            return super().B(xi) * np.nan
+
+    with pytest.raises(kl.ModelError, match="the stiffness of Nothing8N holds nan or inf"):
+        cantilever("Nothing8N").solve()
+
+
 def test_an_own_b_that_is_not_that_of_the_gauss_points_gives_no_stress_at_points():
     class Two8N(PLAIN):
         def B(self, xi):
