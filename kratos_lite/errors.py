@@ -106,7 +106,7 @@ def naming(source: str) -> Iterator[None]:
         yield
     except KratosLiteError as error:
         stem = source.rpartition("/")[2].partition(".")[0]
-        if not source or f"{stem}." in str(error):
+        if not source or f"{stem}." in str(error) or str(error).startswith(f"{source}: "):
             raise
         raise type(error)(f"{source}: {error}") from None
 

@@ -15,6 +15,7 @@ import numpy as np
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
 from kratos_lite.records import Tabular
 from kratos_lite.typing import Array
+from kratos_lite.validation import short
 
 STRAIN = ("B", "B_at_gauss_points", "strain")
 """Steps to the strain; what follows has the short way of gradients where a class inherits them."""
@@ -109,7 +110,13 @@ def _by_element(value: Any, lead: tuple[int, ...]) -> Callable[[int], Any]:
 
 
 def _checked(value: Any, cls: type[Any], name: str, tail: tuple[int, ...]) -> Array:
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{cls.__name__}.{name} must return numbers of shape {tail} here; got {short(value)}; "
+            "see docs/howto/own-element.md"
+        ) from error
     if array.shape != tail:
         raise InputError(
             f"{cls.__name__}.{name} must return shape {tail} here; got {array.shape}; "

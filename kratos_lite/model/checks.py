@@ -26,8 +26,8 @@ from kratos_lite.typing import Array, Mask
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-SLOWEST, QUICKEST = 1.0, 2e4
-"""Speeds of waves in m/s: jelly is above the one, diamond below the other."""
+SLOWEST, QUICKEST = 1.0, 2.5e4
+"""Speeds of waves in m/s: jelly is above the one, diamond and graphene below the other."""
 SOFTEST, STIFFEST = 1.0, 1.2e14
 """Young's moduli in Pa: a hundredth of that of the softest gels, and a hundred times that of diamond."""
 LIGHTEST, HEAVIEST = 0.01, 2.26e6

@@ -169,3 +169,10 @@ def test_notes_are_of_materials_in_use():
     assert model.remarks()
     model.assign(kl.Isotropic3D(1e9, 0.3))
     assert not model.remarks()
+
+
+def test_the_speed_of_waves_in_graphene_is_no_warning():
+    model = kl.Model(kl.box(), kl.Isotropic3D(E=1.05e12, nu=0.17, density=2200.0))
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e6, 0.0, 0.0)))
+    assert not [text for text in model.solve().report.warnings if "waves" in text]

@@ -158,3 +158,10 @@ def test_a_stiffness_of_another_shape_is_refused_by_its_name():
         kl.InputError, match=r"Short\.stiffness must return shape \(24, 24\) here; got \(5, 24\)"
     ):
         cantilever(Short).solve()
+
+
+@pytest.mark.parametrize("wrong", ["x", [[1.0], [1.0, 2.0]]])
+def test_a_step_that_returns_no_numbers_is_refused_by_its_name(wrong):
+    element = own(kl.KinematicLinear3D8N, B=lambda self, xi: wrong)
+    with pytest.raises(kl.InputError, match=r"Own\.B must return numbers of shape \(6, 24\) here; got"):
+        cantilever(element).solve()
