@@ -67,7 +67,7 @@ def write_result_page(path: str | Path, result: Result) -> None:
     write_page(path, Content(title, "result", result.mesh, fields, [frame], "1:von Mises", result.table()))
 
 
-def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes: Complexes) -> None:
+def write_modes_page(path: str | Path, mesh: Mesh, names: Sequence[str], shapes: Array | Complexes) -> None:
     """Write the page of modes: their names and shapes (k, n, 3); the real part of φ exp(iωt) is shown."""
     largest = np.linalg.norm(shapes, axis=2).max(axis=1)
     scaled = shapes / np.where(largest > 0, largest, 1.0)[:, None, None]
