@@ -180,6 +180,7 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
     if not case.is_of_model:
         return [], checked(case)
     from kratos_lite.materials.isotropic3d import Isotropic3D
+    from kratos_lite.model.checks import LOADS_ON_SUPPORTS
 
     model, needs = case.model, list[str]()
     warnings = model.check_geometry()
@@ -195,6 +196,8 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
         except ModelError as error:
             needs += [str(error)] if str(error) not in needs else []
             cure()
+    if needs:  # the supports may be those that keep the checks going
+        warnings = [text for text in warnings if text != LOADS_ON_SUPPORTS]
     return needs, [*warnings, *model.remarks()]
 
 

@@ -36,6 +36,8 @@ HEAVY, HARD = 2300.0, 1e7
 """Above this density in kg/m³ there are concrete, rock and metals, all far stiffer than this E in Pa."""
 FOLD = 0.2
 """Share of the mean det J by which it may be negative at a node; two swapped nodes give 0.7 and more."""
+LOADS_ON_SUPPORTS = "all loads act on fixed components, so nothing moves"
+"""The warning of loads that only supports carry."""
 
 
 def checked_mesh(mesh: object) -> Mesh:
@@ -264,7 +266,7 @@ def check_loads(
     if not forces.any() and not moved:
         return ["no load acts and no displacement is prescribed, so nothing moves"]
     if not forces[~supports.fixed].any() and not moved:
-        return ["all loads act on fixed components, so nothing moves"]
+        return [LOADS_ON_SUPPORTS]
     return []
 
 

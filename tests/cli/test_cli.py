@@ -363,6 +363,13 @@ def test_check_tells_all_that_is_missing_at_once(run, box):
     assert "can still move: translation x, y, z; rotation about x, y, z" in needs[1]
 
 
+def test_check_does_not_take_the_supports_that_are_missing_for_those_that_carry_the_loads(run, box):
+    done = run("check", "box.vtu", "--material", "E=1e9,nu=0.3", "--fix", "z-:z", "--traction", "z+:0,0,-1e5")
+    assert done.code == 2
+    assert "can still move: translation x, y; rotation about z" in done.out
+    assert "nothing moves" not in done.out
+
+
 def test_check_takes_the_options_of_solve(run, box):
     words = ("box.vtu", *HELD, "--pressure", "z+:1e5", "-o", "out.vtu")
     done = run("check", *words)
