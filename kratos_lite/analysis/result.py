@@ -349,6 +349,10 @@ class Result(ElementFields, Tabular):
 
     # ---- out -----------------------------------------------------------------------------------
 
+    def _place(self, row: int) -> str:
+        (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
+        return f"{self.mesh.element_ids[row]} around {vector(self.mesh.points[nodes[0]].mean(axis=0))} m"
+
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary.
 
@@ -370,7 +374,7 @@ class Result(ElementFields, Tabular):
             ("largest displacement", largest),
             ("strain energy", f"{energy:.6e} J"),
             ("estimated error", self._stated_error()),
-            ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {mesh.element_ids[row]}"),
+            ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {self._place(row)}"),
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]

@@ -161,6 +161,8 @@ def _check(options: Namespace) -> int:
     needs, warnings = _needs(case)
     what = f"{path}: {_what(case)}{f', {case.time}' if case.time else ''}"
     lines = [f"{what}, {'cannot be solved' if needs else 'no errors'}"]
+    if case.is_of_model and case.model.mesh.n_nodes:
+        lines.append(f"extent   {dict(case.model.mesh.table())['extent']}")
     lines += [f"error    {text}" for text in needs]
     lines += [f"note     {text}" for text in warnings]
     _print([] if options.quiet else lines)
