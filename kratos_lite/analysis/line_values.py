@@ -126,12 +126,12 @@ class LineValues(PointValues):
         KratosLiteError
             matplotlib is missing.
         """
-        from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
+        from kratos_lite.analysis.named_values import NAMES, local_values  # pictures alone need these
         from kratos_lite.view.canvas import checked_size, save
         from kratos_lite.view.curves import curves_figure
 
         choice(values, "values", [name for name in NAMES if name not in ("reaction", "error")])
-        shown = named_values(_AsNodes(self), values)
+        shown = local_values(values, self.displacement, lambda: self.strain, lambda: self.stress)
         curves = {shown.title: shown.numbers}
         if shown.unit == "Pa":
             seen = np.abs(shown.numbers) > ZERO * np.abs(self.stress).max()
@@ -146,20 +146,3 @@ class LineValues(PointValues):
         if path is not None:
             save(figure, path)
         return figure
-
-
-class _AsNodes:
-    """Points in place of nodes, for what takes values by their names."""
-
-    def __init__(self, points: PointValues) -> None:
-        self._points = points
-        self.u, self.reactions, self.mesh = points.displacement, np.zeros((0, 3)), points._fields.mesh
-
-    def stress(self, at: str) -> Array:
-        return self._points.stress
-
-    def strain(self, at: str) -> Array:
-        return self._points.strain
-
-    def error(self) -> Any:
-        raise NotImplementedError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -56,21 +57,21 @@ def named_values(result: Fields, name: str) -> Values:
     if name not in NAMES:
         known = ", ".join(NAMES)
         raise InputError(f"there are no values {name!r}; there are {known}.{nearest(name, list(NAMES), 1)}")
-    title = NAMES[name]
     if name == "error":
-        return Values(result.error().per_element, title, "√J", log=True)
-    if name in MOTIONS:
-        return motion_values(result.u, name)
+        return Values(result.error().per_element, NAMES[name], "√J", log=True)
     if name == "reaction":
-        return Values(np.linalg.norm(result.reactions, axis=1), title, "N")
+        return Values(np.linalg.norm(result.reactions, axis=1), NAMES[name], "N")
+    return local_values(name, result.u, lambda: result.strain("node"), lambda: result.stress("node"))
+
+
+def local_values(name: str, u: Array, strain: Callable[[], Array], stress: Callable[[], Array]) -> Values:
+    """Return the values of displacements (n, 3), or of strains or stresses (n, 6), made if needed."""
+    if name in MOTIONS:
+        return motion_values(u, name)
     if name[0] == "e":
-        return Values(
-            _component(
-                _halved(result.strain("node")) if name[1].isdigit() else result.strain("node"), name[1:]
-            ),
-            title,
-        )
-    return Values(_component(result.stress("node"), name if len(name) > 3 else name[1:]), title, "Pa")
+        halves = np.array([1, 1, 1, 0.5, 0.5, 0.5]) if name[1].isdigit() else 1.0  # of engineering shear
+        return Values(_component(strain() * halves, name[1:]), NAMES[name])
+    return Values(_component(stress(), name if len(name) > 3 else name[1:]), NAMES[name], "Pa")
 
 
 def motion_values(u: Array, name: str) -> Values:
@@ -88,8 +89,3 @@ def _component(tensor: Array, name: str) -> Array:
     if name.isdigit():
         return voigt.principal_values(tensor)[:, int(name) - 1]
     return tensor[:, voigt.NAMES.index(name.upper())]
-
-
-def _halved(strain: Array) -> Array:
-    """Return strains with tensor shear in place of engineering shear."""
-    return strain * np.array([1, 1, 1, 0.5, 0.5, 0.5])

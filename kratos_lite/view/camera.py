@@ -13,8 +13,6 @@ from kratos_lite.validation import finite, short
 
 View: TypeAlias = "str | Sequence[float]"
 """A name of `VIEWS`, azimuth and elevation in degrees, or the direction towards the viewer."""
-ISOMETRIC: Array = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])
-"""Rows: right, up and towards the viewer."""
 OBLIQUE: Array = np.array([[0.90, 0.43, 0], [-0.13, 0.27, 0.954], [0.41, -0.86, 0.30]])
 """No two corners of a cube fall on one another."""
 VIEWS: dict[str, Sequence[float]] = {

@@ -100,6 +100,17 @@ def new_plot(size: tuple[float, float], *units: str) -> tuple[Any, Any]:
     return figure, axes
 
 
+def label(axes: Any, x: str, y: str, title: str) -> None:
+    """Write what axes for curves show, over a grid; a legend where there are several curves."""
+    axes.grid(True, color="0.92", lw=0.8)
+    axes.set_axisbelow(True)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if len(axes.lines) > 1:
+        axes.legend(fontsize=9, frameon=False)
+    axes.set_title(title, fontsize=11)
+
+
 def axes_in_inches(figure: Any, place: Any, size: Any) -> Any:
     """Return new axes with their lower left corner and size in inches."""
     width, height = figure.get_size_inches()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from kratos_lite.typing import Array
-from kratos_lite.view.canvas import new_plot
+from kratos_lite.view.canvas import label, new_plot
 
 STYLES = (("-", "#2b6ca8", 1.8), ((0, (5, 3)), "#c8442b", 1.4), ((0, (1, 2)), "0.35", 1.6))
 """Dashes, color and width of one curve after the other."""
@@ -34,14 +34,8 @@ def curves_figure(
         matplotlib is missing.
     """
     figure, axes = new_plot(size, "m", unit)
-    for (label, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
-        axes.plot(x, values, ls=dashes, color=color, lw=width, label=label)
-    axes.grid(True, color="0.92", lw=0.8)
-    axes.set_axisbelow(True)
+    for (name, values), (dashes, color, width) in zip(curves.items(), STYLES, strict=False):
+        axes.plot(x, values, ls=dashes, color=color, lw=width, label=name)
     axes.margins(x=0)
-    axes.set_xlabel("distance along the line")
-    axes.set_ylabel(next(iter(curves)))
-    if len(curves) > 1:
-        axes.legend(fontsize=9, frameon=False)
-    axes.set_title(title, fontsize=11)
+    label(axes, "distance along the line", next(iter(curves)), title)
     return figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kratos_lite.typing import Array
-from kratos_lite.view.canvas import new_log_plot
+from kratos_lite.view.canvas import label, new_log_plot
 
 LINE, GOAL = "#2b6ca8", "#c8442b"
 
@@ -45,10 +45,5 @@ def history_figure(
         axes.axhline(100 * goal, color=GOAL, lw=1.2, ls=(0, (4, 3)), label="asked for", zorder=1)
     for number, (x, y) in enumerate(zip(unknowns[shown], 100 * errors[shown], strict=True), 1):
         axes.annotate(str(number), (x, y), (4, 4), textcoords="offset points", size=8, color="0.35")
-    axes.grid(True, color="0.92", lw=0.8)
-    axes.set_axisbelow(True)
-    axes.set_xlabel("unknowns")
-    axes.set_ylabel(f"error of {of} in %" if of else "error in %")
-    axes.legend(fontsize=9, frameon=False)
-    axes.set_title(title, fontsize=11)
+    label(axes, "unknowns", f"error of {of} in %" if of else "error in %", title)
     return figure

@@ -11,7 +11,7 @@ from kratos_lite.shapes import SHAPES
 from kratos_lite.shapes.faces import Point1
 from kratos_lite.shapes.hexahedra import Hexahedron20
 from kratos_lite.shapes.tetrahedra import Tetrahedron4
-from kratos_lite.view.camera import ISOMETRIC, OBLIQUE
+from kratos_lite.view.camera import OBLIQUE, VIEWS, rows_of
 
 image = pytest.importorskip("matplotlib.image")
 
@@ -159,7 +159,12 @@ def test_gauss_points_are_marked_in_red(tmp_path):
 
 
 def test_the_view_directions_are_right_handed_and_of_unit_length():
-    np.testing.assert_allclose(ISOMETRIC @ ISOMETRIC.T, np.eye(3), atol=1e-15)
+    plate = np.array([[0.0, 0.0, 0.0], [9.0, 1.0, 0.1]])
+    for view in (None, *VIEWS, (30.0, -20.0), (1.0, 2.0, -3.0)):
+        rows = rows_of(view, plate)
+        np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-15)
+        assert np.linalg.det(rows) == pytest.approx(1)
+    isometric = np.array([[1, 1, 0], [-1, 1, 2], [1, -1, 1]]) / np.sqrt([[2], [6], [3]])  # right, up, towards
+    np.testing.assert_allclose(rows_of("iso", plate), isometric, atol=1e-15)
     np.testing.assert_allclose(OBLIQUE @ OBLIQUE.T, np.eye(3), atol=0.02)
-    assert np.linalg.det(ISOMETRIC) == pytest.approx(1)
     assert np.linalg.det(OBLIQUE) > 0.9
