@@ -19,6 +19,7 @@ FLOORS = [
     {"mesh": (0, "nodes, cells, parts")},
     {"view": (0, "pictures"), "assembly": (1, "K, M, fields at Gauss points")},
     {"solvers": (1, "K u = f, constraints, modes")},
+    {"distributed": (0, "one model over many processes")},
     {"model": (1, "loads, supports, checks")},
     {"ale": (1, "material moves through mesh"), "bodies": (2, "rigid, pseudo-rigid, FE")},
     {"analysis": (1, "static, modal, integrators")},

@@ -19,6 +19,7 @@ from kratos_lite.mesh.selection import (
     find_nodes,
     find_part,
 )
+from kratos_lite.mesh.subdomain import ALONE, Alone, Subdomain
 from kratos_lite.mesh.topology import inverted, mirror
 from kratos_lite.records import Tabular, replace
 from kratos_lite.typing import Array, Ints
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.mesh.locate import Located
+    from kratos_lite.typing import Mask
 
 PART = "kl.Part(nodes=[4, 5])"
 
@@ -47,6 +49,7 @@ class Mesh(Cells, Tabular):
     parts : named parts; a child of part ``A`` is named ``A.b``.
     source : name of the file it came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
+    subdomain : if this is what one of many processes holds of a mesh: which nodes and cells are its own.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Mesh(Cells, Tabular):
     """
 
     conditions: tuple[Block, ...]
+    subdomain: Subdomain | None
     _parts: dict[str, Part]
 
     def __init__(
@@ -75,16 +79,32 @@ class Mesh(Cells, Tabular):
         parts: Mapping[str, Part] | None = None,
         source: str = "",
         hanging: HangingNodes | None = None,
+        subdomain: Subdomain | None = None,
     ) -> None:
         super().__init__(points, blocks, node_ids, source, hanging)
         named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
-        vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
+        vars(self).update(
+            conditions=blocks_of(conditions, "conditions"), _parts=dict(named), subdomain=subdomain
+        )
         self._check_rows(self.conditions)
         self._check_parts()
+        if subdomain is not None:
+            self._check_subdomain(subdomain)
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
         state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
-        return _remade, (*state, self.hanging)
+        return _remade, (*state, self.hanging, self.subdomain)
+
+    def _check_subdomain(self, subdomain: Subdomain) -> None:
+        """Raise MeshError if there are more or fewer of anything than a subdomain is for."""
+        sizes = {
+            "nodes": (len(subdomain.owner), self.n_nodes),
+            "elements": (len(subdomain.own_elements), self.n_elements),
+            "conditions": (len(subdomain.own_conditions), self.n_conditions),
+        }
+        for what, (expected, found) in sizes.items():
+            if expected != found:
+                raise MeshError(f"a subdomain of {expected} {what} cannot be that of a mesh with {found}")
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""
@@ -135,12 +155,37 @@ class Mesh(Cells, Tabular):
             parts=self._parts if parts is None else parts,
             source=self.source,
             hanging=self.hanging,
+            subdomain=self.subdomain,
         )
 
     @property
     def n_conditions(self) -> int:
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
+
+    # ---- what is own, where many processes share the mesh ----------------------------------
+
+    @property
+    def ranks(self) -> Alone:
+        """The processes that share the mesh."""
+        return ALONE if self.subdomain is None else self.subdomain.ranks
+
+    @property
+    def own_nodes(self) -> Mask:
+        """(n,) bool, the nodes of this process: all, unless others share the mesh."""
+        return np.ones(self.n_nodes, dtype=bool) if self.subdomain is None else self.subdomain.mine
+
+    @property
+    def own_elements(self) -> Mask:
+        """(m,) bool, the elements of this process."""
+        return np.ones(self.n_elements, dtype=bool) if self.subdomain is None else self.subdomain.own_elements
+
+    @property
+    def own_conditions(self) -> Mask:
+        """(c,) bool, the conditions of this process."""
+        if self.subdomain is None:
+            return np.ones(self.n_conditions, dtype=bool)
+        return self.subdomain.own_conditions
 
     # ---- parts -----------------------------------------------------------------------------
 
@@ -376,7 +421,14 @@ class Mesh(Cells, Tabular):
 
 
 def _remade(
-    points: Array, blocks: Any, node_ids: Ints, conditions: Any, parts: Any, source: str, hanging: Any
+    points: Array,
+    blocks: Any,
+    node_ids: Ints,
+    conditions: Any,
+    parts: Any,
+    source: str,
+    hanging: Any,
+    subdomain: Any = None,
 ) -> Mesh:
     """Return a mesh from what it was made of."""
     return Mesh(
@@ -387,4 +439,5 @@ def _remade(
         parts=parts,
         source=source,
         hanging=hanging,
+        subdomain=subdomain,
     )
