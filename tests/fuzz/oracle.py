@@ -111,7 +111,8 @@ def _of_words(code: int | None, told: str, said: str, files: list[str], words: l
         found.append(f"exit code {code}: {said[-300:]}")
     if "Traceback" in said or re.search(r"\w+Warning\b", said):
         found.append(f"says {said[-300:]}")
-    if code == 2 and words[0] == "check" and "cannot be solved\nerror    " in told and not said:
+    refused = ", cannot be solved\n" in told and re.search(r"^error {4}", told, re.MULTILINE)
+    if code == 2 and words[0] == "check" and refused and not said:
         return found
     if code == 2 and said.count("error: ") != 1:
         found.append(f"exit code 2 with {said!r}")
