@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from kratos_lite.errors import MeshError
@@ -11,8 +14,13 @@ from kratos_lite.records import replace
 from kratos_lite.typing import Ints, Mask
 from kratos_lite.validation import whole_numbers
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
-def scattered(mesh: Mesh, ranks: Alone, part_of_element: Ints, layers: int = 1) -> Mesh:
+
+def scattered(
+    mesh: Mesh, ranks: Alone, part_of_element: ArrayLike, layers: int = 1, together: Sequence[Ints] = ()
+) -> Mesh:
     """Return what this rank holds of a mesh that every rank knows whole.
 
     Parameters
@@ -21,6 +29,7 @@ def scattered(mesh: Mesh, ranks: Alone, part_of_element: Ints, layers: int = 1) 
     ranks : that share it.
     part_of_element : (m,) int, the rank of each element.
     layers : of elements around the own nodes that are here, too.
+    together : rows of nodes, such as those of each constraint, that are all here if one of them is own.
 
     Returns
     -------
@@ -54,6 +63,8 @@ def scattered(mesh: Mesh, ranks: Alone, part_of_element: Ints, layers: int = 1) 
         here = _nodes_of(mesh.blocks, elements, here)
     conditions = _touching(mesh.conditions, own)
     here = _nodes_of(mesh.conditions, conditions, here)
+    for rows in together:
+        here[rows] |= own[rows].any()
     first = np.concatenate(
         [np.zeros(0, dtype=np.int64), *(_lowest(block, owner) for block in mesh.conditions)]
     )

@@ -9,6 +9,7 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import ending, input_file, read_document, write_document
 from kratos_lite.io.kratos.to_model import model_from
+from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.validation import path_of
 from kratos_lite.view.progress import watched
 
@@ -55,6 +56,7 @@ def read_case(
     strict: bool = True,
     allow_outside: bool = False,
     initial_displacement: bool = True,
+    comm: Any = None,
 ) -> Case:
     """Return what an input means: model or body, analysis, outputs and expected values.
 
@@ -67,6 +69,8 @@ def read_case(
     allow_outside : let a .json file name files outside its folder.
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
         False ignores it.
+    comm : communicator of mpi4py, such as ``MPI.COMM_WORLD``, whose ranks share the model: each gets its own
+        part of the mesh.
 
     Returns
     -------
@@ -78,28 +82,33 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
+    ranks = ALONE
+    if comm is not None:
+        from kratos_lite.distributed.communicator import ranks_of  # one process does without it
+
+        ranks = ranks_of(comm)
     path = input_file(path_of(path))
-    with watched(None, "read"):
+    with watched(None, "read"), ranks.together():
         if ending(path) == ".json":
             from kratos_lite.io.settings import read_settings
 
-            return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement)
+            return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement, ranks)
         if ending(path) == ".py":
             from kratos_lite.io.readers.script import read_script
 
             return read_script(path)
-        document = read_document(path, strict=strict)
+        document = read_document(path, strict=strict, ranks=ranks)
         model = model_from(document, materials=materials, initial_displacement=initial_displacement)
         return Case(model, files=[path])
 
 
-def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool) -> Case:
+def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool, ranks: Alone) -> Case:
     """Return the case of a JSON file; the reader is chosen by its keys."""
     if "solver_settings" in settings or "problem_data" in settings:
         from kratos_lite.io.kratos.run_file import read_kratos_project
 
         folder = Path(settings.source).parent
-        return read_kratos_project(settings, folder, outside, initial_displacement=initial)
+        return read_kratos_project(settings, folder, outside, initial_displacement=initial, ranks=ranks)
     if "properties" in settings and "model" not in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")
     if ("body" in settings or "mesh" in settings) and "model" not in settings:
@@ -108,7 +117,9 @@ def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool
         return read_body_file(settings, strict=strict)
     from kratos_lite.io.readers.run_file import read_run_file
 
-    return read_run_file(settings, strict=strict, allow_outside=outside, initial_displacement=initial)
+    return read_run_file(
+        settings, strict=strict, allow_outside=outside, initial_displacement=initial, ranks=ranks
+    )
 
 
 def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:

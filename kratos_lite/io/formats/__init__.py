@@ -9,6 +9,7 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError, naming
 from kratos_lite.io.formats.document import Document
+from kratos_lite.mesh.subdomain import ALONE, Alone
 
 PROJECT = "ProjectParameters.json"
 """The run file of Kratos, which stands for its folder."""
@@ -40,13 +41,19 @@ def _is_stem(path: Path) -> bool:
     return bool(name) and any(path.with_name(name + ending).is_file() for ending in (".elem", ".node"))
 
 
-def read_document(path: str | Path, *, strict: bool = True) -> Document:
+def read_document(path: str | Path, *, strict: bool = True, ranks: Alone = ALONE) -> Document:
     """Return what a model file says: .mdpa, any file of an .elem set or its stem, or what meshio reads.
 
-    `strict` refuses `.mdpa` rows that do not stand on lines of their own.
+    `strict` refuses `.mdpa` rows that do not stand on lines of their own.  Each of several `ranks` gets its
+    share.
     """
     with naming(str(path)):
-        return _read(Path(path), strict)
+        document = _read(Path(path), strict)
+        if ranks is ALONE:
+            return document
+        from kratos_lite.io.formats.ranks import shared  # one process does without it
+
+        return shared(document, ranks)
 
 
 def _read(path: Path, strict: bool) -> Document:

@@ -22,6 +22,7 @@ from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.readers.motion import add_motion
 from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
+from kratos_lite.mesh.subdomain import ALONE, Alone
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
@@ -44,7 +45,12 @@ OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process"
 
 
 def read_kratos_project(
-    settings: Settings, folder: Path, allow_outside: bool = False, *, initial_displacement: bool = True
+    settings: Settings,
+    folder: Path,
+    allow_outside: bool = False,
+    *,
+    initial_displacement: bool = True,
+    ranks: Alone = ALONE,
 ) -> Case:
     """Return what a Kratos run file says.
 
@@ -54,6 +60,7 @@ def read_kratos_project(
     folder : its folder.
     allow_outside : let it name files outside the folder.
     initial_displacement : as of `kratos_lite.read`; what moves starts from it.
+    ranks : that share the model.
 
     Raises
     ------
@@ -68,7 +75,7 @@ def read_kratos_project(
         notes.append(
             f"supports, loads and motion are taken at the end of the run: those at t = {times[-1]:g} s"
         )
-    document = _read_mesh(solver, folder, allow_outside, notes)
+    document = _read_mesh(solver, folder, allow_outside, notes, ranks)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
     materials = _read_materials(solver, context, document, notes)
@@ -130,12 +137,12 @@ def _check_solver(solver: Settings) -> list[str]:
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
 
 
-def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str]) -> Document:
+def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], ranks: Alone) -> Document:
     source = solver.section("model_import_settings", required=True)
     kind = source.text("input_type", "mdpa")
     source.expect(kind == "mdpa", "input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
     path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
-    document = read_document(path)
+    document = read_document(path, ranks=ranks)
     check_elements(document)
     notes += [note] if note else []
     unused = len(document.constraints)

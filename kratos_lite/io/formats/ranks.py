@@ -1,0 +1,37 @@
+"""What each of several ranks holds of a document."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.distributed.partition import parts_of
+from kratos_lite.distributed.subdomains import scattered
+from kratos_lite.io.formats.document import Constraint, Document
+from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.subdomain import Alone
+from kratos_lite.records import replace
+from kratos_lite.typing import Ints
+
+
+def shared(document: Document, ranks: Alone) -> Document:
+    """Return what this rank holds of a document that every rank has read.
+
+    Values of nodes and conditions that are elsewhere stay in it; whoever uses them skips them.
+
+    Parameters
+    ----------
+    document : the same on all ranks.
+    ranks : that share it.
+    """
+    mesh = document.mesh
+    tied = [_rows(mesh, constraint) for constraint in document.constraints]
+    own = scattered(mesh, ranks, parts_of(mesh, ranks.size), together=tied)
+    here = np.isin(mesh.node_ids, own.node_ids)
+    kept = [one for one, rows in zip(document.constraints, tied, strict=True) if here[rows].all()]
+    return replace(document, mesh=own, constraints=kept)
+
+
+def _rows(mesh: Mesh, constraint: Constraint) -> Ints:
+    """Return the rows of the nodes of a constraint, of those that exist."""
+    rows = mesh.node_rows([node for node, _ in (constraint.slave, *constraint.masters)])
+    return rows[rows >= 0]
