@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 
 class Alone:
@@ -123,7 +123,7 @@ class Subdomain:
         asked = self.ranks.exchange([self.numbers[rows] for rows in ghosts])
         return ghosts, [self.own_nodes[numbers - first] for numbers in asked]
 
-    def fetch(self, values: Array) -> Array:
+    def fetch(self, values: Numbers) -> Any:
         """Return nodal values (n, ...) with those of ghosts taken from their owners; all ranks call it."""
         ghosts, wanted = self._plan
         out = np.array(values)
