@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.mesh.subdomain import ALONE, Alone
 
 INSTALL = "python3-mpi4py of Debian or `pip install kratos-lite[mpi]`"
+SPIN, PAUSE = 1e-3, 1e-4
+"""Seconds that a rank looks for the others without a pause, and between two looks after that."""
 
 
 def world() -> Alone:
@@ -56,7 +59,14 @@ class Ranks(Alone):
     Parameters
     ----------
     comm : mpi4py communicator.
+
+    Attributes
+    ----------
+    shares : the kinds of errors that all ranks raise if one does.  Others, and Ctrl-C, may come while the
+        others wait for something else: they leave `together` at once, and who catches them ends all ranks.
     """
+
+    shares: tuple[type[BaseException], ...] = (BaseException,)
 
     def __init__(self, comm: Any) -> None:
         self.comm, self._MPI = comm, _mpi()
@@ -140,14 +150,19 @@ class Ranks(Alone):
             yield
             self.agree()
         except BaseException as error:
-            if not getattr(error, "is_shared", False):
-                self._has_anybody_failed(True)
-                raise self._shared(error) from None
-            raise
+            is_known = getattr(error, "is_shared", False)
+            if is_known or isinstance(error, KeyboardInterrupt) or not isinstance(error, self.shares):
+                raise
+            self._has_anybody_failed(True)
+            raise self._shared(error) from None
 
     def _has_anybody_failed(self, mine: bool) -> bool:
         flag = np.array([mine], dtype=np.int32)
-        self.comm.Allreduce(self._MPI.IN_PLACE, flag, self._MPI.MAX)
+        request = self.comm.Iallreduce(self._MPI.IN_PLACE, flag, self._MPI.MAX)
+        start = perf_counter()
+        while not request.Test():  # in Python, so that a signal ends a rank that waits for the others
+            if perf_counter() - start > SPIN:
+                sleep(PAUSE)
         return bool(flag[0])
 
     def _shared(self, error: BaseException | None) -> BaseException:

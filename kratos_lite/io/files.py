@@ -128,8 +128,9 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     Parameters
     ----------
     path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
-        values at points to .csv; a state to .npz, from which `read_state` reads; a model or a mesh to .mdpa,
-        an .elem set, .vtu or a format of meshio.
+        of many processes, which all call this, to .pvtu and a .vtu piece of each; values at points to .csv; a
+        state to .npz, from which `read_state` reads; a model or a mesh to .mdpa, an .elem set, .vtu or a
+        format of meshio.
     thing : a `Result`, what its `at` or `along` returns, a `State`, `Model` or `Mesh`.
     mode : of the .vtu file of a result: ``binary`` (if not given), ``compressed`` or ``ascii``.
 

@@ -59,6 +59,19 @@ def test_an_error_that_cannot_be_packed_gives_its_text(ranks):
         raise Local("my text")
 
 
+def test_what_is_not_shared_leaves_at_once(ranks):
+    """Nobody may be listening: each rank would wait for the others if it told them."""
+    picky = ranks_of(ranks.comm)
+    picky.shares = (MeshError,)
+    for alone in (ValueError, KeyboardInterrupt):
+        for rank in range(ranks.size):
+            if rank == ranks.rank:
+                with pytest.raises(alone) as caught, picky.together():
+                    raise alone
+                assert not hasattr(caught.value, "is_shared")
+            ranks.agree()
+
+
 def test_what_is_no_communicator_is_refused(ranks):
     assert type(ranks_of(None)) is Alone
     assert ranks_of(ranks) is ranks

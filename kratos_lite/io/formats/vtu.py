@@ -5,7 +5,7 @@ Source of the format and of the node orders: VTK User's Guide, "VTK File Formats
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
@@ -20,9 +20,10 @@ from kratos_lite.mesh.vtk import vtk_cells, with_shape
 from kratos_lite.native import threads
 from kratos_lite.typing import Numbers
 
-_HEAD = """<?xml version="1.0"?>
+HEAD = """<?xml version="1.0"?>
 <VTKFile type="{}" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 """
+"""First lines of a file of some type."""
 _TYPES = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "|u1": "UInt8"}
 _COMPONENTS = {3: tuple("XYZ"), 6: voigt.NAMES}
 
@@ -74,14 +75,25 @@ def write_vtu(
     """
     if Path(path).suffix.lower() == ".gz":
         raise InputError(f"{path}: ParaView reads no gzipped file; write it as .vtu")
+    write_whole(path, writer_of(path, mesh, point_data or {}, cell_data or {}, mode))
+
+
+def writer_of(
+    path: str | Path,
+    mesh: Mesh,
+    point_data: Mapping[str, Numbers],
+    cell_data: Mapping[str, Numbers],
+    mode: str = "binary",
+) -> Callable[[BinaryIO], None]:
+    """Return what writes a `.vtu` file, opened by the caller; the arguments and errors of `write_vtu`."""
     check_mode(mode)
     blocks, keep = with_shape(mesh)
-    cells = [(name, array[keep]) for name, array in _checked(cell_data or {}, mesh.n_elements, "element")]
+    cells = [(name, array[keep]) for name, array in checked(cell_data, mesh.n_elements, "element")]
     refuse_nan(path, "a coordinate", mesh.points)
-    for name, values in (*(point_data or {}).items(), *cells):
+    for name, values in (*point_data.items(), *cells):
         refuse_nan(path, name, values)
     groups = {
-        "PointData": _checked(point_data or {}, mesh.n_nodes, "node"),
+        "PointData": checked(point_data, mesh.n_nodes, "node"),
         "CellData": cells,
         "Points": [("Points", mesh.points.astype("<f8", copy=False))],
         "Cells": list(zip(CELLS, vtk_cells(blocks, mesh.n_nodes), strict=True)),
@@ -103,7 +115,7 @@ def write_vtu(
             file.writelines(pieces)
         file.write(tail.encode())
 
-    write_whole(path, write)
+    return write
 
 
 def check_mode(mode: str) -> None:
@@ -158,15 +170,15 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
     >>> write_pvd(getfixture("tmp_path") / "swing.pvd", [(0.0, "swing_0.vtu"), (0.1, "swing_1.vtu")])
     """
     sets = [
-        f'<DataSet timestep="{float(time)!r}" part="0" file="{_escaped(name)}"/>\n' for time, name in steps
+        f'<DataSet timestep="{float(time)!r}" part="0" file="{escaped(name)}"/>\n' for time, name in steps
     ]
-    text = _HEAD.format("Collection") + f"<Collection>\n{''.join(sets)}</Collection>\n</VTKFile>\n"
+    text = HEAD.format("Collection") + f"<Collection>\n{''.join(sets)}</Collection>\n</VTKFile>\n"
     write_whole(path, text.encode())
 
 
-def _checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
+def checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
     """Return arrays of (rows, …) little-endian numbers of one of the types of the file."""
-    checked = []
+    found = []
     for name, values in data.items():
         array = np.asarray(values)
         if array.ndim == 0 or len(array) != rows:
@@ -175,28 +187,28 @@ def _checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
             raise InputError(f"{name}: expected real or whole numbers; got {array.dtype}")
         small = array.dtype.kind == "b" or array.dtype == np.int32
         kind = "<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8"
-        checked.append((name, array.astype(kind, copy=False)))
-    return checked
+        found.append((name, array.astype(kind, copy=False)))
+    return found
 
 
 def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, places: Iterator[str]) -> str:
     """Return the XML up to the binary data; `places` gives for each array in turn where its numbers are."""
-    text = _HEAD.format("UnstructuredGrid")
+    text = HEAD.format("UnstructuredGrid")
     if mode == "compressed":
         text = text.replace("header_type", 'compressor="vtkZLibDataCompressor" header_type')
     text += f'<UnstructuredGrid>\n<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n'
     for group, members in groups.items():
         text += f"<{group}>\n"
         for (name, array), place in zip(members, places, strict=False):
-            text += f"<DataArray {_describe(name, array)}{place}\n"
+            text += f"<DataArray {described(name, array)}{place}\n"
         text += f"</{group}>\n"
     text += "</Piece>\n</UnstructuredGrid>\n"
     return text if mode == "ascii" else text + '<AppendedData encoding="raw">\n_'
 
 
-def _describe(name: str, array: Numbers) -> str:
+def described(name: str, array: Numbers) -> str:
     """Return type, name and, for more than one number per row, the components as XML attributes."""
-    text = f'type="{_TYPES[array.dtype.str]}" Name="{_escaped(name)}"'
+    text = f'type="{_TYPES[array.dtype.str]}" Name="{escaped(name)}"'
     if array.ndim > 1:
         count = int(np.prod(array.shape[1:]))
         text += f' NumberOfComponents="{count}"'
@@ -205,7 +217,7 @@ def _describe(name: str, array: Numbers) -> str:
     return text
 
 
-def _escaped(name: str) -> str:
+def escaped(name: str) -> str:
     """Return a name as the value of an XML attribute."""
     for sign, word in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
         name = name.replace(sign, word)

@@ -6,8 +6,10 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv")
+RESULTS = (".vtu", ".pvtu", ".vtk", ".json", ".html", ".csv")
 """Formats that keep fields on nodes; most others of meshio drop them unsaid."""
+OF_RANKS = (".pvtu", ".vtu", ".json")
+"""Formats that many processes write together: a piece of each, or sums over all."""
 SERIES = (".pvd", ".html", ".csv", ".npz")
 """Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
 
@@ -31,10 +33,20 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
         from kratos_lite.io.formats.vtu import check_mode  # rarely needed
 
         check_mode(mode)
-        if ending != ".vtu":
+        if ending not in (".vtu", ".pvtu"):
             raise InputError(
                 f"{path}: only .vtu files are written as {mode}; leave the mode out, or write .vtu"
             )
+
+
+def check_result_of_ranks(path: str | Path) -> None:
+    """Raise InputError for a format that many processes cannot write."""
+    ending = Path(path).suffix.lower()
+    if ending in RESULTS and ending not in OF_RANKS:
+        raise InputError(
+            f"{path}: {ending} is written by one process, and none holds the whole result; "
+            "write .pvtu for ParaView or .json with the summary, or solve without --engine petsc"
+        )
 
 
 def check_series(path: str | Path) -> None:

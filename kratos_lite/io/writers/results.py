@@ -1,4 +1,4 @@
-"""Results to files: `.vtu` for ParaView, `.vtk`, `.json`, `.html` for the browser, `.csv` of nodes."""
+"""Results to files: `.vtu`, `.pvtu` for ParaView, `.vtk`, `.json`, `.html` for browsers, `.csv` of nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.writers.endings import check_result
+from kratos_lite.io.writers.endings import check_result, check_result_of_ranks
 from kratos_lite.io.writers.table import write_table
 
 if TYPE_CHECKING:
@@ -19,9 +19,19 @@ if TYPE_CHECKING:
 
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu (in one of its modes), .vtk, .json, .html or .csv."""
+    """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv.
+
+    Of a result of many processes, all of them call this: its .vtu is a .pvtu, too.
+    """
+    ending, is_of_many = Path(path).suffix.lower(), result.mesh.ranks.size > 1
+    if is_of_many:
+        check_result_of_ranks(path)
     check_result(path, mode)
-    ending = Path(path).suffix.lower()
+    if ending == ".pvtu" or (is_of_many and ending == ".vtu"):
+        from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
+
+        write_pieces(path, result, mode or "binary")
+        return
     if ending == ".json":
         write_json(path, result)
         return

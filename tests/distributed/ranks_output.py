@@ -1,0 +1,152 @@
+"""Files that ranks write together."""
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from tempfile import mkdtemp
+
+import meshio
+import numpy as np
+import pytest
+
+import kratos_lite as kl
+from kratos_lite.analysis.fields import fields
+from kratos_lite.analysis.result import Result
+from kratos_lite.distributed.subdomains import scattered
+from kratos_lite.errors import InputError, SolveError
+
+LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
+
+
+def random(mesh, size):
+    return np.random.default_rng(7).integers(size, size=mesh.n_elements)
+
+
+def first_rank_only(mesh, size):
+    return np.zeros(mesh.n_elements, dtype=int)
+
+
+def whole_result(element="KinematicLinear3D8N"):
+    mesh = kl.box((2, 1, 1), (4, 3, 2), element=element)
+    model = kl.Model(mesh, LAW)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e6, 0.0, 2e6)))
+    return model.solve()
+
+
+def shared(ranks, result, parts):
+    """The displacements and reactions of a result on what each rank holds of its mesh; ghosts are wrong."""
+    mesh = scattered(result.mesh, ranks, parts)
+    rows = result.mesh.node_rows(mesh.node_ids)
+    groups = kl.Model(mesh, LAW).element_groups() if mesh.n_elements else []
+    reactions = np.where(mesh.own_nodes[:, None], result.reactions[rows], 1e30)
+    return Result(mesh, groups, result.u[rows], reactions, result.loads[rows], result.report)
+
+
+def folder_of_all(ranks):
+    return Path(ranks.first(mkdtemp() if ranks.rank == 0 else None))
+
+
+def pieces_of(path):
+    """Return the meshes that a .pvtu file names, and the names, types and components of its arrays."""
+    (grid,) = ElementTree.parse(path).getroot()
+    described = {
+        kind.tag: {one.get("Name"): (one.get("type"), one.get("NumberOfComponents", "1")) for one in kind}
+        for kind in grid
+        if kind.tag != "Piece"
+    }
+    sources = [piece.get("Source") for piece in grid.iter("Piece")]
+    return [meshio.read(path.parent / source) for source in sources], described, sources
+
+
+def by_node(pieces, name):
+    """Return the value of each node by its id, and how far values of the same node differ."""
+    found, off = {}, 0.0
+    for piece in pieces:
+        for node, value in zip(piece.point_data["NODE_ID"], piece.point_data[name], strict=True):
+            off = max(off, float(np.abs(np.asarray(value) - found.setdefault(int(node), value)).max()))
+    return found, off
+
+
+def test_pieces_are_the_whole(ranks, cut, mode):
+    serial = whole_result()
+    result = shared(ranks, serial, cut(serial.mesh, ranks.size))
+    path = folder_of_all(ranks) / "beam.pvtu"
+    kl.write(path, result, mode)
+    pieces, described, sources = pieces_of(path)
+    assert sorted(path.parent.iterdir()) == sorted([path, *(path.parent / name for name in sources)])
+    points, cells = fields(serial)
+    assert sum(len(block.data) for piece in pieces for block in piece.cells) == serial.mesh.n_elements
+    for name in ("DISPLACEMENT", "REACTION"):
+        found, off = by_node(pieces, name)
+        values = np.array([found[node] for node in serial.mesh.node_ids.tolist()])
+        assert off == 0.0
+        assert np.array_equal(values, points[name])
+    owners, off = by_node(pieces, "PARTITION_INDEX") if ranks.size > 1 else ({}, 0.0)
+    assert off == 0.0
+    assert set(owners.values()) <= set(range(ranks.size))
+    stresses = {}
+    for piece in pieces:
+        (ids,), (found,) = piece.cell_data["ELEMENT_ID"], piece.cell_data["CAUCHY_STRESS_VECTOR"]
+        stresses |= dict(zip(ids.tolist(), found, strict=True))
+        for corner, place in zip(piece.points, piece.point_data["NODE_ID"], strict=True):
+            assert np.array_equal(corner, serial.mesh.points[place - 1])
+    values = np.array([stresses[one] for one in serial.mesh.element_ids.tolist()])
+    assert np.abs(values - cells["CAUCHY_STRESS_VECTOR"]).max() <= 1e-12 * np.abs(values).max()
+    assert described["PPointData"]["DISPLACEMENT"] == ("Float64", "3")
+    assert described["PPointData"]["NODE_ID"] == ("Int64", "1")
+    assert described["PCellData"]["CAUCHY_STRESS_VECTOR"] == ("Float64", "6")
+    assert described["PPoints"] == {"Points": ("Float64", "3")}
+
+
+test_pieces_are_the_whole.cases = [
+    (random, "binary"),
+    (random, "compressed"),
+    (random, "ascii"),
+    (first_rank_only, "binary"),
+]
+
+
+def test_over_ranks_a_vtu_file_is_a_pvtu_file(ranks):
+    serial = whole_result()
+    path = folder_of_all(ranks) / "beam.vtu"
+    kl.write(path, shared(ranks, serial, random(serial.mesh, ranks.size)))
+    names = {one.name for one in path.parent.iterdir()}
+    many = {"beam.pvtu", *(f"beam_{rank}.vtu" for rank in range(ranks.size))}
+    assert names == ({"beam.vtu"} if ranks.size == 1 else many)
+
+
+def test_formats_of_one_process_are_refused(ranks):
+    serial = whole_result()
+    result = shared(ranks, serial, random(serial.mesh, ranks.size))
+    for name in ("a.html", "a.csv", "a.vtk"):
+        if ranks.size > 1:
+            with pytest.raises(InputError, match=r"none holds the whole result; write \.pvtu"):
+                kl.write(folder_of_all(ranks) / name, result)
+
+
+def test_an_error_on_one_rank_leaves_what_was_there(ranks):
+    """A number that is not finite, on the last rank only; and a folder where a piece has to go."""
+    serial = whole_result()
+    parts = np.arange(serial.mesh.n_elements) % ranks.size
+    good = shared(ranks, serial, parts)
+    path = folder_of_all(ranks) / "beam.pvtu"
+    kl.write(path, good)
+    ranks.agree()
+    before = {one: one.read_bytes() for one in path.parent.iterdir()}
+    u = good.u.copy()
+    u[good.mesh.own_nodes & (ranks.rank == ranks.size - 1)] = np.nan
+    bad = Result(good.mesh, good.groups, u, good.reactions, good.loads, good.report)
+    with np.errstate(invalid="ignore"), pytest.raises(SolveError, match="not finite"):
+        kl.write(path, bad)
+    ranks.agree()
+    assert {one: one.read_bytes() for one in path.parent.iterdir()} == before
+    other = folder_of_all(ranks) / "beam.pvtu"
+    if ranks.rank == 0:
+        other.with_name(f"beam_{ranks.size - 1}.vtu").mkdir()
+    ranks.agree()
+    with pytest.raises(InputError, match=f"beam_{ranks.size - 1}.vtu: cannot be written: it is a folder"):
+        kl.write(other, good)
+    ranks.agree()
+    assert [one.name for one in other.parent.iterdir()] == [f"beam_{ranks.size - 1}.vtu"]
+    with pytest.raises(InputError, match="there is no folder"):
+        kl.write(other.parent / "missing" / "beam.pvtu", good)
