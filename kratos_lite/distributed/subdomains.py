@@ -1,128 +1,129 @@
-"""Subdomains of a mesh: which nodes, elements and conditions each rank holds."""
+"""Subdomains: of what ranks know of a mesh by ids, what each of them holds, with owners, numbers and halo.
+
+Each id is looked after by one rank, which the others ask: no rank sees all of the mesh.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from kratos_lite.errors import MeshError
-from kratos_lite.mesh import Block, Mesh, Part, with_rows
+from kratos_lite.distributed.halo import to_owners, with_halo
+from kratos_lite.distributed.node_directory import NodeDirectory
+from kratos_lite.distributed.pieces import Kind, Piece, aligned, check_once, parts_here
+from kratos_lite.distributed.scatter import scattered
+from kratos_lite.mesh import Block, Mesh, rows_of_ids
+from kratos_lite.mesh.blocks import ids_of
 from kratos_lite.mesh.subdomain import Alone, Subdomain
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints, Mask
-from kratos_lite.validation import whole_numbers
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+__all__ = ["grown", "piece_of", "scattered", "subdomain_mesh"]
 
 
-def scattered(
-    mesh: Mesh, ranks: Alone, part_of_element: ArrayLike, layers: int = 1, together: Sequence[Ints] = ()
-) -> Mesh:
-    """Return what this rank holds of a mesh that every rank knows whole.
+def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str = "") -> Mesh:
+    """Return what each rank holds of a mesh whose pieces the ranks give; all ranks call it.
+
+    A node is own on the rank that a piece names, or else on the lowest that gives an element at it, or else
+    on the lowest that knows it.  A condition is own on the lowest rank that owns a node of it.
 
     Parameters
     ----------
-    mesh : the same on all ranks.
-    ranks : that share it.
-    part_of_element : (m,) int, the rank of each element.
+    ranks : the communicator.
+    piece : what this rank gives.
     layers : of elements around the own nodes that are here, too.
-    together : rows of nodes, such as those of each constraint, that are all here if one of them is own.
+    source : name of the file it came from, used in messages.
 
     Returns
     -------
     Mesh
-        With the ids of the whole one; a node is own on the lowest rank that has an element at it.
+        Nodes in their order, cells of each block in theirs; all ranks have the same blocks and parts, some of
+        them empty.
 
     Raises
     ------
     MeshError
-        There is no such rank, or the mesh has hanging nodes.
+        Ranks disagree on a node, two give the same element, or nobody knows a node.
 
     Examples
     --------
     >>> from kratos_lite import box
     >>> from kratos_lite.mesh.subdomain import ALONE
-    >>> scattered(box(), ALONE, [0]).subdomain.numbers.tolist()
+    >>> subdomain_mesh(ALONE, piece_of(box())).subdomain.numbers.tolist()
     [0, 1, 2, 3, 4, 5, 6, 7]
     """
-    parts = whole_numbers(part_of_element, "ranks of elements", (mesh.n_elements,), error=MeshError)
-    if len(parts) and not 0 <= parts.min() <= parts.max() < ranks.size:
-        raise MeshError(f"elements go to the ranks 0 … {ranks.size - 1}; got {parts.min()} … {parts.max()}")
-    if mesh.hanging is not None:
-        raise MeshError("a mesh with hanging nodes cannot be shared by several ranks; solve it on one")
-    owner = _owners(mesh, parts, ranks.size)
-    numbers = np.empty(mesh.n_nodes, dtype=np.int64)
-    numbers[np.argsort(owner, kind="stable")] = np.arange(mesh.n_nodes)
-    own = owner == ranks.rank
-    here, elements = own, parts == ranks.rank
-    for _ in range(layers):
-        elements = elements | _touching(mesh.blocks, here)
-        here = _nodes_of(mesh.blocks, elements, here)
-    conditions = _touching(mesh.conditions, own)
-    here = _nodes_of(mesh.conditions, conditions, here)
-    for rows in together:
-        here[rows] |= own[rows].any()
-    first = np.concatenate(
-        [np.zeros(0, dtype=np.int64), *(_lowest(block, owner) for block in mesh.conditions)]
+    with ranks.together():
+        elements, conditions = aligned(ranks, piece.elements), aligned(ranks, piece.conditions)
+        check_once(ranks, elements, "element")
+        check_once(ranks, conditions, "condition")
+        nodes = NodeDirectory(ranks, piece)
+        elements, own = with_halo(nodes, elements, layers)
+        conditions = to_owners(nodes, conditions)
+        here, asked = nodes.ask((*elements, *conditions), np.concatenate([nodes.own, piece.wanted]))
+        order = np.argsort(asked.answer(nodes.order), kind="stable")
+        here, owner = here[order], asked.answer(nodes.owner)[order]
+        blocks, faces = _blocks(here, elements), _blocks(here, conditions)
+        lowest = [owner[block.nodes].min(axis=1, initial=ranks.size) for block in faces]
+        own_conditions = np.concatenate([np.zeros(0, dtype=np.int64), *lowest]) == ranks.rank
+        have = {"nodes": here, "elements": ids_of(blocks), "conditions": ids_of(faces)}
+        return Mesh(
+            asked.answer(nodes.points)[order],
+            blocks,
+            node_ids=here,
+            conditions=faces,
+            parts=parts_here(ranks, piece.parts, have),
+            source=source,
+            subdomain=Subdomain(ranks, owner, asked.answer(nodes.numbers)[order], own, own_conditions),
+        )
+
+
+def _blocks(node_ids: Ints, kinds: tuple[Kind, ...]) -> list[Block]:
+    """Return the blocks of kinds of cells whose nodes are all here."""
+    order = np.argsort(node_ids, kind="stable")
+    return [kind.block(rows_of_ids(node_ids, kind.nodes, order)) for kind in kinds]
+
+
+def piece_of(mesh: Mesh) -> Piece:
+    """Return what a rank has of a mesh, by ids: the nodes, and its own cells."""
+
+    def kinds(blocks: tuple[Block, ...], own: Mask) -> tuple[Kind, ...]:
+        ends = np.cumsum([0, *map(len, blocks)])
+        mine = [block.take(own[a:b]) for block, a, b in zip(blocks, ends, ends[1:], strict=False)]
+        return tuple(
+            Kind(b.name, mesh.node_ids[b.nodes], b.ids, b.properties, b.shape, b.lines, place)
+            for place, b in enumerate(mine)
+        )
+
+    ids: dict[str, Any] = {
+        "nodes": mesh.node_ids,
+        "elements": mesh.element_ids,
+        "conditions": ids_of(mesh.conditions),
+    }
+    share = mesh.subdomain
+    return Piece(
+        kinds(mesh.blocks, mesh.own_elements),
+        kinds(mesh.conditions, mesh.own_conditions),
+        mesh.node_ids,
+        mesh.points,
+        None if share is None else share.owner,
+        np.arange(mesh.n_nodes) if share is None else share.numbers,
+        {
+            name: replace(part, **{what: ids[what][getattr(part, what)] for what in ids})
+            for name, part in mesh.parts.items()
+        },
+        mesh.node_ids,
     )
-    share = Subdomain(
-        ranks,
-        owner[here],
-        numbers[here],
-        (parts == ranks.rank)[elements],
-        (first == ranks.rank)[conditions],
-    )
-    return _cut(mesh, here, elements, conditions, share)
 
 
-def _owners(mesh: Mesh, parts: Ints, size: int) -> Ints:
-    """Return the lowest rank with an element at each node; 0 for nodes without elements."""
-    owner = np.full(mesh.n_nodes, size)
-    for block, at in with_rows(mesh.blocks):
-        np.minimum.at(owner, block.nodes, parts[at, None])
-    owner[owner == size] = 0
-    return owner
+def grown(mesh: Mesh, layers: int = 2) -> Mesh:
+    """Return what a rank holds with another number of layers of elements around its own nodes.
 
+    The own nodes stand in the same order and keep their numbers; all ranks call it.
 
-def _lowest(block: Block, owner: Ints) -> Ints:
-    return owner[block.nodes].min(axis=1) if len(block) else np.zeros(0, dtype=np.int64)
-
-
-def _touching(blocks: tuple[Block, ...], nodes: Mask) -> Mask:
-    """Return which cells have one of some nodes, through all blocks."""
-    return np.concatenate([np.zeros(0, dtype=bool), *(nodes[block.nodes].any(axis=1) for block in blocks)])
-
-
-def _nodes_of(blocks: tuple[Block, ...], cells: Mask, nodes: Mask) -> Mask:
-    """Return some nodes and those of some cells."""
-    found = nodes.copy()
-    for block, at in with_rows(blocks):
-        found[block.nodes[cells[at]]] = True
-    return found
-
-
-def _cut(mesh: Mesh, nodes: Mask, elements: Mask, conditions: Mask, share: Subdomain) -> Mesh:
-    """Return the mesh of some nodes and cells; all names of blocks and parts stay."""
-    kept = {"nodes": nodes, "elements": elements, "conditions": conditions}
-    row = {what: np.cumsum(mask) - 1 for what, mask in kept.items()}
-
-    def cells(blocks: tuple[Block, ...], mask: Mask) -> list[Block]:
-        found = [(block.take(mask[at]), block) for block, at in with_rows(blocks)]
-        return [replace(one, nodes=row["nodes"][one.nodes].astype(np.int32)) for one, _ in found]
-
-    def part(whole: Part) -> Part:
-        rows = {what: getattr(whole, what) for what in kept}
-        return replace(whole, **{what: row[what][some[kept[what][some]]] for what, some in rows.items()})
-
-    return Mesh(
-        mesh.points[nodes],
-        cells(mesh.blocks, elements),
-        node_ids=mesh.node_ids[nodes],
-        conditions=cells(mesh.conditions, conditions),
-        parts={name: part(whole) for name, whole in mesh.parts.items()},
-        source=mesh.source,
-        subdomain=share,
-    )
+    Parameters
+    ----------
+    mesh : with a subdomain.
+    layers : of elements.
+    """
+    return subdomain_mesh(mesh.ranks, piece_of(mesh), layers=layers, source=mesh.source)
