@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from kratos_lite.analysis.engines import check_own
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
@@ -62,6 +63,8 @@ class Model(Structure):
         most_unknowns: int | None = None,
         geometry: Mapping[str, Callable[[Array], Array]] | None = None,
         quantity: Quantity | None = None,
+        engine: str | None = None,
+        petsc: str | None = None,
     ) -> Result:
         """Check the model and solve it: statics, or the steady state of a motion at the time 0.
 
@@ -79,6 +82,9 @@ class Model(Structure):
         quantity : with `error`: the error is that of a quantity, such as ``kl.DisplacementAt(point, "z")``,
             as `Result.error` estimates it, in place of the energy norm.  Relative to its value, which must
             not be 0.
+        engine : ``own``, or ``petsc`` for statics by PETSc, which must be installed; if not given, that
+            which takes the mesh: PETSc where several ranks share it.
+        petsc : options of PETSc, which win over what is chosen: ``"-ksp_type cg -pc_type hypre"``.
 
         Returns
         -------
@@ -101,19 +107,28 @@ class Model(Structure):
             if error is not None:
                 from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
+                check_own(self.mesh, engine, petsc, "a requested error")
                 most = UNKNOWNS if most_unknowns is None else most_unknowns
                 return solve_to(self, error, solver, tolerance, shown, most, geometry, quantity)
             if self.motion is not None:
                 from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 
+                check_own(self.mesh, engine, petsc, "a motion of the material")
                 return solve_steady(self, solver, tolerance, shown)
-            analysis = StaticAnalysis(self, solver, tolerance, shown)
-            result = analysis.solve()
-            analysis.release()  # the result keeps the analysis, which would keep the matrix
-            return result
+            analysis = StaticAnalysis(self, solver, tolerance, shown, engine=engine, petsc=petsc)
+            try:
+                return analysis.solve()
+            finally:
+                analysis.release()  # the result keeps the analysis, which would keep the matrix
 
     def static(
-        self, solver: str = "auto", tolerance: float = 1e-10, progress: Progress | None = None
+        self,
+        solver: str = "auto",
+        tolerance: float = 1e-10,
+        progress: Progress | None = None,
+        *,
+        engine: str | None = None,
+        petsc: str | None = None,
     ) -> StaticAnalysis:
         """Check the model and return its static analysis, ready for many sets of loads.
 
@@ -121,7 +136,8 @@ class Model(Structure):
 
         Parameters
         ----------
-        solver, tolerance, progress : as for `solve`.
+        solver, tolerance, progress, engine, petsc : as for `solve`.  What PETSc holds is let go of by
+            the analysis's ``release()``, on all ranks.
 
         Returns
         -------
@@ -143,7 +159,7 @@ class Model(Structure):
         >>> print(f"{pull.u[:, 2].max():.1e} m, {push.u[:, 2].min():.1e} m")
         1.0e-03 m, -2.0e-03 m
         """
-        return StaticAnalysis(self, solver, tolerance, progress)
+        return StaticAnalysis(self, solver, tolerance, progress, engine=engine, petsc=petsc)
 
     def solve_cases(
         self,
@@ -151,13 +167,16 @@ class Model(Structure):
         solver: str = "auto",
         tolerance: float = 1e-10,
         progress: Progress | None = None,
+        *,
+        engine: str | None = None,
+        petsc: str | None = None,
     ) -> dict[str, Result]:
         """Solve the model for several load cases, with one matrix.
 
         Parameters
         ----------
         cases : names and loads; each case has these loads, not those of the model.
-        solver, tolerance, progress : as for `solve`.
+        solver, tolerance, progress, engine, petsc : as for `solve`.
 
         Returns
         -------
@@ -170,10 +189,11 @@ class Model(Structure):
             As for `solve`.
         """
         with watched(progress) as shown:
-            analysis = StaticAnalysis(self, solver, tolerance, shown)
-            results = analysis.solve_cases(cases)
-            analysis.release()
-            return results
+            analysis = StaticAnalysis(self, solver, tolerance, shown, engine=engine, petsc=petsc)
+            try:
+                return analysis.solve_cases(cases)
+            finally:
+                analysis.release()
 
     def transient(self, **options: Any) -> TransientAnalysis:
         """Return the transient analysis of the model.

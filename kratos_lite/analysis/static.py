@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from kratos_lite.analysis.engines import System, displacements, engine_of, release, system_of
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
@@ -17,7 +18,7 @@ from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
-from kratos_lite.solvers.constrained_system import ConstrainedSystem, among
+from kratos_lite.solvers.constrained_system import among
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
@@ -50,10 +51,11 @@ class StaticAnalysis:
     solver : ``auto``, ``dense``, ``direct`` or ``amg``.
     tolerance : relative residual at which the iterative solver stops.
     progress : called with the phase and the share done, 0 … 1.
+    engine, petsc : see `Model.solve`.
 
     Attributes
     ----------
-    system : the `ConstrainedSystem` that is solved, or None as long as nothing has moved.
+    system : the `ConstrainedSystem` or `PetscSystem` that is solved, or None as long as nothing has moved.
 
     Raises
     ------
@@ -67,13 +69,22 @@ class StaticAnalysis:
         solver: str = "auto",
         tolerance: float = 1e-10,
         progress: Progress | None = None,
+        *,
+        engine: str | None = None,
+        petsc: str | None = None,
     ) -> None:
         check_arguments(solver, tolerance)
+        self.engine, self.petsc = engine_of(model.mesh, engine, petsc), petsc
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
-        self.model, self.solver, self.tolerance, self.progress = model, solver, tolerance, progress
-        self._phase = Phases(progress)
-        self._prepare()
+        self.model, self.solver, self.tolerance = model, solver, tolerance
+        self.ranks = model.mesh.ranks
+        self.progress = progress if self.ranks.rank == 0 else None
+        self.system: System | None = None
+        self._solved = np.zeros(0, dtype=bool)  # parts in the equations
+        self._phase = Phases(self.progress)
+        with self.ranks.together():
+            self._prepare()
 
     def solve(
         self,
@@ -103,13 +114,14 @@ class StaticAnalysis:
         SolveError
             If the accuracy asked for cannot be reached.
         """
-        self._follow()
-        case = self._load(self.model.loads if loads is None else loads)
-        if tolerance is not None:
-            check_arguments(self.solver, tolerance)
-        if start is not None:
-            start = finite(start, "start", (self.model.mesh.n_nodes, 3))
-        return self._solve(case, case.moving, tolerance, start)
+        with self.ranks.together():
+            self._follow()
+            case = self._load(self.model.loads if loads is None else loads)
+            if tolerance is not None:
+                check_arguments(self.solver, tolerance)
+            if start is not None:
+                start = finite(start, "start", (self.model.mesh.n_nodes, 3))
+            return self._solve(case, case.moving, tolerance, start)
 
     def check(self) -> list[str]:
         """Check the loads of the model, too, as a solution does, without solving.
@@ -123,17 +135,19 @@ class StaticAnalysis:
         MeshError, ModelError, InputError
             A load does not fit, or a change of the model has broken it.
         """
-        self._follow()
-        return self._warnings(self._load(self.model.loads))
+        with self.ranks.together():
+            self._follow()
+            return self._warnings(self._load(self.model.loads))
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
             raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
-        self._follow()
-        loaded = {name: self._load(loads) for name, loads in cases.items()}
-        moving = np.any([case.moving for case in loaded.values()], axis=0)
-        return {name: self._solve(case, moving) for name, case in loaded.items()}
+        with self.ranks.together():
+            self._follow()
+            loaded = {name: self._load(loads) for name, loads in cases.items()}
+            moving = np.any([case.moving for case in loaded.values()], axis=0)
+            return {name: self._solve(case, moving) for name, case in loaded.items()}
 
     # ---- what is kept from one solution to the next ------------------------------------------------
 
@@ -147,9 +161,8 @@ class StaticAnalysis:
             self._used = self.part >= 0
             self._read_supports()
             self.initial = initial_loads(model, self.groups)
-            self.system: ConstrainedSystem | None = None
+            self.release()
             self._prescribed: Array | None = None  # where it differs from that of the system
-            self._solved = np.zeros(0, dtype=bool)  # parts in the equations
             self._still = 0  # elements left out of them
             self._version = version
 
@@ -173,10 +186,10 @@ class StaticAnalysis:
         elif self._value_version != supports.value_version:
             held = self._held
             self._read_supports()
-            if not np.array_equal(held, self._held):
-                self.system = None  # elements that were left out may be needed now
+            if self.ranks.any(not np.array_equal(held, self._held)):
+                self.release()  # elements that were left out may be needed now
             if self.system:
-                self._prescribed = supports.constraint_map(self.system.nodes).c
+                self._prescribed = displacements(self.model, self.system)
 
     def _load(self, given: Load | Sequence[Load]) -> LoadSet:
         """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
@@ -193,34 +206,35 @@ class StaticAnalysis:
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
             checks.check_carried(mesh, forces, self._used)
-            moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
-            moving[self.part[(_any_axis(acts & ~fixed) | self._moved) & self._used]] = True
+            moving = self._parts_with(_any_axis(acts & ~fixed) | self._moved)
         return LoadSet(loads, external, forces, moving, phase)
+
+    def _parts_with(self, nodes: Mask) -> Mask:
+        """Return the parts with one of some own nodes, a mask (n,)."""
+        parts = np.zeros(self.ranks.max(int(self.part.max(initial=-1))) + 1, dtype=bool)
+        parts[self.part[nodes & self._used & self.model.mesh.own_nodes]] = True
+        found: Mask = self.ranks.any(parts)
+        return found
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
         idle = checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
         return self.warnings + idle + equal_loads(case.loads)
 
-    def _system_of(self, moving: Mask) -> ConstrainedSystem:
+    def _system_of(self, moving: Mask) -> System:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""
         if self.system is None or (moving & ~self._solved).any():
             model = self.model
             solved = moving if self.system is None else moving | self._solved
             parts = solved[self.part] & self._used
             every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
-            self.system = ConstrainedSystem(
-                model.mesh.points,
-                groups,
-                model.supports.constraint_map,
-                solver=self.solver,
-                tolerance=self.tolerance,
-                patterns=model.patterns,
-                progress=self.progress,
-                hanging=model.mesh.hanging,
-            )
+            self.release()
+            how = self.solver, self.tolerance, self.progress, self.engine, self.petsc
+            self.system = system_of(model, groups, *how)
             self._prescribed = None
-            self._still = sum(map(len, every)) - sum(map(len, groups))
+            own = model.mesh.own_elements
+            still = (sum(int(own[group.rows].sum()) for group in some) for some in (every, groups))
+            self._still = self.ranks.sum(next(still) - next(still))
             self._solved = solved
         return self.system
 
@@ -263,6 +277,8 @@ class StaticAnalysis:
 
     def release(self) -> None:
         """Let go of the matrix and what is made of it; another solution makes them anew."""
+        if self.system is not None:
+            release(self.system)
         self.system, self._solved = None, np.zeros(0, dtype=bool)
 
     def adjoint(self, load: Array, motion: Array) -> Array:
@@ -287,12 +303,11 @@ class StaticAnalysis:
         moved = np.where(supports.fixed, motion, 0.0)
         if motion.any() and not moved.any():
             raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
-        moving = np.zeros(int(self.part.max()) + 1, dtype=bool)
-        moving[self.part[(_any_axis(load != 0) | _any_axis(moved != 0)) & self._used]] = True
+        moving = self._parts_with(_any_axis(load != 0) | _any_axis(moved != 0))
         if not moving.any():
             return np.zeros_like(load)
         system = self._system_of(moving)
-        displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
+        displaced, at_rest = (displacements(self.model, system, u) for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
     def _initial_noise(self, forces: Array) -> float:
@@ -327,7 +342,7 @@ class StaticAnalysis:
         """Return displacements (n, 3) that are 0 but for what is prescribed."""
         return np.where(self.model.supports.fixed, self.model.supports.values, 0.0)
 
-    def _complete(self, u: Array, system: ConstrainedSystem, moving: Mask) -> Array:
+    def _complete(self, u: Array, system: System, moving: Mask) -> Array:
         """Fill in what is prescribed on nodes without equations; parts that nothing moves stay at rest."""
         if len(system.nodes) < len(u):
             rest = self._at_rest()

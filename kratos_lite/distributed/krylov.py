@@ -93,7 +93,7 @@ class Krylov:
             raise error
         if self._share:
             self._share.finish()
-        return ksp.getIterationNumber(), self._failure()
+        return (0 if ksp.getType() == "preonly" else ksp.getIterationNumber()), self._failure()
 
     def _failure(self) -> str:
         """Return why the iteration failed, or an empty text."""

@@ -235,8 +235,20 @@ class Supports:
 
     def _eliminated(self, values: Array, agree: bool) -> Slaves:
         """Return the slaves for some prescribed values; those of symmetric ties must agree if asked for."""
+        constraints, share = self.turned(agree), self.mesh.subdomain
+        if share is None:
+            return eliminate(constraints, self.fixed, values, self.name)
+        from kratos_lite.distributed.constraints import local_slaves, slaves_over_ranks  # chains cross ranks
+
+        return local_slaves(share, slaves_over_ranks(share, constraints, self.fixed, values, self.name))
+
+    def turned(self, agree: bool) -> list[MultiPointConstraint]:
+        """Return the constraints, symmetric ties with a node that supports hold as master.
+
+        With `agree`, ModelError where supports move both nodes of a tie, and not alike.
+        """
         turned = [self._turned(c, agree) if c.symmetric else c for c in self.constraints]
-        return eliminate([c for c in turned if c], self.fixed, values, self.name)
+        return [c for c in turned if c]
 
     def _turned(self, tie: MultiPointConstraint, agree: bool) -> MultiPointConstraint | None:
         """Return a symmetric tie with the node that supports hold as master; None if they hold both alike."""
