@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import permutations
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from kratos_lite.shapes import Shape
 from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, fits_memory
+
+Counts: TypeAlias = tuple[int, int, int]
+"""Bricks along x, y, z."""
 
 
 def _kuhn() -> list[list[int]]:
@@ -42,11 +46,11 @@ SPLITS: dict[str, list[list[int]]] = {
 """Cells of one brick by family; corner 8 is the center of the brick."""
 
 
-def _grid(cells: tuple[int, int, int], with_centers: bool) -> tuple[Array, Ints]:
-    """Return points of the unit cube and bricks (m, 8 or 9)."""
-    axes = [np.arange(n + 1) / n for n in cells]
+def _grid(cells: Counts, with_centers: bool, low: Counts, high: Counts) -> tuple[Array, Ints]:
+    """Return points of the unit cube and bricks (m, 8 or 9), of those between two corners of the grid."""
+    axes = [np.arange(a, b + 1) / n for n, a, b in zip(cells, low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    number = np.arange(len(points)).reshape([n + 1 for n in cells])
+    number = np.arange(len(points)).reshape([len(axis) for axis in axes])
     ends = [(slice(0, -1), slice(1, None))[i] for i in (0, 1)]
     corners = [number[ends[i], ends[j], ends[k]].ravel() for i, j, k in (Hexahedron8.nodes > 0).astype(int)]
     bricks = np.stack(corners, axis=1)
@@ -57,7 +61,8 @@ def _grid(cells: tuple[int, int, int], with_centers: bool) -> tuple[Array, Ints]
     return points, bricks
 
 
-def _cells(cells: Sequence[int]) -> tuple[int, int, int]:
+def counts_of(cells: Sequence[int]) -> Counts:
+    """Return three whole numbers ≥ 1; InputError for anything else."""
     counts = finite(cells, "cells")
     if counts.shape != (3,) or (counts < 1).any() or (counts != counts.round()).any():
         raise InputError(f"cells must be three whole numbers ≥ 1; got {cells}")
@@ -86,25 +91,40 @@ def _full_name(element: str) -> str:
     return f"{UNNAMED}{nodes[:-1]}N" if nodes[-1:] == "N" and nodes[:-1].isdigit() else element
 
 
-def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:
-    """Return points and cells of the unit cube."""
+def kind_of(element: str) -> tuple[str, type[Shape]]:
+    """Return the name of the block of such elements, and their shape; InputError if there are none."""
     if not isinstance(element, str):
         raise InputError(f"element must be a name such as KinematicLinear3D8N; got {element!r}")
     element = _full_name(element)
     kind = ELEMENTS[element]
-    shape = kind.shape
-    if shape.cell not in SPLITS:
-        raise InputError(f"{element} has cell {shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
-    counts = _cells(cells)
-    _check_size(counts, shape)
-    points, bricks = _grid(counts, shape.cell == "pyramid")
+    if kind.shape.cell not in SPLITS:
+        raise InputError(f"{element} has cell {kind.shape.cell!r}; boxes are made of {', '.join(SPLITS)}")
+    return element if is_unnamed(element) else kind.__name__, kind.shape
+
+
+def unit_cells(
+    cells: Counts, shape: type[Shape], low: Counts = (0, 0, 0), high: Counts | None = None
+) -> tuple[Array, Ints]:
+    """Return points (n, 3) and cells (m, k) of the unit cube, or of the bricks between two corners of it.
+
+    Nodes of the grid come first, by x, y, z, then the centers of bricks, if any, and the nodes between those.
+    """
+    high = cells if high is None else high
+    i, j, k = (b - a for a, b in zip(low, high, strict=True))
+    _check_size((i, j, k), shape)
+    points, bricks = _grid(cells, shape.cell == "pyramid", low, high)
     split = np.array(SPLITS[shape.cell])
-    corners = bricks[:, split].reshape(-1, split.shape[1])
-    points, nodes = raise_order(points, corners, shape)
-    return points, {element if is_unnamed(element) else kind.__name__: nodes}
+    return raise_order(points, bricks[:, split].reshape(-1, split.shape[1]), shape)
 
 
-def _sides(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
+def _unit_mesh(cells: Sequence[int], element: str) -> tuple[Array, dict[str, Ints]]:
+    """Return points and cells of the unit cube."""
+    name, shape = kind_of(element)
+    points, nodes = unit_cells(counts_of(cells), shape)
+    return points, {name: nodes}
+
+
+def sides_of(unit: Array, sides: dict[str, tuple[int, int]]) -> dict[str, Part]:
     """Return parts by their axis and end in the unit cube."""
     return {name: Part(nodes=np.flatnonzero(unit[:, axis] == end)) for name, (axis, end) in sides.items()}
 
@@ -140,11 +160,17 @@ def box(
     >>> mesh.n_nodes, mesh.n_elements, len(mesh.nodes("z+"))
     (81, 8, 21)
     """
+    corner, lengths = corner_and_lengths(size, origin)
+    unit, cells_by_name = _unit_mesh(cells, element)
+    return Mesh(corner + unit * lengths, cells_by_name, parts=sides_of(unit, SIDES))
+
+
+def corner_and_lengths(size: Sequence[float], origin: Sequence[float]) -> tuple[Array, Array]:
+    """Return the corner (3,) and the lengths (3,) of a box; InputError if they make none."""
     lengths, corner = finite(size, "size"), finite(origin, "origin")
     if lengths.shape != (3,) or corner.shape != (3,) or (lengths <= 0).any():
         raise InputError(f"size must be three lengths > 0 m and origin three numbers; got {size}, {origin}")
-    unit, cells_by_name = _unit_mesh(cells, element)
-    return Mesh(corner + unit * lengths, cells_by_name, parts=_sides(unit, SIDES))
+    return corner, lengths
 
 
 def annulus(
@@ -181,7 +207,7 @@ def annulus(
     sizes = finite([inner, outer, width], "inner, outer and width")
     if sizes.shape != (3,) or not (0 < sizes[0] < sizes[1] and sizes[2] > 0):
         raise InputError(f"an annulus needs 0 < inner < outer and width > 0; got {inner}, {outer}, {width}")
-    if _cells(cells)[1] < 3:
+    if counts_of(cells)[1] < 3:
         raise InputError(f"an annulus needs at least 3 cells around; got {cells[1]}")
     unit, cells_by_name = _unit_mesh(cells, element)
     seam, start = np.flatnonzero(unit[:, 1] == 1), np.flatnonzero(unit[:, 1] == 0)
@@ -194,5 +220,5 @@ def annulus(
     r = inner + (outer - inner) * unit[:, 0]
     angle = 2 * np.pi * unit[:, 1]
     points = np.column_stack([r * np.cos(angle), r * np.sin(angle), width * unit[:, 2]])
-    parts = _sides(unit, {"inner": (0, 0), "outer": (0, 1), "z-": (2, 0), "z+": (2, 1)})
+    parts = sides_of(unit, {"inner": (0, 0), "outer": (0, 1), "z-": (2, 0), "z+": (2, 1)})
     return Mesh(points, {name: renumbered[nodes] for name, nodes in cells_by_name.items()}, parts=parts)
