@@ -12,21 +12,30 @@ import pytest
 
 HERE = Path(__file__).parent
 PYTHON = os.environ.get("KRATOS_LITE_MPI_PYTHON", "")
+NEAR = (Path(PYTHON).with_name("mpirun"), Path("/usr/bin/mpirun"))
+MPIRUN = next((str(path) for path in NEAR if PYTHON and path.exists()), shutil.which("mpirun"))
+"""That of the second Python's MPI: with the one of another MPI each rank would be alone."""
+OPEN_MPI = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none",  # all runs would share the first processors
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+}
+LEAVE = ("PYTHONPATH", "VIRTUAL_ENV", "PETSC_DIR", "PETSC_ARCH")
 FILES = sorted(path.stem for path in HERE.glob("ranks_*.py"))
 
 pytestmark = pytest.mark.skipif(
-    not PYTHON or shutil.which("mpirun") is None, reason="KRATOS_LITE_MPI_PYTHON or mpirun is absent"
+    not PYTHON or MPIRUN is None, reason="KRATOS_LITE_MPI_PYTHON or mpirun is absent"
 )
 
 
 def mpirun(ranks, *words, seconds=600, **options):
     """Run the second Python on some ranks; its output is in the result."""
-    launch = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PYTHON]
-    leave = ("PYTHONPATH", "VIRTUAL_ENV")
-    environment = {name: value for name, value in os.environ.items() if name not in leave}
-    environment |= {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(HERE.parents[1])}
+    environment = {name: value for name, value in os.environ.items() if name not in LEAVE}
+    environment |= {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(HERE.parents[1]), **OPEN_MPI}
     return subprocess.run(
-        [*launch, *map(str, words)],
+        [str(MPIRUN), "-n", str(ranks), PYTHON, *map(str, words)],
         capture_output=True,
         text=True,
         timeout=seconds,
