@@ -87,9 +87,10 @@ void union_pattern(int64_t rows, int64_t columns, const Lists& lists, Ints& indp
     for (const Ints& mine : found) indices.insert(indices.end(), mine.begin(), mine.end());
 }
 
+// The sum over the rows of g; P may have more.
 template <int b>
-CoarseMatrix galerkin(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
-                      int32_t count) {
+CoarseMatrix galerkin_sum(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
+                          int32_t count) {
     CoarseMatrix AP, C;
     union_pattern(
         g.rows, count,
@@ -116,6 +117,13 @@ CoarseMatrix galerkin(const Graph& g, const double* A, const Prolongator& P, con
         const int64_t first = count * s / slabs, last = count * (s + 1) / slabs;
         dispatch<double>([&](auto) KL_INLINE_LAMBDA { galerkin_rows<b>(g, A, P, AP, C, first, last); });
     });
+    return C;
+}
+
+template <int b>
+CoarseMatrix galerkin(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
+                      int32_t count) {
+    CoarseMatrix C = galerkin_sum<b>(g, A, P, columns, count);
     // Components without stiffness (modes that an aggregate cannot tell apart) stand alone.
     for (int32_t I = 0; I < count; ++I)
         for (int32_t k = C.indptr[I]; k < C.indptr[I + 1]; ++k)

@@ -2,6 +2,7 @@
 
 #include "displacement_pressure.hpp"
 #include "elements.hpp"
+#include "rank_multigrid.hpp"
 
 namespace {
 
@@ -364,6 +365,19 @@ auto pressures(std::shared_ptr<Multigrid> multigrid, const Pressures::Parts<doub
                                        std::move(weight), share, most);
 }
 
+auto shared_level(Array<int32_t> indptr, Array<int32_t> indices, Array<double> data, Array<uint8_t> fixed, int b) {
+    return std::make_shared<SharedLevel>(std::move(indptr), std::move(indices), std::move(data), std::move(fixed), b);
+}
+
+auto shared_product(std::shared_ptr<Product> product, Array<uint8_t> fixed, int64_t own) {
+    return std::make_shared<SharedLevel>(*product, product, std::move(fixed), own);
+}
+
+auto shared_transfer(Array<int32_t> indptr, Array<int32_t> indices, Array<float> data, int b, int64_t fine,
+                     int64_t coarse, Array<uint8_t> fine_fixed, Array<uint8_t> coarse_fixed) {
+    return std::make_shared<SharedTransfer>(indptr, indices, data, b, fine, coarse, fine_fixed, coarse_fixed);
+}
+
 }  // namespace
 
 KL_MODULE(_multigrid, m) {
@@ -383,6 +397,21 @@ KL_MODULE(_multigrid, m) {
                           method<&Multigrid::has_planes>("has_planes"),
                           method<&Multigrid::bytes>("bytes"),
                           method<&Multigrid::complexity>("complexity")});
+    add_class<SharedLevel>("kratos_lite.native.SharedLevel",
+                           {method<&SharedLevel::step>("step"), method<&SharedLevel::first_step>("first_step"),
+                            method<&SharedLevel::aggregates>("aggregates"), method<&SharedLevel::tentative>("tentative"),
+                            method<&SharedLevel::prolongator>("prolongator"),
+                            method<&SharedLevel::galerkin>("galerkin"), method<&SharedLevel::forget>("forget"),
+                            method<&SharedLevel::bytes>("bytes")});
+    add_class<SharedTransfer>("kratos_lite.native.SharedTransfer",
+                              {method<&SharedTransfer::restrict_to>("restrict_to"),
+                               method<&SharedTransfer::prolong>("prolong"), method<&SharedTransfer::bytes>("bytes")});
+    define<&shared_level>(m, "SharedLevel", "a level of a multigrid over ranks, of a matrix",
+                          {"indptr", "indices", "data", "fixed", "b"});
+    define<&shared_product>(m, "SharedProduct", "a level of a multigrid over ranks, of a Product",
+                            {"product", "fixed", "own"});
+    define<&shared_transfer>(m, "SharedTransfer", "a transfer between levels of a multigrid over ranks",
+                             {"indptr", "indices", "data", "b", "fine", "coarse", "fine_fixed", "coarse_fixed"});
     define<&matrix>(m, "Matrix", "a matrix of 3x3 blocks", {"indptr", "indices", "data"});
     define<&product>(m, "Product", "products of the stiffness of elements, without a matrix", {"points", "groups"});
     define<&multigrid>(m, "Multigrid", "a multigrid of a Matrix or a Product",

@@ -57,9 +57,14 @@ struct Transfer {
 
     // coarse = P^T fine
     void restrict_to(const Level& fine, const Floats& from, const Level& coarse, Floats& to) const {
-        parallel_ranges(coarse.n, 64, [&](int64_t first, int64_t last) {
+        restrict_to(fine.b, from.data(), coarse.n, to.data());
+    }
+
+    // The same between vectors, to `count` coarse nodes.
+    void restrict_to(int b, const float* from, int64_t count, float* to) const {
+        parallel_ranges(count, 64, [&](int64_t first, int64_t last) {
             if (!weights)
-                return fine.b == 3 ? restrict_blocks<3>(from, to, first, last)
+                return b == 3 ? restrict_blocks<3>(from, to, first, last)
                                    : restrict_blocks<6>(from, to, first, last);
             for (int64_t I = first; I < last; ++I) {
                 float sum[3] = {};
@@ -73,9 +78,14 @@ struct Transfer {
 
     // fine += P coarse
     void prolong(const Floats& from, const Level& fine, Floats& to) const {
-        parallel_ranges(fine.n, 1024, [&](int64_t first, int64_t last) {
+        prolong(from.data(), fine.b, fine.n, to.data());
+    }
+
+    // The same between vectors, to `count` fine nodes.
+    void prolong(const float* from, int b, int64_t count, float* to) const {
+        parallel_ranges(count, 1024, [&](int64_t first, int64_t last) {
             if (!weights)
-                return fine.b == 3 ? prolong_blocks<3>(from, to, first, last)
+                return b == 3 ? prolong_blocks<3>(from, to, first, last)
                                    : prolong_blocks<6>(from, to, first, last);
             for (int64_t i = first; i < last; ++i) {
                 float sum[3] = {};
@@ -90,15 +100,15 @@ struct Transfer {
 
 private:
     template <int b>
-    void restrict_blocks(const Floats& from, Floats& to, int64_t first, int64_t last) const {
+    void restrict_blocks(const float* from, float* to, int64_t first, int64_t last) const {
         dispatch<float>([&](auto) KL_INLINE_LAMBDA {
-            restrict_rows<b>(columns, P.data.data(), from.data(), to.data(), first, last);
+            restrict_rows<b>(columns, P.data.data(), from, to, first, last);
         });
     }
 
     template <int b>
-    void prolong_blocks(const Floats& from, Floats& to, int64_t first, int64_t last) const {
-        dispatch<float>([&](auto) KL_INLINE_LAMBDA { prolong_rows<b>(P, from.data(), to.data(), first, last); });
+    void prolong_blocks(const float* from, float* to, int64_t first, int64_t last) const {
+        dispatch<float>([&](auto) KL_INLINE_LAMBDA { prolong_rows<b>(P, from, to, first, last); });
     }
 };
 

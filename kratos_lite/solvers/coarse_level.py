@@ -76,7 +76,7 @@ class _Part:
 
 
 def linear_level(
-    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None = None
+    points: Array, groups: Sequence[ElementGroup], hanging: HangingNodes | None = None, whole: bool = True
 ) -> LinearLevel | None:
     """Return stiffness and interpolation of the linear elements on the corners of `groups`.
 
@@ -91,15 +91,17 @@ def linear_level(
     points : (n, 3) float, m.
     groups : elements with these points.
     hanging : the nodes among them that hang on larger neighbors, if any.
+    whole : False for a share of a mesh, for which others decide as well: nothing is halved, and elements that
+        are all linear make a level, too.
 
     Returns
     -------
     The level, or None if all elements are linear or some have no linear element on their corners.
     """
     corners = [c for group in groups if (c := _corners(group.element.shape)) is not None]
-    if len(corners) < len(groups) or all(_is_linear(group.element.shape) for group in groups):
+    if len(corners) < len(groups) or (whole and not has_middle_nodes(groups)):
         return None
-    halved = hanging is None  # else a middle node would be a corner of smaller neighbors
+    halved = whole and hanging is None  # else a middle node would be a corner of smaller neighbors
     parts = [p for group, c in zip(groups, corners, strict=True) for p in _parts(points, group, c, halved)]
     number = np.full(len(points), -1, dtype=np.int32)
     for part in parts:
@@ -114,6 +116,16 @@ def linear_level(
     halves = any(len(part.cells) > 1 for part in parts)
     level = LinearLevel(assemble, nodes, *_interpolation(parts, number), halves)
     return level if hanging is None else _continuous(level, groups, number, hanging)
+
+
+def has_middle_nodes(groups: Sequence[ElementGroup]) -> bool:
+    """Return whether some elements have nodes beside their corners."""
+    return not all(_is_linear(group.element.shape) for group in groups)
+
+
+def has_corners(groups: Sequence[ElementGroup]) -> bool:
+    """Return whether all elements have linear ones on their corners."""
+    return all(_corners(group.element.shape) is not None for group in groups)
 
 
 def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:

@@ -1,0 +1,185 @@
+"""From one level of a multigrid over ranks to the next: smoothed aggregation and the Galerkin product.
+
+Each rank joins its own nodes to aggregates; the prolongator and the product P^T A P reach over ranks.
+Source: Vaněk, Mandel & Brezina, Computing 56 (1996) 179-196; Tuminaro & Tong, Parallel smoothed aggregation
+multigrid, Supercomputing 2000 (aggregates within ranks).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.distributed.ghosts import Ghosts
+from kratos_lite.mesh.subdomain import Alone
+from kratos_lite.records import record
+from kratos_lite.typing import Array, Ints
+
+STRENGTH = 0.005
+"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
+LEAST_GAIN = 0.9
+"""Unknowns of a level to those of the level above, beyond which coarsening has come to a halt."""
+
+
+@record(eq=False)
+class Rows:
+    """Rows of blocks of a sparse matrix, with columns by number over all ranks.
+
+    Attributes
+    ----------
+    indptr : (m + 1,) int, where each row starts.
+    columns : (nnz,) int.
+    data : (nnz, k), the blocks.
+    """
+
+    indptr: Ints
+    columns: Ints
+    data: Array
+
+    def __len__(self) -> int:
+        return len(self.indptr) - 1
+
+    def local(self, own: int, first: int, ghosts: Ints) -> Rows:
+        """Return them with columns by place: own nodes from 0, then ghosts; ascending within a row.
+
+        Parameters
+        ----------
+        own, first : number of own columns, and of the first of them.
+        ghosts : ascending numbers of the others.
+        """
+        mine = (self.columns >= first) & (self.columns < first + own)
+        place = np.where(mine, self.columns - first, own + np.searchsorted(ghosts, self.columns))
+        row = np.repeat(np.arange(len(self)), np.diff(self.indptr))
+        order = np.lexsort((place, row))
+        return Rows(self.indptr.astype(np.int32), place[order].astype(np.int32), self.data[order])
+
+    def elsewhere(self, own: int, first: int) -> Ints:
+        """Return the numbers of the columns that are not own, ascending."""
+        return np.unique(self.columns[(self.columns < first) | (self.columns >= first + own)])
+
+
+@record(eq=False)
+class Coarser:
+    """The next level: its matrix, the way to it, and its rigid modes.
+
+    Attributes
+    ----------
+    ghosts : copies of coarse nodes of other ranks.
+    A, P : own rows of the matrix (blocks 6x6) and of the prolongator, with columns by place.
+    modes : (m, 6, 6).
+    """
+
+    ghosts: Ghosts
+    A: Rows
+    P: Rows
+    modes: Array
+
+
+def coarsened(
+    kernel: Any, ghosts: Ghosts, all_nodes: int, b: int, modes: Array, largest: float
+) -> Coarser | None:
+    """Return the next level, or None if it would have hardly fewer unknowns.
+
+    Parameters
+    ----------
+    kernel : the level, a SharedLevel.
+    ghosts : of it.
+    all_nodes : number of own nodes, ghosts, and others behind them.
+    b : unknowns of a node.
+    modes : (n, b, 6) of own nodes, 0 where fixed.
+    largest : eigenvalue of D^-1 A.
+    """
+    ranks, own = ghosts.ranks, ghosts.own
+    of, count = kernel.aggregates(STRENGTH)
+    offsets = np.concatenate([[0], np.cumsum(ranks.gather(count))])
+    if not 0 < 6 * offsets[-1] <= LEAST_GAIN * b * ghosts.offsets[-1]:
+        return None
+    first = int(offsets[ranks.rank])
+    T, R = kernel.tentative(of, count, np.ascontiguousarray(modes, dtype=float))
+    aggregate = np.full((all_nodes, 1), -1, dtype=np.int64)
+    aggregate[:own, 0] = np.where(of >= 0, of + first, -1)
+    ghosts.update(aggregate)
+    modes_of = np.zeros((all_nodes, 6 * b))
+    modes_of[:own] = T.reshape(own, 6 * b)
+    ghosts.update(modes_of)
+    P = _prolongator(kernel, aggregate[:, 0], modes_of, count, first, 4.0 / 3.0 / largest)
+    around = _rows_of_ghosts(P, ghosts, all_nodes)
+    A = _galerkin(kernel, ranks, around, offsets)
+    _stand_alone(A, first)
+    below = Ghosts(ranks, offsets, np.union1d(A.elsewhere(count, first), P.elsewhere(count, first)))
+    A, P = (rows.local(count, first, below.numbers) for rows in (A, P))
+    return Coarser(below, A, P, R.reshape(count, 6, 6))
+
+
+def _prolongator(kernel: Any, aggregate: Ints, T: Array, count: int, first: int, omega: float) -> Rows:
+    """Return own rows of T - omega D^-1 A T."""
+    mine = (aggregate >= first) & (aggregate < first + count)
+    others = np.unique(aggregate[(aggregate >= 0) & ~mine])
+    of = np.where(mine, aggregate - first, count + np.searchsorted(others, aggregate))
+    of[aggregate < 0] = -1
+    indptr, indices, data = kernel.prolongator(of.astype(np.int32), np.ascontiguousarray(T), omega)
+    numbers = np.concatenate([first + np.arange(count), others])
+    return Rows(indptr, numbers[indices], data.reshape(len(indices), T.shape[1]))
+
+
+def _rows_of_ghosts(P: Rows, ghosts: Ghosts, all_nodes: int) -> Rows:
+    """Return the rows of a prolongator at own nodes and at ghosts; those of other nodes are empty."""
+    lengths = np.zeros((ghosts.own + len(ghosts), 1), dtype=np.int64)
+    lengths[: ghosts.own, 0] = np.diff(P.indptr)
+    ghosts.update(lengths)
+    sent = [_places(P.indptr, rows) for rows in ghosts.wanted]
+    columns = ghosts.ranks.exchange([P.columns[places] for places in sent])
+    data = ghosts.ranks.exchange([P.data[places] for places in sent])
+    ends = np.zeros(all_nodes + 1, dtype=np.int64)
+    ends[1 : len(lengths) + 1] = np.cumsum(lengths[:, 0])
+    ends[len(lengths) + 1 :] = ends[len(lengths)]
+    return Rows(ends, np.concatenate([P.columns, *columns]), np.concatenate([P.data, *data]))
+
+
+def _places(indptr: Ints, rows: Ints) -> Ints:
+    """Return the places of the entries of some rows, one row after the other."""
+    counts = (indptr[rows + 1] - indptr[rows]).astype(np.int64)
+    ends = np.cumsum(counts)
+    return np.arange(counts.sum()) + np.repeat(indptr[rows] - (ends - counts), counts)
+
+
+def _galerkin(kernel: Any, ranks: Alone, P: Rows, offsets: Ints) -> Rows:
+    """Return own rows of P^T A P: the sum of what the rows of all ranks give."""
+    first, last = int(offsets[ranks.rank]), int(offsets[ranks.rank + 1])
+    others = P.elsewhere(last - first, first)
+    local = P.local(last - first, first, others)
+    numbers = np.concatenate([np.arange(first, last), others])
+    indptr, indices, data = kernel.galerkin(local.indptr, local.columns, local.data, len(numbers))
+    rows = numbers[np.repeat(np.arange(len(numbers)), np.diff(indptr))]
+    columns, data = numbers[indices], data.reshape(len(indices), 36)
+    owner = np.searchsorted(offsets, rows, side="right") - 1
+    to = [
+        np.flatnonzero(owner == rank) if rank != ranks.rank else np.zeros(0, int)
+        for rank in range(ranks.size)
+    ]
+    keys = ranks.exchange([np.stack([rows[some], columns[some]], axis=1) for some in to])
+    came = ranks.exchange([data[some] for some in to])
+    mine = owner == ranks.rank
+    rows = np.concatenate([rows[mine], *(each[:, 0] for each in keys)])
+    columns = np.concatenate([columns[mine], *(each[:, 1] for each in keys)])
+    return _summed(rows - first, columns, np.concatenate([data[mine], *came]), last - first)
+
+
+def _summed(rows: Ints, columns: Ints, data: Array, count: int) -> Rows:
+    """Return rows in which entries of the same row and column are added."""
+    order = np.lexsort((columns, rows))
+    rows, columns = rows[order], columns[order]
+    new = np.flatnonzero(np.append(True, (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])))
+    new = new[: len(rows)]
+    sums = np.add.reduceat(data[order], new, axis=0) if len(rows) else data
+    counts = np.bincount(rows[new], minlength=count)
+    return Rows(np.concatenate([[0], np.cumsum(counts)]), columns[new], sums)
+
+
+def _stand_alone(A: Rows, first: int) -> None:
+    """Give components without stiffness, modes that an aggregate cannot tell apart, a diagonal of 1."""
+    rows = np.repeat(np.arange(len(A)), np.diff(A.indptr))
+    at = np.flatnonzero(A.columns == rows + first)
+    diagonal = A.data[at, ::7]
+    A.data[at[:, None], np.arange(0, 36, 7)] = np.where(diagonal > 0, diagonal, 1.0)

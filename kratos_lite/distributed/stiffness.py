@@ -1,0 +1,161 @@
+"""The stiffness of a mesh that ranks share, in its own format, and the multigrid of it.
+
+Nodes are renumbered: own ones with equations, ghosts with equations by number, and the others, where all is
+prescribed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.matrix_free import MatrixFree
+from kratos_lite.assembly.sparsity_pattern import Pattern
+from kratos_lite.assembly.stiffness import assemble_stiffness
+from kratos_lite.distributed.ghosts import Ghosts
+from kratos_lite.distributed.multigrid import Level, Multigrid
+from kratos_lite.mesh.subdomain import Alone
+from kratos_lite.native import kernels
+from kratos_lite.records import replace
+from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
+from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.typing import Array, Ints, Mask, Progress
+
+LARGEST_CONTRAST = 1e3
+"""Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
+
+
+class SharedStiffness:
+    """K of the own nodes of a rank: its rows in blocks, or, of quadratic elements, its product alone.
+
+    All ranks call each method.
+
+    Parameters
+    ----------
+    ranks : the communicator.
+    points : (n, 3) m.
+    groups : all elements here, without initial stress.
+    rows : (m,) own nodes with equations.
+    number : (n,) their number over all ranks, -1 without equations.
+    free : (n, 3) bool.
+    progress : called with the phase and the share done.
+    """
+
+    def __init__(
+        self,
+        ranks: Alone,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        rows: Ints,
+        number: Ints,
+        free: Mask,
+        progress: Progress | None = None,
+    ) -> None:
+        self.ranks = ranks
+        offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(rows)))])
+        own = np.zeros(len(points), dtype=bool)
+        own[rows] = True
+        others = np.flatnonzero((number >= 0) & ~own)
+        others = others[np.argsort(number[others])]
+        order = np.concatenate([rows, others, np.flatnonzero((number < 0) & ~own)])
+        place = np.empty(len(points), dtype=np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        self.ghosts = Ghosts(ranks, offsets, number[others])
+        self.points, self.free = points[order], free[order]
+        self.groups = [replace(group, nodes=place[group.nodes]) for group in groups]
+        self.skipped: set[str] = set()
+        self.K = MatrixFree(self.points, self.groups) if self._needs_no_matrix() else self._matrix(progress)
+
+    def _needs_no_matrix(self) -> bool:
+        """Return whether products do on all ranks: quadratic elements of like stiffness, compact cells."""
+        moduli = [float(np.abs(group.material.C).max()) for group in self.groups]
+        low, high = self.ranks.min(min(moduli, default=np.inf)), self.ranks.max(max(moduli, default=0.0))
+        local = all(map(MatrixFree.takes, self.groups))
+        return bool(
+            self.ranks.all(local and bool(moduli) and not is_stretched(self.points, self.groups))
+            and high <= LARGEST_CONTRAST * low
+            and self.ranks.any(has_middle_nodes(self.groups))
+        )
+
+    def _matrix(self, progress: Progress | None) -> BlockMatrix:
+        """Return the rows of own nodes."""
+        pattern = Pattern(len(self.points), [group.nodes for group in self.groups])
+        K = assemble_stiffness(self.points, self.groups, pattern, progress, self.skipped)
+        stop = int(K.indptr[self.ghosts.own])
+        return BlockMatrix(K.data[:stop], K.indices[:stop], K.indptr[: self.ghosts.own + 1])
+
+    @property
+    def own(self) -> int:
+        """Number of unknowns of this rank."""
+        return 3 * self.ghosts.own
+
+    def times(self, x: Array) -> Array:
+        """Return K x of own unknowns; x and K x are 0 where something is prescribed."""
+        all_x = np.zeros((len(self.points), 3))
+        all_x[: self.ghosts.own] = x.reshape(-1, 3)
+        self.ghosts.update(all_x)
+        y: Array = np.asarray(self.K @ all_x.ravel())[: self.own]
+        return y * self.free[: self.ghosts.own].ravel()
+
+    def multigrid(self) -> Multigrid:
+        """Return the multigrid of K."""
+        module, fixed = kernels("multigrid"), ~self.free
+        held, own = fixed.ravel().astype(np.uint8), self.ghosts.own
+        if isinstance(self.K, MatrixFree):
+            kernel = module.SharedProduct(self.K.product, held, own)
+        else:
+            kernel = module.SharedLevel(self.K.indptr, self.K.indices, self.K.data, held, 3)
+        first = Level(kernel, self.ghosts, 3, fixed)
+        quadratic = self.ranks.any(has_middle_nodes(self.groups)) and self.ranks.all(has_corners(self.groups))
+        linear = self._linear(module, fixed) if quadratic else None
+        points, free = (self.points[:own], self.free[:own]) if linear is None else linear[2:]
+        return Multigrid(first, self._modes(points, free), None if linear is None else linear[:2])
+
+    def _modes(self, points: Array, free: Mask) -> Array:
+        """Return the rigid-body modes (m, 3, 6) at own nodes."""
+        count = max(int(self.ranks.sum(len(points))), 1)
+        modes = rigid_modes(points, self.ranks.sum(points.sum(axis=0)) / count)
+        return (modes * free.reshape(-1, 1)).reshape(-1, 3, 6)
+
+    def _linear(self, module: Any, fixed: Mask) -> tuple[Level, Any, Array, Mask]:
+        """Return the level of linear elements, the way to it, and places and freedom of its own nodes."""
+        n, own = len(self.points), self.ghosts.own
+        if self.groups:
+            linear = linear_level(self.points, self.groups, whole=False)
+            assert linear is not None
+            nodes, weights = linear.nodes, (linear.indptr, linear.indices, linear.weights)
+            K = linear.K
+        else:  # a rank without elements
+            nodes, none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
+            weights = np.zeros(n + 1, dtype=np.int32), none, np.zeros(0)
+            K = BlockMatrix(np.zeros((0, 3, 3)), none, np.zeros(1, dtype=np.int32))
+        mine = int(np.searchsorted(nodes, own))
+        offsets = np.concatenate([[0], np.cumsum(self.ranks.gather(mine))])
+        number = np.full((n, 1), -1, dtype=np.int64)
+        number[nodes[:mine], 0] = offsets[self.ranks.rank] + np.arange(mine)
+        self.ghosts.update(number)
+        beyond = int(np.searchsorted(nodes, own + len(self.ghosts)))
+        ghosts = Ghosts(self.ranks, offsets, number[nodes[mine:beyond], 0])
+        indptr, indices, shares = weights
+        stop, rows = int(indptr[own]), int(K.indptr[mine])
+        held = fixed[nodes]
+        flat = held.ravel().astype(np.uint8)
+        transfer = module.SharedTransfer(
+            indptr[: own + 1].astype(np.int32),
+            indices[:stop].astype(np.int32),
+            shares[:stop].astype(np.float32),
+            3,
+            n,
+            len(nodes),
+            fixed.ravel().astype(np.uint8),
+            flat,
+        )
+        kernel = module.SharedLevel(
+            K.indptr[: mine + 1], K.indices[:rows], np.ascontiguousarray(K.data[:rows]), flat, 3
+        )
+        level = Level(kernel, ghosts, 3, held)
+        return level, transfer, self.points[nodes[:mine]], ~held[:mine]
