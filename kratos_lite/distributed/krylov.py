@@ -58,7 +58,7 @@ class Krylov:
         kind, preconditioner = self.ksp.getType(), self.ksp.getPC().getType()
         if kind == "preonly":
             return f"{self.options.get('pc_factor_mat_solver_type') or preconditioner} (PETSc)"
-        return f"{kind} + {preconditioner} (PETSc)"
+        return f"{kind} + {'own multigrid' if preconditioner == 'python' else preconditioner} (PETSc)"
 
     def set_up(self) -> None:
         """Prepare what does not depend on the right side."""

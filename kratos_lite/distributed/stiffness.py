@@ -23,10 +23,46 @@ from kratos_lite.native import kernels
 from kratos_lite.records import replace
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
 from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.multigrid import multigrid
+from kratos_lite.solvers.plate_level import plate_axes
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
 LARGEST_CONTRAST = 1e3
 """Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
+
+
+class OneProcess:
+    """The multigrid of one process, on own unknowns.
+
+    Parameters
+    ----------
+    K : of all nodes.
+    free, points : of all nodes, (n, 3).
+    groups : the elements.
+    own : number of own unknowns.
+    """
+
+    def __init__(
+        self,
+        K: BlockMatrix | MatrixFree,
+        free: Mask,
+        points: Array,
+        groups: Sequence[ElementGroup],
+        own: int,
+    ) -> None:
+        self._multigrid = multigrid(K, free.ravel(), points, linear_level(points, groups))
+        self._all, self._own = 3 * len(points), own
+
+    @property
+    def sizes(self) -> list[int]:
+        """Unknowns of each level."""
+        return self._multigrid.levels
+
+    def precondition(self, r: Array) -> Array:
+        """Return one V-cycle on the residual of own unknowns."""
+        whole = np.zeros(self._all)
+        whole[: self._own] = r
+        return self._multigrid.precondition(whole)[: self._own]
 
 
 class SharedStiffness:
@@ -74,6 +110,8 @@ class SharedStiffness:
         """Return whether products do on all ranks: quadratic elements of like stiffness, compact cells."""
         moduli = [float(np.abs(group.material.C).max()) for group in self.groups]
         low, high = self.ranks.min(min(moduli, default=np.inf)), self.ranks.max(max(moduli, default=0.0))
+        if self.ranks.size == 1 and plate_axes(self.points, self.free.ravel()) is not None:
+            return False
         local = all(map(MatrixFree.takes, self.groups))
         return bool(
             self.ranks.all(local and bool(moduli) and not is_stretched(self.points, self.groups))
@@ -82,9 +120,11 @@ class SharedStiffness:
         )
 
     def _matrix(self, progress: Progress | None) -> BlockMatrix:
-        """Return the rows of own nodes."""
+        """Return the rows of own nodes; on one rank all, for the multigrid of one process."""
         pattern = Pattern(len(self.points), [group.nodes for group in self.groups])
         K = assemble_stiffness(self.points, self.groups, pattern, progress, self.skipped)
+        if self.ranks.size == 1:
+            return K
         stop = int(K.indptr[self.ghosts.own])
         return BlockMatrix(K.data[:stop], K.indices[:stop], K.indptr[: self.ghosts.own + 1])
 
@@ -101,8 +141,14 @@ class SharedStiffness:
         y: Array = np.asarray(self.K @ all_x.ravel())[: self.own]
         return y * self.free[: self.ghosts.own].ravel()
 
-    def multigrid(self) -> Multigrid:
-        """Return the multigrid of K."""
+    def norm(self) -> float:
+        """Return the largest row sum of |K|."""
+        return float(self.ranks.max(self.K.norm()))
+
+    def multigrid(self) -> Multigrid | OneProcess:
+        """Return the multigrid of K: on one rank that of one process, which takes stretched cells, too."""
+        if self.ranks.size == 1:
+            return OneProcess(self.K, self.free, self.points, self.groups, self.own)
         module, fixed = kernels("multigrid"), ~self.free
         held, own = fixed.ravel().astype(np.uint8), self.ghosts.own
         if isinstance(self.K, MatrixFree):
