@@ -11,7 +11,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
-from kratos_lite.cli.options import build_parser
+from kratos_lite.cli.options import build_parser, with_values
+from kratos_lite.cli.ranks import Job
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
 
@@ -25,55 +26,64 @@ def main(arguments: Sequence[str] | None = None) -> int:
     atexit.register(gc.freeze)  # at its end Python would look through all objects for garbage, for 15 ms
     gc.set_threshold(100_000)  # and a hundred times while modules are loaded, for 5 ms
     _escape_unknown_characters()
-    words = sys.argv[1:] if arguments is None else list(arguments)
-    debug = "--debug" in words
-    try:
-        with _ended_by_signals():
-            return _run(words)
-    except KeyboardInterrupt as error:
-        ended = isinstance(error, Terminated)
-        print(f"{'terminated' if ended else 'interrupted'}; nothing half-written is left", file=sys.stderr)
-        return 128 + error.args[0] if ended else EXIT_INTERRUPTED
-    except BrokenPipeError:
-        _discard_output()
-        return 0
-    except Exception as error:
-        if debug:
-            raise
-        if isinstance(error, OSError):
-            _discard_output()
-            print(f"error: {error.filename or 'the output'}: {error.strerror or error}", file=sys.stderr)
-            return EXIT_BAD_INPUT
-        if isinstance(error, MemoryError):
-            print("error: not enough memory; use a coarser mesh or --solver amg", file=sys.stderr)
-            return EXIT_BAD_INPUT
-        print(
-            f"internal error: {type(error).__name__}: {error}\n"
-            "This is a defect of kratos-lite; please report it with the output of --debug.",
-            file=sys.stderr,
-        )
-        return EXIT_INTERNAL
+    words = with_values(sys.argv[1:] if arguments is None else arguments)
+    job = Job(words)
+    with job.quiet():
+        try:
+            with _ended_by_signals():
+                return job.end(_run(words, job))
+        except SystemExit as end:  # of the parser, which has said why
+            if job.size == 1:
+                raise
+            return job.end(int(end.code or 0))
+        except (Exception, KeyboardInterrupt) as error:
+            code, text = _verdict(error)
+            if isinstance(error, Terminated) and job.size > 1:
+                text = ""  # whoever ends all ranks says why
+            if "--debug" in words and not isinstance(error, (KeyboardInterrupt, BrokenPipeError)):
+                if job.size == 1:
+                    raise
+                import traceback
+
+                text = traceback.format_exc().rstrip()
+            return job.end(code, error, text)
 
 
-def _run(words: Sequence[str]) -> int:
-    """Run one command; errors of the user's end in one line."""
+def _verdict(error: BaseException) -> tuple[int, str]:
+    """Return the exit code of an error and what to say of it."""
     from kratos_lite.errors import KratosLiteError
 
+    if isinstance(error, KeyboardInterrupt):
+        ended = isinstance(error, Terminated)
+        text = f"{'terminated' if ended else 'interrupted'}; nothing half-written is left"
+        return 128 + error.args[0] if ended else EXIT_INTERRUPTED, text
+    if isinstance(error, BrokenPipeError):
+        _discard_output()
+        return 0, ""
+    if isinstance(error, KratosLiteError):
+        # The texts are written for Python; here the same choice is an option.
+        return EXIT_BAD_INPUT, f"error: {str(error).replace('strict=False', '--lenient')}"
+    if isinstance(error, OSError):
+        _discard_output()
+        return EXIT_BAD_INPUT, f"error: {error.filename or 'the output'}: {error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return EXIT_BAD_INPUT, "error: not enough memory; use a coarser mesh or --solver amg"
+    return EXIT_INTERNAL, (
+        f"internal error: {type(error).__name__}: {error}\n"
+        "This is a defect of kratos-lite; please report it with the output of --debug."
+    )
+
+
+def _run(words: Sequence[str], job: Job) -> int:
+    """Run one command; return its exit code."""
     parser = build_parser()
     options, rest = parser.parse_known_args(words)
     options.rest = rest
     if rest and options.command != "bench":
         parser.refuse(options.command, rest)
-    try:
-        from kratos_lite.cli import commands
+    from kratos_lite.cli import commands
 
-        code = int(getattr(commands, options.command)(options))
-    except KratosLiteError as error:
-        if options.debug:
-            raise
-        # The texts are written for Python; here the same choice is an option.
-        print(f"error: {str(error).replace('strict=False', '--lenient')}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+    code = int(job.run(getattr(commands, options.command), options))
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program
     return code

@@ -61,7 +61,9 @@ def case_of(options: Namespace) -> Case:
         materials=not everywhere,
         strict=not options.lenient,
         initial_displacement=not options.ignore_initial_displacement,
+        comm=options.ranks,
     )
+    case.engine, case.petsc = options.engine or case.engine, options.petsc
     if case.is_of_model:
         apply(case.model, options, materials)
         if options.solver:

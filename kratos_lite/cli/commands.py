@@ -161,8 +161,8 @@ def _check(options: Namespace) -> int:
     needs, warnings = _needs(case)
     what = f"{path}: {_what(case)}{f', {case.time}' if case.time else ''}"
     lines = [f"{what}, {'cannot be solved' if needs else 'no errors'}"]
-    if case.is_of_model and case.model.mesh.n_nodes:
-        lines.append(f"extent   {dict(case.model.mesh.table())['extent']}")
+    if case.is_of_model and (extent := dict(case.model.mesh.table()).get("extent")):
+        lines.append(f"extent   {extent}")
     lines += [f"error    {text}" for text in needs]
     lines += [f"note     {text}" for text in warnings]
     _print([] if options.quiet else lines)
@@ -172,7 +172,9 @@ def _check(options: Namespace) -> int:
 def _what(case: Case) -> str:
     if not case.is_of_model:
         return f"{case.body.kind} body"
-    return f"{case.model.mesh.n_nodes} nodes, {case.model.mesh.n_elements} elements"
+    mesh = case.model.mesh
+    nodes, elements = (mesh.ranks.sum(int(own.sum())) for own in (mesh.own_nodes, mesh.own_elements))
+    return f"{nodes} nodes, {elements} elements"
 
 
 def _needs(case: Case) -> tuple[list[str], list[str]]:
@@ -193,7 +195,8 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
     )
     for cure in cures:
         try:
-            warnings = checked(case)
+            with model.mesh.ranks.together():  # all ranks have the same needs
+                warnings = checked(case)
             break
         except ModelError as error:
             needs += [str(error)] if str(error) not in needs else []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from kratos_lite import __version__
@@ -28,11 +29,13 @@ EXAMPLES = {
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
   kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
   kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
+  mpirun -n 4 kratos-lite solve bridge.mdpa --engine petsc -o bridge.pvtu
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
     "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
     "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
     "  kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5\n"
+    "  mpirun -n 4 kratos-lite check bridge.mdpa --engine petsc\n"
     "  kratos-lite check my_element.py",
     "verify": "kratos-lite verify\n  kratos-lite verify patch macneal_harder --element 3D8N --element 3D20N\n"
     "  kratos-lite verify my_element.py -o my_element.md",
@@ -46,10 +49,26 @@ MODES = (
     "find the N lowest natural frequencies instead; their modes go to -o OUT.pvd or OUT.html, the first of "
     "them to --picture"
 )
+ENGINE = "petsc: statics, by PETSc over all processes that mpirun or srun has started (own, on one)"
 RESTART = (
     "go on from a state that --state wrote; series and picture then hold the rest of the run only, and "
     "replace those of the same name, so give them new names"
 )
+
+
+def with_values(words: Sequence[str]) -> list[str]:
+    """Return the words with options of PETSc, which begin with a dash, joined to ``--petsc``.
+
+    >>> with_values(["solve", "a.mdpa", "--petsc", "-ksp_view"])
+    ['solve', 'a.mdpa', '--petsc=-ksp_view']
+    """
+    found: list[str] = []
+    for word in words:
+        if found[-1:] == ["--petsc"]:
+            found[-1] = f"--petsc={word}"
+        else:
+            found.append(word)
+    return found
 
 
 def build_parser() -> Parser:
@@ -113,6 +132,7 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_model(command)
     _add_motion(command)
     _add_time(command)
+    command.set_defaults(ranks=None)  # with --engine petsc, those who run it
     how = command.add_argument_group("solver")
     how.add_argument("--modes", type=int, metavar="N", help=MODES)
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")
@@ -121,6 +141,8 @@ def _add_case(command: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="relative error of the energy norm, such as 1%% or 0.01: statics, the mesh made finer",
     )
+    how.add_argument("--engine", choices=("own", "petsc"), help=ENGINE)
+    how.add_argument("--petsc", metavar="OPTIONS", help="options of PETSc, such as '-pc_type hypre'")
     how.add_argument("--tolerance", type=float, help="relative residual of the iterative solver (1e-10)")
     how.add_argument("--threads", type=int, metavar="N", help="threads of the compiled kernels (all cores)")
     how.add_argument("--progress", action="store_true", help="show progress, even if not on a terminal")
@@ -156,8 +178,9 @@ def _add_outputs(solve: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         default=[],
-        help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes); in time: .pvd "
-        "for ParaView, .html, .csv or .npz; of modes: .pvd or .html; may be given several times",
+        help="static: .vtu for ParaView, .html for the browser, .vtk, .json or .csv (nodes), over many "
+        "processes .pvtu with a piece of each, or .json; in time: .pvd for ParaView, .html, .csv or .npz; of "
+        "modes: .pvd or .html; may be given several times",
     )
     _add_options(
         out,

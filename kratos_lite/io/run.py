@@ -23,6 +23,13 @@ ANALYSES = {
     "bodies": "bodies",
 }
 """The module of `kratos_lite.io.runners` that runs each analysis."""
+NOT_OF_PETSC = {
+    "bodies": "a body",
+    "steady": "a motion of the material",
+    "transient": "an integration in time",
+    "modal": "natural frequencies",
+}
+"""What cases are that the engine PETSc does not solve."""
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
@@ -78,6 +85,8 @@ def check_case(case: Case) -> None:
         raise InputError(f"the results of a case are a list of paths; got {case.outputs.results!r}")
     if case.modes and case.time is not None:
         raise InputError("a case has natural frequencies or a time integration; give one of them")
+    if case.engine == "petsc":
+        _check_statics(case)
     if isinstance(case.subject, Structure):
         return
     from kratos_lite.bodies import Body  # a model at rest starts quicker without it
@@ -90,6 +99,16 @@ def check_case(case: Case) -> None:
         )
     if case.time.integrator is not None or any(case.time.rayleigh) or case.time.lumped:
         raise InputError("a body has its own integrator, damping and mass: set them on the body")
+
+
+def _check_statics(case: Case) -> None:
+    """Raise InputError for a case that PETSc does not solve."""
+    if case.analysis in NOT_OF_PETSC:
+        raise InputError(
+            f"engine='petsc' solves statics; this case has {NOT_OF_PETSC[case.analysis]}; leave it out"
+        )
+    if case.error is not None:
+        raise InputError("engine='petsc' solves on the mesh as it is; leave the error asked for out")
 
 
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -40,34 +40,45 @@ class NodeComparison:
     what : name of the check.
     component : such as ``DISPLACEMENT_X``.
     rows : (m,) int, node rows.
-    expected : called with the result; returns the expected values and the allowed differences (m,).
+    expected : called with the result and rows; returns expected values and allowed differences of these.
     """
 
     what: str
     component: str
     rows: Ints
-    expected: Callable[[Result], tuple[Array, Array]]
+    expected: Callable[[Result, Ints], tuple[Array, Array]]
 
     def __call__(self, result: Result) -> str:
         """Return ``check … passed`` or ``failed`` with the numbers of the worst node."""
         name, _, axis = self.component.rpartition("_")
         if name not in FIELDS or axis not in ("X", "Y", "Z"):
             return f"check {self.what} not evaluated: kratos_lite has no nodal {self.component}"
-        if not len(self.rows):
-            return f"check {self.what} not evaluated: its part has no nodes"
         values = result.displacement() if name == "DISPLACEMENT" else result.reaction()
-        found = values[self.rows, "XYZ".index(axis)]
-        try:
-            expected, allowed = self.expected(result)
-        except ValueError as error:
-            return f"check {self.what} not evaluated: {error}"
-        error_ = np.abs(found - expected)
-        worst = int(np.argmax(error_ - allowed))
+        rows = self.rows[result.mesh.own_nodes[self.rows]]  # each node is compared once, by who owns it
+        found, ranks = values[rows, "XYZ".index(axis)], result.mesh.ranks
+        worst, why = list[Any](), None
+        if len(rows):
+            try:
+                worst = _worst(result.mesh.node_ids[rows], found, *self.expected(result, rows))
+            except ValueError as error:
+                why = str(error)
+        if (why := ranks.first(why)) is not None:
+            return f"check {self.what} not evaluated: {why}"
+        every = [one for one in ranks.gather(worst) if one]
+        if not every:
+            return f"check {self.what} not evaluated: its part has no nodes"
+        excess, node, number, expected, allowed = max(every, key=lambda one: one[0])
         return (
-            f"check {self.what} {'passed' if (error_ <= allowed).all() else 'failed'} "
-            f"(node {result.mesh.node_ids[self.rows[worst]]}: found {found[worst]:.9g}, "
-            f"expected {expected[worst]:.9g}, tolerance {allowed[worst]:.3g})"
+            f"check {self.what} {'passed' if excess <= 0 else 'failed'} "
+            f"(node {node}: found {number:.9g}, expected {expected:.9g}, tolerance {allowed:.3g})"
         )
+
+
+def _worst(nodes: Ints, found: Array, expected: Array, allowed: Array) -> list[Any]:
+    """Return how much the worst node is beyond its tolerance, its id, value, expected value and tolerance."""
+    excess = np.nan_to_num(np.abs(found - expected) - allowed, nan=np.inf)
+    row = int(np.argmax(excess))
+    return [column[row].item() for column in (excess, nodes, found, expected, allowed)]
 
 
 def _idle(what: str, why: str) -> Comparison:
@@ -95,14 +106,14 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
         fits = is_number(one) or isinstance(one, str)
         settings.expect(fits, "value", f"value must be a number or an expression; got {shown(one)}")
         if span.begin <= time < span.end:
-            expected = partial(_from_expression, str(one), rows, time, moved, 0.5 * 10.0**-rank)
+            expected = partial(_from_expression, str(one), time, moved, 0.5 * 10.0**-rank)
             yield NodeComparison(what, name + suffix, rows, expected)
         else:
             yield _idle(what, f"time {time:g} s is outside its interval")
 
 
 def _from_expression(
-    text: str, rows: Ints, time: float, moved: bool, allowed: float, result: Result
+    text: str, time: float, moved: bool, allowed: float, result: Result, rows: Ints
 ) -> tuple[Array, Array]:
     """Return the values of an expression in x, y, z, t, as Python reads it, and the allowed differences."""
     points = result.mesh.points[rows] + (result.displacement()[rows] if moved else 0.0)
@@ -130,7 +141,7 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
     tolerances = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
     for variable in settings.texts("check_variables"):
         for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in FIELDS else [variable]:
-            expected = partial(_from_table, data, component, rows, context.times[-1], tolerances)
+            expected = partial(_from_table, data, component, context.times[-1], tolerances)
             yield NodeComparison(f"{component} {what}", component, rows, expected)
     for variable in settings.texts("gauss_points_check_variables"):
         yield _idle(f"{variable} {what}", "values at Gauss points are not compared")
@@ -139,10 +150,10 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
 def _from_table(
     data: Settings,
     component: str,
-    rows: Ints,
     time: float,
     tolerances: tuple[float, float],
     result: Result,
+    rows: Ints,
 ) -> tuple[Array, Array]:
     """Return the values at a time in a file of json_output_process, and the allowed differences."""
     times = data.numbers("TIME")

@@ -12,7 +12,8 @@ def check(case: Case) -> list[str]:
     """Return the warnings of the model, checked as its solution does."""
     model = case.model
     if model.motion is None:
-        return StaticAnalysis(model, case.solver, case.tolerance).check()
+        analysis = StaticAnalysis(model, case.solver, case.tolerance, engine=case.engine, petsc=case.petsc)
+        return analysis.check()
     from kratos_lite.analysis.equations_of_motion import EquationsOfMotion  # statics start quicker without it
 
     equations = EquationsOfMotion(model, free=False, steady=True)
@@ -22,4 +23,7 @@ def check(case: Case) -> list[str]:
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:
     """Solve the model."""
-    return Outcome(case, [], case.model.solve(case.solver, case.tolerance, progress, error=case.error))
+    result = case.model.solve(
+        case.solver, case.tolerance, progress, error=case.error, engine=case.engine, petsc=case.petsc
+    )
+    return Outcome(case, [], result)

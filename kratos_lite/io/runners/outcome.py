@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
-from kratos_lite.io.outputs import write_at_end
+from kratos_lite.io.outputs import write_at_end, written_as
 from kratos_lite.records import field, record
 
 WIDTH = 22
@@ -72,4 +72,5 @@ class Outcome:
         """
         if self.result is not None:
             write_at_end(self.case.outputs, self.result, in_time=self.case.time is not None)
-        return self.case.outputs.paths()
+        ranks = self.case.model.mesh.ranks.size if self.case.is_of_model else 1
+        return [written_as(path, ranks) for path in self.case.outputs.paths()]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError
 
-RESULTS = (".vtu", ".pvtu", ".vtk", ".json", ".html", ".csv")
+RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv", ".pvtu")
 """Formats that keep fields on nodes; most others of meshio drop them unsaid."""
 OF_RANKS = (".pvtu", ".vtu", ".json")
 """Formats that many processes write together: a piece of each, or sums over all."""
@@ -47,6 +47,24 @@ def check_result_of_ranks(path: str | Path) -> None:
             f"{path}: {ending} is written by one process, and none holds the whole result; "
             "write .pvtu for ParaView or .json with the summary, or solve without --engine petsc"
         )
+
+
+def index_of(path: str | Path) -> Path:
+    """Return the `.pvtu` file that is written for a path over many processes.
+
+    >>> index_of("out/beam.vtu").name
+    'beam.pvtu'
+    """
+    return Path(path).with_suffix(".pvtu")
+
+
+def piece_of(path: str | Path, rank: int) -> Path:
+    """Return the `.vtu` file of a rank.
+
+    >>> piece_of("out/beam.pvtu", 3).name
+    'beam_3.vtu'
+    """
+    return Path(path).with_name(f"{Path(path).stem}_{rank}.vtu")
 
 
 def check_series(path: str | Path) -> None:

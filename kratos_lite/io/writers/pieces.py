@@ -15,6 +15,7 @@ import numpy as np
 from kratos_lite.analysis.fields import fields
 from kratos_lite.atomic import replacing
 from kratos_lite.io.formats.vtu import HEAD, checked, described, escaped, writer_of
+from kratos_lite.io.writers.endings import index_of, piece_of
 from kratos_lite.mesh import Mesh, with_rows
 from kratos_lite.typing import Mask, Numbers
 
@@ -22,24 +23,6 @@ if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
 
 Fields = tuple[Mapping[str, Numbers], Mapping[str, Numbers]]
-
-
-def index_of(path: str | Path) -> Path:
-    """Return the `.pvtu` file that is written for a path over many processes.
-
-    >>> index_of("out/beam.vtu").name
-    'beam.pvtu'
-    """
-    return Path(path).with_suffix(".pvtu")
-
-
-def piece_of(path: str | Path, rank: int) -> Path:
-    """Return the `.vtu` file of a rank.
-
-    >>> piece_of("out/beam.pvtu", 3).name
-    'beam_3.vtu'
-    """
-    return Path(path).with_name(f"{Path(path).stem}_{rank}.vtu")
 
 
 def write_pieces(path: str | Path, result: Result, mode: str = "binary") -> None:

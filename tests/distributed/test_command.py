@@ -1,0 +1,167 @@
+"""`mpirun -n P kratos-lite … --engine petsc`: one command over many processes, and what goes wrong in it."""
+
+import re
+
+import pytest
+from over_ranks import mpirun, needs_mpi
+
+import kratos_lite as kl
+
+pytestmark = needs_mpi
+
+LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
+LIMIT = 60
+"""Seconds after which a command hangs."""
+
+
+def command(ranks, *words, **options):
+    """Run kratos-lite over some ranks; its output is in the result."""
+    return mpirun(ranks, "-m", "kratos_lite", *words, seconds=LIMIT, **options)
+
+
+def script(ranks, text, *words, **options):
+    """Run the command from a script that changes something on one rank before."""
+    start = "import sys\nfrom kratos_lite.cli import main\n"
+    return mpirun(
+        ranks, "-c", f"{start}{text}\nsys.exit(main(sys.argv[1:]))", *words, seconds=LIMIT, **options
+    )
+
+
+def said(run):
+    """Return what the command itself has written on standard error, without mpirun's own lines."""
+    text = re.sub(r"(?m)^-{20,}\n(.*\n)*?-{20,}\n", "", run.stderr)
+    return [line for line in text.splitlines() if line.strip()]
+
+
+def assert_refused(run, *texts, code=2):
+    """Assert that the command has ended with one message that holds some texts."""
+    lines = said(run)
+    assert run.returncode == code, run.stderr
+    assert sum(line.startswith(("error:", "internal error:", "rank ")) for line in lines) == 1, run.stderr
+    assert all(text in "\n".join(lines) for text in texts), run.stderr
+    assert "Traceback" not in run.stderr
+    assert run.stdout == ""
+
+
+@pytest.fixture
+def beam(tmp_path):
+    """Write a clamped beam under its weight; return its file."""
+    model = kl.Model(kl.box((4, 1, 1), (8, 2, 2), element="20N"), LAW)
+    model.fix("x-")
+    model.add(kl.Gravity((0, 0, -9.81)))
+    kl.write(tmp_path / "beam.mdpa", model)
+    return tmp_path / "beam.mdpa"
+
+
+def files_of(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+# ---- copies that know nothing of each other ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_copies_of_a_serial_command_are_refused_once(beam, ranks):
+    run = command(ranks, "solve", beam, "--json", "out.json", cwd=beam.parent)
+    assert_refused(run, f"{ranks} copies", "--engine petsc", "--engine own")
+    assert files_of(beam.parent) == ["beam.mdpa"]
+
+
+def test_copies_that_are_wanted_each_solve(beam):
+    run = command(2, "solve", beam, "--engine", "own", cwd=beam.parent)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("largest displacement") == 2
+
+
+# ---- what is refused before a file is read ----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--modes", "3"], "--modes does not go with --engine petsc"),
+        (["--time", "1e-3:5"], "--time does not go with --engine petsc"),
+        (["--rotation", "z:3"], "--rotation does not go with --engine petsc"),
+        (["--error", "1%"], "--error is for one process"),
+        (["--picture", "a.png"], "--picture is drawn on one process"),
+        (["-o", "a.html"], "a.html: .html is written by one process"),
+        (["-o", "a.csv"], "a.csv: .csv is written by one process"),
+        (["-o", "a.xyz"], "a.xyz: results cannot be written as '.xyz'"),
+        (["--petsc", "-ksp_type cg gmres"], "'gmres' is no option and the value of none"),
+        (["--petsc", "ksp_view"], "'ksp_view' is no option"),
+        (["--nonsense"], "--nonsense: there is no such option"),
+    ],
+)
+def test_options_that_do_not_carry_over(tmp_path, words, text):
+    """The input does not exist: nobody looks for it."""
+    run = command(2, "solve", "no.mdpa", "--engine", "petsc", *words, cwd=tmp_path)
+    assert_refused(run, text)
+
+
+def test_a_missing_input(tmp_path):
+    run = command(2, "solve", "no.mdpa", "--engine", "petsc", cwd=tmp_path)
+    assert_refused(run, "error: no.mdpa: there is no such file")
+
+
+# ---- an error, a defect or a signal on one rank -----------------------------------------------------
+
+CHANGED = """import os
+from kratos_lite.cli import apply_options
+from kratos_lite.cli.ranks import launched
+rank, read = launched()[0], apply_options.read_case
+def changed(*words, **options):
+    case = read(*words, **options)
+    {}
+    return case
+apply_options.read_case = changed
+"""
+
+
+def after_reading(what):
+    """Return lines by which ranks do something once the input is read."""
+    return CHANGED.format(what)
+
+
+def test_an_error_of_the_user_on_one_rank(beam):
+    text = after_reading(
+        "if rank == 1: from kratos_lite.errors import MeshError; raise MeshError('torn in two')"
+    )
+    assert_refused(script(2, text, "solve", beam, "--engine", "petsc"), "error: torn in two")
+
+
+@pytest.mark.parametrize("what", ["raise KeyError('odd')", "raise MemoryError"])
+def test_a_defect_on_one_rank_ends_all(beam, what):
+    run = script(3, after_reading(f"if rank == 1: {what}"), "solve", beam, "--engine", "petsc")
+    assert_refused(run, "rank 1: ", code=1 if "odd" in what else 2)
+
+
+def test_a_defect_on_all_ranks_is_told_once(beam):
+    run = script(3, after_reading("raise KeyError('odd')"), "solve", beam, "--engine", "petsc")
+    assert_refused(run, "rank 0: internal error: KeyError: 'odd'", code=1)
+
+
+def test_debug_shows_the_traceback_of_the_rank(beam):
+    run = script(
+        2, after_reading("if rank == 1: raise KeyError('odd')"), "solve", beam, "--engine", "petsc", "--debug"
+    )
+    assert run.returncode == 1
+    assert run.stderr.count("Traceback") == 1
+    assert "rank 1: Traceback" in run.stderr
+
+
+def test_a_rank_that_is_killed_ends_all(beam):
+    text = after_reading("if rank == 1: import signal; os.kill(os.getpid(), signal.SIGKILL)")
+    run = script(
+        3, text, "solve", beam, "--engine", "petsc", "-o", "out.pvtu", "--json", "out.json", cwd=beam.parent
+    )
+    assert run.returncode != 0
+    assert files_of(beam.parent) == ["beam.mdpa"]
+
+
+def test_a_rank_that_is_terminated_ends_all(beam):
+    """The launcher says which one; those that it ends have nothing to add."""
+    text = after_reading("if rank == 1: import signal; os.kill(os.getpid(), signal.SIGTERM)")
+    run = script(2, text, "solve", beam, "--engine", "petsc")
+    assert run.returncode == 128 + 15
+    assert "MPI_ABORT was invoked on rank 1" in run.stderr
+    assert said(run)[:1] == [] or said(run)[0].startswith("[")
