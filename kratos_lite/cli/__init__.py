@@ -38,8 +38,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return job.end(int(end.code or 0))
         except (Exception, KeyboardInterrupt) as error:
             code, text = _verdict(error)
-            if isinstance(error, Terminated) and job.size > 1:
-                text = ""  # whoever ends all ranks says why
             if "--debug" in words and not isinstance(error, (KeyboardInterrupt, BrokenPipeError)):
                 if job.size == 1:
                     raise

@@ -22,6 +22,8 @@ In the script of a Slurm job, outside srun, there is no SLURM_STEP_NUM_TASKS.
 """
 COMMANDS = ("solve", "check")
 """Commands that ranks share."""
+ENDING = 3.0
+"""Seconds after a signal in which the launcher, if it was that which sent it, ends all ranks by force."""
 PATIENCE = 0.2
 """Seconds that rank r waits r times for a rank below it to say what is wrong, five times at most."""
 
@@ -114,10 +116,11 @@ class Job:
         """
         many = self.ranks is not None and self.ranks.size > 1
         if many and error is not None and not getattr(error, "is_shared", False):
-            if text:
-                sleep(PATIENCE * min(self.rank, 5))  # it may be the same on all
-                stderr = self._streams[1] if self._streams else sys.stderr
-                print(f"rank {self.rank}: {text}", file=stderr, flush=True)
+            if isinstance(error, KeyboardInterrupt):
+                sleep(ENDING)
+            sleep(PATIENCE * min(self.rank, 5))  # it may be the same on all
+            stderr = self._streams[1] if self._streams else sys.stderr
+            print(f"rank {self.rank}: {text}", file=stderr, flush=True)
             self.ranks.comm.Abort(code)
         if text:
             print(text, file=sys.stderr, flush=True)

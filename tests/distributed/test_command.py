@@ -159,9 +159,29 @@ def test_a_rank_that_is_killed_ends_all(beam):
 
 
 def test_a_rank_that_is_terminated_ends_all(beam):
-    """The launcher says which one; those that it ends have nothing to add."""
+    """Those that the launcher then ends have nothing to add."""
     text = after_reading("if rank == 1: import signal; os.kill(os.getpid(), signal.SIGTERM)")
-    run = script(2, text, "solve", beam, "--engine", "petsc")
-    assert run.returncode == 128 + 15
-    assert "MPI_ABORT was invoked on rank 1" in run.stderr
-    assert said(run)[:1] == [] or said(run)[0].startswith("[")
+    run = script(3, text, "solve", beam, "--engine", "petsc")
+    assert_refused(run, "rank 1: terminated; nothing half-written is left", code=128 + 15)
+
+
+def test_an_inverted_element_that_one_rank_holds(beam):
+    """The first of 8 × 2 × 2 along x, far from those of the last rank."""
+    text = beam.read_text()
+    nodes = re.search(r"(?m)^\s*1 1 (\d+ \d+ \d+ \d+) (\d+ \d+ \d+ \d+)(.*)$", text)
+    beam.write_text(text.replace(nodes[0], f"1 1 {nodes[2]} {nodes[1]}{nodes[3]}"))
+    for words in (("solve", beam), ("check", beam)):
+        run = command(3, *words, "--engine", "petsc")
+        assert run.returncode == 2
+        assert (run.stderr + run.stdout).count("element 1 (") == 1
+
+
+def test_a_folder_that_is_not_there_or_may_not_be_written(beam):
+    run = command(2, "solve", beam, "--engine", "petsc", "-o", "none/out.pvtu", cwd=beam.parent)
+    assert_refused(run, "error: none/out.pvtu: the folder none does not exist")
+    (beam.parent / "out.pvtu").mkdir()
+    run = command(2, "solve", beam, "--engine", "petsc", "-o", "out.vtu", cwd=beam.parent)
+    assert_refused(run, "error: out.pvtu: cannot be written: it is a folder or a device")
+    (beam.parent / "out_1.vtu").write_text("input")
+    run = command(2, "solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.pvtu", cwd=beam.parent)
+    assert_refused(run, "error: a.pvtu: is an input or another output")
