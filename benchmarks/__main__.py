@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cases, curves, effectivity, report, requested, scenes, sets
+from benchmarks import cases, curves, distributed, effectivity, report, requested, scenes, sets
 from benchmarks import stall as stalling
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
@@ -109,6 +109,14 @@ def main(words: Sequence[str] | None = None) -> int:
         requested.write(requested.run(options.scenes, options.elements))
         effectivity.write_page(kept(effectivity.RESULTS)["rows"])
         return 0
+    if options.command == "distributed":
+        python = options.pythons.get("")
+        found = distributed.run(
+            python, options.elements, options.cells, options.repeats or 3, options.limit or 1800.0
+        )
+        distributed.write(found)
+        print(distributed.goals(found["rows"]), end="")
+        return 0
     if options.command == "references":
         return references(options.cells or (4, 8, 16))
     with scratch() as name:
@@ -147,7 +155,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("command", choices=[*COMMANDS, "report", "references", "effectivity", "adaptive"])
+    add("command", choices=[*COMMANDS, "report", "references", "effectivity", "adaptive", "distributed"])
     add("--programs", nargs="+", choices=[*PROGRAMS, *HELPERS], default=[*PROGRAMS, *HELPERS], metavar="NAME",
         help="some of: " + ", ".join([*PROGRAMS, *HELPERS]))  # fmt: skip
     add(

@@ -28,6 +28,7 @@ from benchmarks import (  # noqa: E402
     hard_scenes,
     motion,
     report,
+    scaling,
     scenes,
     sets,
     stall,
@@ -312,6 +313,39 @@ def test_systems_of_files_are_those_of_the_models(name, tmp_path):
     np.testing.assert_array_equal(points, scene.model.mesh.points[free[::3] // 3])
 
 
+# ---- over ranks ----------------------------------------------------------------------------------------
+
+
+def rank_row(n, engine, ranks, seconds, *, twice=False, threads=1, **words):
+    cells = scaling.cube(n, twice)
+    unknowns = 3 * cells[0] * n * n
+    plain = {"kind": "8N", "n": n, "engine": engine, "ranks": ranks, "cells": cells, "threads": threads}
+    plain |= {"unknowns": unknowns, "iterations": 10 + n // 10, "mesh": 0.0, "seconds": seconds}
+    plain |= {"phases": {"assemble": seconds / 4, "solve": seconds / 2}, "difference": 1e-12}
+    return plain | {"memory": 2e3 * unknowns / ranks, "imports": 1e8, "bytes written": 100 * unknowns} | words
+
+
+def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
+    rows = [
+        rank_row(100, "own", 1, 20.0),
+        rank_row(100, "petsc", 1, 25.0),
+        rank_row(100, "petsc", 2, 12.5),
+        rank_row(100, "petsc", 2, 26.0, twice=True),
+        rank_row(10, "petsc", 2, 0.1),
+        rank_row(10, "plain", 2, 1.0) | {"failed": "killed"},
+    ]
+    assert "| 8N n = 100 | 1.00 | 0.96 | 2.00 | 1.25 |" in scaling.goals(rows)
+    line = "| 8N 200×100×100 | 6000000 | 2 | 0.00 | 6.50 | 13.00 | 26.00 | 20 | 0.96 weak |  | 2.00 | 1e-12 |"
+    assert line in scaling.scaling(rows)
+    assert "| 8N n = 100 | own engine, 1 thread | 5.00 | 10.00 | 20.00 | 20 | 2.00 |" in scaling.others(rows)
+    files = [{"kind": "8N", "bytes": 30, "unknowns": 3}]
+    found = {"rows": rows, "files": files, "date": "", "machine": driver.machine(), "versions": {}}
+    text = scaling.page(found | {"repeats": 1})
+    # 8 iterations more for 6e6 / 3e3 unknowns; a rank of 5e5 takes a sixth of the 26 s, half of it in solve
+    assert "| 8N 1e9 | 2000 | 2200 | 10.0 | 100.0 | 26 | 5 |" in text
+    assert "- 8N 10x10x10 plain, 2 ranks: killed\n" in text
+
+
 # ---- sets, results and report --------------------------------------------------------------------------
 
 
@@ -436,7 +470,7 @@ def test_goal_table_gives_ratios():
     assert line in report.goals(rows)
 
 
-@pytest.mark.parametrize("module", [curves, tables, sets, stall, hard_scenes, report, command])
+@pytest.mark.parametrize("module", [curves, tables, sets, stall, hard_scenes, report, scaling, command])
 def test_examples_of_the_modules_hold(module):
     assert doctest.testmod(module).failed == 0
 
