@@ -108,12 +108,12 @@ class Directory:
         return Asked(self.ranks, ids, self.ids)
 
 
-def all_of(ranks: Alone, ids: Ints, values: Ints, wanted: Ints) -> tuple[Ints, Ints]:
+def all_of(ranks: Alone, ids: Ints, values: Any, wanted: Ints) -> tuple[Ints, Any]:
     """Return every value that ranks have given for the wanted ids: ids (q,) and values (q, c).
 
     Parameters
     ----------
-    ids, values : (k,) and (k, c) int, what this rank gives; an id may have any number of values.
+    ids, values : (k,) int and (k, c), what this rank gives; an id may have any number of values.
     wanted : (w,) int, each once.
     """
     route = Route(ranks, home(ranks, ids))

@@ -1,10 +1,15 @@
 """Inputs read by several ranks, each of which gets its share."""
 
+import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
+from kratos_part_files import write_part_files
 
 import kratos_lite as kl
+from kratos_lite.errors import InputError, MeshError
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 
@@ -30,6 +35,10 @@ def test_the_shares_make_the_whole(ranks, path):
     assert error == expected
     if whole is None or case is None:
         return
+    check_shares(ranks, whole, case)
+
+
+def check_shares(ranks, whole, case):
     mesh, all_of = case.model.mesh, whole.model.mesh
     assert ranks.sum(int(mesh.own_nodes.sum())) == all_of.n_nodes
     assert ranks.sum(int(mesh.own_elements.sum())) == all_of.n_elements
@@ -41,3 +50,113 @@ def test_the_shares_make_the_whole(ranks, path):
 
 
 test_the_shares_make_the_whole.cases = inputs()
+
+
+def folder_of(ranks):
+    """Return a new folder that all ranks know, and that rank 0 removes in the end."""
+    return Path(ranks.first(tempfile.mkdtemp() if ranks.rank == 0 else None))
+
+
+def parts_of_beam(ranks, folder, size=None, element="EnhancedStrain3D8N", seed=5):
+    """Write a beam with a support and a traction, and its part files; return both paths."""
+    size = ranks.size if size is None else size
+    path = folder / "whole" / "beam.mdpa"
+    if ranks.rank == 0:
+        path.parent.mkdir(exist_ok=True)
+        model = kl.Model(kl.box((3, 1, 1), cells=(6, 2, 2), element=element), kl.Isotropic3D(E=210e9, nu=0.3))
+        model.fix("x-", "xyz", 1e-4)
+        model.stress_free_at(np.where(model.supports.fixed, 0.0, 1e-5 * model.mesh.points))
+        model.add(kl.Traction("x+", (1e6, 2e6, -3e6)))
+        kl.write(path, model)
+        count = model.mesh.n_elements
+        chosen = np.random.default_rng(seed).integers(size, size=count)
+        write_part_files(path, folder, size, chosen)
+    ranks.sum(1)
+    return path, folder / "beam.mdpa"
+
+
+def test_part_files(ranks, element):
+    folder = folder_of(ranks)
+    try:
+        path, parts = parts_of_beam(ranks, folder, element=element)
+        whole = kl.read_case(path)
+        for name in (parts, folder / "beam_partitioned"):
+            case = kl.read_case(name, comm=ranks)
+            check_shares(ranks, whole, case)
+            mesh, rows = case.model.mesh, whole.model.mesh.node_rows(case.model.mesh.node_ids)
+            assert np.array_equal(case.model.initial_displacement, whole.model.initial_displacement[rows])
+            assert mesh.subdomain is not None
+        if ranks.size == 1:
+            with pytest.raises(InputError, match="there are 1 part files; solve them by"):
+                kl.read_case(parts)
+    finally:
+        ranks.sum(1)
+        if ranks.rank == 0:
+            shutil.rmtree(folder)
+
+
+test_part_files.cases = ["KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D20N"]
+
+
+def cut(file):
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text[: len(text) // 3], encoding="utf-8")
+
+
+def move(file):
+    """Move each node of a part file a little."""
+    lines = file.read_text(encoding="utf-8").split("\n")
+    first, last = lines.index("Begin Nodes"), lines.index("End Nodes")
+    for i in range(first + 1, last):
+        words = lines[i].split()
+        lines[i] = " ".join([words[0], str(float(words[1]) + 1e-3), *words[2:]])
+    file.write_text("\n".join(lines), encoding="utf-8")
+
+
+def stranger(file):
+    text = file.read_text(encoding="utf-8")
+    at = text.index("Begin NodalData PARTITION_INDEX")
+    head, *rest = text[at:].split("\n")
+    words = rest[0].split()
+    file.write_text("\n".join([text[:at] + head, f"{words[0]} 0 7", *rest[1:]]), encoding="utf-8")
+
+
+def test_broken_part_files(ranks, damage, text):
+    """One error on all ranks, which names the file or the node."""
+    folder = folder_of(ranks)
+    try:
+        _, parts = parts_of_beam(ranks, folder)
+        if ranks.rank == 0:
+            damage(folder / "beam_partitioned" / f"beam_{ranks.size - 1}.mdpa")
+        ranks.sum(1)
+        if damage is move and ranks.size == 1:
+            return  # nobody to disagree with
+        if damage is Path.unlink and ranks.size == 1:
+            text = "no such file"
+        with pytest.raises((InputError, MeshError), match=text) as found:
+            kl.read_case(parts, comm=ranks)
+        assert len(set(ranks.gather(str(found.value)))) == 1
+    finally:
+        ranks.sum(1)
+        if ranks.rank == 0:
+            shutil.rmtree(folder)
+
+
+test_broken_part_files.cases = [
+    (cut, r"beam_\d.mdpa:\d+"),
+    (Path.unlink, r"part files"),
+    (move, r"node \d+"),
+    (stranger, r"PARTITION_INDEX of node \d+ is 7"),
+]
+
+
+def test_other_numbers_of_part_files_than_ranks(ranks):
+    folder = folder_of(ranks)
+    try:
+        _, parts = parts_of_beam(ranks, folder, size=ranks.size + 1)
+        with pytest.raises(InputError, match=f"there are {ranks.size + 1} part files"):
+            kl.read_case(parts, comm=ranks)
+    finally:
+        ranks.sum(1)
+        if ranks.rank == 0:
+            shutil.rmtree(folder)

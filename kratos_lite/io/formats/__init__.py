@@ -48,12 +48,11 @@ def read_document(path: str | Path, *, strict: bool = True, ranks: Alone = ALONE
     share.
     """
     with naming(str(path)):
-        document = _read(Path(path), strict)
         if ranks is ALONE:
-            return document
-        from kratos_lite.io.formats.ranks import shared  # one process does without it
+            return _read(Path(path), strict)
+        from kratos_lite.io.formats.ranks import read_shared  # one process does without it
 
-        return shared(document, ranks)
+        return read_shared(Path(path), ranks, strict, _read)
 
 
 def _read(path: Path, strict: bool) -> Document:
@@ -64,6 +63,8 @@ def _read(path: Path, strict: bool) -> Document:
     if kind == ".mdpa":
         from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
+        if not path.exists():
+            _refuse_part_files(path)
         return read_mdpa(path, strict=strict)
     if kind in ELEM_SET or (not path.is_file() and _is_stem(path)):
         from kratos_lite.io.formats.elem import read_elem
@@ -72,6 +73,7 @@ def _read(path: Path, strict: bool) -> Document:
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
     if path.is_dir():
+        _refuse_part_files(path)
         raise InputError(f"{path}: is a folder without {PROJECT}; name a file in it")
     from kratos_lite.io.formats.gmsh import GEOMETRY, meshing
 
@@ -80,6 +82,17 @@ def _read(path: Path, strict: bool) -> Document:
     from kratos_lite.io.formats.meshio import read_meshio
 
     return read_meshio(path)
+
+
+def _refuse_part_files(path: Path) -> None:
+    """Raise InputError where a path stands for part files, which one process does not read."""
+    from kratos_lite.io.formats.part_files import part_files  # rarely needed
+
+    if files := part_files(path):
+        raise InputError(
+            f"{path}: there are {len(files)} part files; solve them by "
+            f"`mpirun -n {len(files)} kratos-lite solve {path} --engine petsc`"
+        )
 
 
 def write_document(path: str | Path, document: Document) -> list[str]:

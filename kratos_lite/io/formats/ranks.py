@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 
 from kratos_lite.distributed.partition import parts_of
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.io.formats.document import Constraint, Document
+from kratos_lite.io.formats.part_files import part_files, read_part_files
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
+
+
+def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bool], Document]) -> Document:
+    """Return what this rank holds of a model file, or of the part files that it stands for.
+
+    Parameters
+    ----------
+    path : the file.
+    ranks : that share the model.
+    strict : of `.mdpa` files, as for one process.
+    read : reads the whole file.
+    """
+    files = part_files(path)
+    return read_part_files(files, path, ranks, strict) if files else shared(read(path, strict), ranks)
 
 
 def shared(document: Document, ranks: Alone) -> Document:

@@ -137,11 +137,22 @@ def _check_solver(solver: Settings) -> list[str]:
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
 
 
+def _mesh_file(source: Settings, folder: Path, outside: bool, ranks: Alone) -> tuple[Path, str]:
+    """Return the mesh file, and a note if it stands elsewhere; over ranks it may stand for part files."""
+    if ranks is not ALONE:
+        from kratos_lite.io.formats.part_files import part_files  # one process does without it
+
+        path = folder / (source.text("input_filename") + ".mdpa")
+        if part_files(path):
+            return path, ""
+    return find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+
+
 def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], ranks: Alone) -> Document:
     source = solver.section("model_import_settings", required=True)
     kind = source.text("input_type", "mdpa")
     source.expect(kind == "mdpa", "input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
-    path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+    path, note = _mesh_file(source, folder, outside, ranks)
     document = read_document(path, ranks=ranks)
     check_elements(document)
     notes += [note] if note else []
