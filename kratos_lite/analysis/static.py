@@ -254,6 +254,7 @@ class StaticAnalysis:
                 noise = float(np.finfo(float).eps * system.norm)
             with phase("solve"):
                 u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
+                warnings += system.warnings
                 u = self._complete(u, system, case.moving)
                 noise *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from itertools import count
 from typing import Any
 
+import numpy as np
+
 from kratos_lite.distributed.petsc import PREFIX, clear_options, petsc, plain_errors, set_options, unused
 from kratos_lite.solvers.iteration import MAX_ITERATIONS, Share
 from kratos_lite.typing import Progress
@@ -21,6 +23,11 @@ STOPPED = {
 }
 """Reasons of PETSc, in words."""
 NUMBERS = count()
+EPSILON = float(np.finfo(float).eps)
+MAXIMUM = 3
+"""PETSc's number of the maximum norm."""
+REFINEMENTS = 2
+"""Solutions for what is left where the true residual is too large."""
 
 
 class Krylov:
@@ -41,7 +48,7 @@ class Krylov:
     def __init__(self, A: Any, chosen: Mapping[str, str | None], given: Mapping[str, str | None]) -> None:
         self.prefix = f"{PREFIX}{next(NUMBERS)}_"
         self.options, self.given = {**chosen, **given}, dict(given)
-        self.is_ready = False
+        self._A, self._is_ready = A, False
         self._error: BaseException | None = None
         self._share: Share | None = None
         with plain_errors():
@@ -60,24 +67,69 @@ class Krylov:
             return f"{self.options.get('pc_factor_mat_solver_type') or preconditioner} (PETSc)"
         return f"{kind} + {'own multigrid' if preconditioner == 'python' else preconditioner} (PETSc)"
 
-    def set_up(self) -> None:
-        """Prepare what does not depend on the right side."""
+    def set_up(self, progress: Progress | None = None) -> None:
+        """Prepare what does not depend on the right side, once."""
+        if self._is_ready:
+            return
+        if progress:
+            progress("set up", 0.0)
         with plain_errors():
             self.ksp.setUp()
             self.ksp.setUpOnBlocks()
-        self.is_ready = True
+        if progress:
+            progress("set up", 1.0)
+        self._is_ready = True
 
     def solve(
-        self, b: Any, x: Any, tolerance: float, progress: Progress | None = None, near: bool = False
-    ) -> tuple[int, str]:
-        """Solve for x, from where it is if `near`; return the iterations, and why it failed ("" if not).
+        self,
+        b: Any,
+        x: Any,
+        tolerance: float,
+        norm: float,
+        progress: Progress | None = None,
+        near: bool = False,
+    ) -> tuple[int, float, str]:
+        """Solve for x, until the true residual is small; that of the iteration drifts from it by rounding.
 
         Parameters
         ----------
-        b, x : vectors of PETSc.
+        b, x : vectors of PETSc; the iteration begins at x if `near`.
         tolerance : of the residual, relative to b, unless the user's options have one.
+        norm : of the matrix, the largest row sum.
         progress : called on the ranks that give one.
+
+        Returns
+        -------
+        Iterations, backward error, and why it failed, or an empty text.
         """
+        if self.given.get("ksp_rtol"):
+            tolerance = float(self.given["ksp_rtol"] or tolerance)
+        size = b.norm()
+        if size == 0.0:
+            x.set(0.0)
+            return 0, 0.0, ""
+        self.set_up(progress)
+        iterations, failure = self._iterate(b, x, tolerance, progress, near)
+        left, step = b.duplicate(), x.duplicate()
+        for attempt in range(1 + REFINEMENTS):
+            self._A.mult(x, left)
+            left.aypx(-1.0, b)
+            rounding = 2 * EPSILON * (norm * x.norm() + size)
+            found = left.norm()
+            if failure or attempt == REFINEMENTS or found <= max(tolerance * size, rounding):
+                break
+            more, failure = self._iterate(left, step, min(max(tolerance * size, rounding) / found, 0.1))
+            iterations += more
+            x.axpy(1.0, step)
+        error = left.norm(MAXIMUM) / (norm * x.norm(MAXIMUM) + b.norm(MAXIMUM))
+        left.destroy()
+        step.destroy()
+        return iterations, float(error), failure
+
+    def _iterate(
+        self, b: Any, x: Any, tolerance: float, progress: Progress | None = None, near: bool = False
+    ) -> tuple[int, str]:
+        """Run PETSc's solver once; return the iterations, and why it failed."""
         ksp = self.ksp
         ksp.setInitialGuessNonzero(near)
         ksp.setTolerances(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import glob
 import re
@@ -11,6 +12,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
+from weakref import WeakSet
+
+import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 
@@ -29,6 +33,7 @@ MEANINGS = {
     71: "a pivot is 0, so that the matrix is singular: parts may be free to move, or nearly so",
     76: "a library that PETSc uses has failed: {}",
     86: "PETSc has no such type: {}; it may be misspelt, or PETSc was made without it",
+    92: "PETSc was made without this factorization: {}; take solver='amg', or a PETSc with MUMPS",
     91: "PETSc met a number that is not finite, or a pivot of 0: {}",
 }
 """What error codes of PETSc say and what to do; ``{}`` stands for the words of PETSc."""
@@ -52,7 +57,7 @@ def petsc() -> Any:
     try:
         import petsc4py
 
-        petsc4py.init([])  # not the options of our own command line
+        petsc4py.init(["kratos-lite", "-no_signal_handler"])  # not the options of our own command line
         from petsc4py import PETSc
     except (ImportError, ValueError, RuntimeError) as error:
         raise InputError(
@@ -60,7 +65,37 @@ def petsc() -> Any:
         ) from None
     if PETSc.ScalarType().dtype.kind != "f":
         raise InputError("petsc4py is one for complex numbers; install one for real numbers")
+    atexit.register(_destroy_all)  # PETSc itself ends when Python has ended, which its objects may call
     return PETSc
+
+
+LIVE: WeakSet[Any] = WeakSet()
+"""What holds objects of PETSc and has not been destroyed."""
+
+
+def _destroy_all() -> None:
+    for one in list(LIVE):
+        one.destroy()
+
+
+@lru_cache(maxsize=1)
+def has_mumps() -> bool:
+    """Return whether PETSc was made with MUMPS, which factorizes over ranks."""
+    PETSc = petsc()
+    one, pc = np.ones(1), PETSc.PC().create(PETSc.COMM_SELF)
+    pointers = np.array([0, 1], dtype=PETSc.IntType), np.array([0], dtype=PETSc.IntType)
+    A = PETSc.Mat().createAIJ((1, 1), csr=(*pointers, one), comm=PETSc.COMM_SELF)
+    try:
+        pc.setOperators(A)
+        pc.setType("lu")
+        pc.setFactorSolverType("mumps")
+        pc.setUp()
+    except PETSc.Error:
+        return False
+    finally:
+        pc.destroy()
+        A.destroy()
+    return True
 
 
 def _cure(error: BaseException) -> str:

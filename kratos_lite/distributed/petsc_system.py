@@ -14,7 +14,7 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.distributed.constraints import numbers_of_dofs, slaves_over_ranks
 from kratos_lite.distributed.krylov import Krylov
-from kratos_lite.distributed.petsc import parsed, petsc, plain_errors
+from kratos_lite.distributed.petsc import LIVE, parsed, petsc, plain_errors
 from kratos_lite.distributed.petsc_matrix import (
     add_rigid_modes,
     eliminated,
@@ -22,7 +22,7 @@ from kratos_lite.distributed.petsc_matrix import (
     petsc_matrix,
     transformation,
 )
-from kratos_lite.distributed.preconditioner import CONJUGATE_GRADIENTS, choose, options_of
+from kratos_lite.distributed.preconditioner import FALLBACK_LIMIT, choose, options_of
 from kratos_lite.distributed.shell import product_of, set_multigrid
 from kratos_lite.distributed.stiffness import SharedStiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
@@ -35,13 +35,11 @@ from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 
-EPSILON = float(np.finfo(float).eps)
-MAXIMUM = 3
-"""PETSc's number of the maximum norm."""
-REFINEMENTS = 2
-"""Solutions for what is left, where rounding has carried the residual of an iteration from the true one."""
-ROUNDED = 1e-13
-"""Backward error that rounding alone may leave."""
+CURE = (
+    "look for thin elements, nearly free parts or plain elements with ν near 0.5 "
+    "(formulation='non_locking' takes others), or ask for solver='direct'"
+)
+"""What helps where an iteration fails."""
 
 
 @record(eq=False)
@@ -112,7 +110,9 @@ class PetscSystem:
         self.unknowns = unknowns
         self.method, self.reason = choose(solver, unknowns, nearly, self._given)
         self._solver: Krylov | None = None
+        self._A: Any = None
         self._T: Any = None
+        LIVE.add(self)
 
     # ---- numbering ---------------------------------------------------------------------------------
 
@@ -156,10 +156,9 @@ class PetscSystem:
 
     def _carry(self, c: Array) -> None:
         """Let c carry the free along where all supports displace alike, as `constraint_map` does."""
-        held = self._fixed.copy()
-        held[np.setdiff1d(np.arange(self.n_nodes), self.nodes)] = False
-        low = self.ranks.min(np.where(held, c, np.inf).min(axis=0, initial=np.inf))
-        high = self.ranks.max(np.where(held, c, -np.inf).max(axis=0, initial=-np.inf))
+        held, at = self._fixed[self.nodes], c[self.nodes]
+        low = self.ranks.min(np.where(held, at, np.inf).min(axis=0, initial=np.inf))
+        high = self.ranks.max(np.where(held, at, -np.inf).max(axis=0, initial=-np.inf))
         for axis in np.flatnonzero((low == high) & (low != 0)):
             c[:, axis] = low[axis]
 
@@ -197,7 +196,7 @@ class PetscSystem:
                 self._T = transformation(A, slaves)
                 A = eliminated(A, self._T, np.array(sorted(slaves), dtype=np.int64))
             add_rigid_modes(self.ranks, A, self.points[self._rows], self._free[self._rows])
-        self._A, self._solver = A, Krylov(A, options_of(self.method), self._given)
+        self._A, self._solver = A, self._iteration(A, multigrid=True)
 
     def _takes_own_multigrid(self) -> bool:
         """Return whether our multigrid preconditions: without constraints, and unless options name another.
@@ -219,8 +218,11 @@ class PetscSystem:
         self._norm = K.norm()
         with plain_errors():
             self._A = product_of(K)
-            self._solver = Krylov(self._A, CONJUGATE_GRADIENTS, self._given)
+            self._solver = self._iteration(self._A, multigrid=False)
             set_multigrid(self._solver.ksp, K)
+
+    def _iteration(self, A: Any, multigrid: bool) -> Krylov:
+        return Krylov(A, options_of(self.method, self._given, multigrid), self._given)
 
     def _masters(self) -> dict[int, dict[int, float]]:
         """Return the weights of the masters of own slaves, by the numbers of equations."""
@@ -271,51 +273,28 @@ class PetscSystem:
             self._reduce(load, b)
             if start is not None:
                 x.setArray(((start - c) * self._free)[self._rows].ravel())
-            solution = self._found(
-                b, x, self.tolerance if tolerance is None else tolerance, start is not None
-            )
+            solution = self._found(b, x, tolerance, start is not None)
             u = self._expand(x, c)
             b.destroy()
             x.destroy()
         return u, replace(solution, x=u)
 
     def _found(self, b: Any, x: Any, tolerance: float, near: bool) -> Solution:
-        """Solve A x = b until the true residual is small."""
+        """Solve A x = b; where the iteration fails and no options are given, a small one by factorization."""
         solver = self._solver_made()
-        if "ksp_rtol" in self._given:
-            tolerance = float(self._given["ksp_rtol"] or tolerance)
-        size = b.norm()
-        if size == 0.0:
-            x.set(0.0)
-            return Solution(np.zeros(0), solver.name, self.reason, 0, 0.0)
-        if not solver.is_ready:
-            self._note("set up", 0.0)
-            solver.set_up()
-            self._note("set up", 1.0)
-        left, step, iterations = b.duplicate(), x.duplicate(), 0
-        for attempt in range(1 + REFINEMENTS):
-            if attempt == 0:
-                count, failure = solver.solve(b, x, tolerance, self.progress, near)
-            else:
-                count, failure = solver.solve(left, step, min(tolerance * size / left.norm(), 0.1))
-                x.axpy(1.0, step)
-            iterations += count
-            self._A.mult(x, left)
-            left.aypx(-1.0, b)
-            rounding = 2 * EPSILON * (self._norm * x.norm() + size)
-            if failure or left.norm() <= max(tolerance * size, rounding):
-                break
-        scale = self._norm * x.norm(MAXIMUM) + b.norm(MAXIMUM)
-        error = left.norm(MAXIMUM) / scale
-        for one in (left, step):
-            one.destroy()
+        count, error, failure = solver.solve(b, x, tolerance, self._norm, self.progress, near)
+        reason = self.reason
+        if failure and self.method == "amg" and not self._given and self.unknowns <= FALLBACK_LIMIT:
+            self.destroy()
+            self.method = "direct"
+            solver, reason = self._solver_made(), failure
+            count, error, failure = solver.solve(b, x, tolerance, self._norm, self.progress)
         if failure:
-            raise SolveError(failure)
-        return Solution(np.zeros(0), solver.name, self.reason, iterations, float(error))
-
-    def _note(self, phase: str, share: float) -> None:
-        if self.progress:
-            self.progress(phase, share)
+            raise SolveError(f"{failure}; {CURE}")
+        if left := solver.unused():
+            words = " ".join(f"-{one}" for one in left)
+            self.warnings = [f"PETSc has not used these options: {words}; they may be misspelt"]
+        return Solution(np.zeros(0), solver.name, reason, count, error)
 
     def _reduce(self, forces: Array, b: Any) -> None:
         """Put T^T f of nodal forces (n, 3) into b."""
@@ -363,12 +342,10 @@ class PetscSystem:
 
     def destroy(self) -> None:
         """Let go of matrix and solver; all ranks call it at the same time, as PETSc asks for."""
-        if self._solver is not None:
-            self._solver.destroy()
-            for one in (self._A, self._T):
-                if one is not None:
-                    one.destroy()
-        self._solver = self._T = None
+        for one in (self._solver, self._A, self._T):
+            if one is not None:
+                one.destroy()
+        self._solver = self._A = self._T = None
 
 
 def _whole(mesh: Mesh) -> Subdomain:

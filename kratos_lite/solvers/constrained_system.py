@@ -61,7 +61,7 @@ class ConstrainedSystem:
     nodes : (a,) int, rows of these nodes among all n.
     reduced : the constraint map, from the free degrees of freedom to all 3a.
     method, reason : which solver is used, and why.
-    skipped : what assembly left out, in words.
+    skipped, warnings : what assembly left out, and what is to be said, in words.
 
     Examples
     --------
@@ -97,6 +97,7 @@ class ConstrainedSystem:
         self.tolerance, self.progress = tolerance, progress
         self._hanging = hanging if hanging is None else hanging.among(self.nodes, self.n_nodes)
         self.skipped: list[str] = []
+        self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
         dofs = 3 * len(self.nodes)
         self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
