@@ -20,7 +20,7 @@ def describe(document: Document) -> str:
     mesh = document.mesh
     lines = [f"{'file':<12}{mesh.source}", f"{'nodes':<12}{mesh.n_nodes}"]
     if mesh.n_nodes:
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        low, high = mesh.extent
         lines.append(
             f"{'extent':<12}" + " × ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high, strict=True)) + " m"
         )

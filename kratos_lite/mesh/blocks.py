@@ -148,8 +148,17 @@ class Part:
         return Part, tuple(getattr(self, name) for name in names_of(type(self)))
 
     def __str__(self) -> str:
-        sizes = {"nodes": self.nodes, "elements": self.elements, "conditions": self.conditions}
-        return ", ".join(f"{len(rows)} {what}" for what, rows in sizes.items() if len(rows)) or "empty"
+        return listed([len(self.nodes), len(self.elements), len(self.conditions)])
+
+
+def listed(counts: Sequence[int]) -> str:
+    """Return in words how many nodes, elements and conditions a part has.
+
+    >>> listed([4, 0, 2])
+    '4 nodes, 2 conditions'
+    """
+    words = zip(counts, ("nodes", "elements", "conditions"), strict=True)
+    return ", ".join(f"{count} {what}" for count, what in words if count) or "empty"
 
 
 def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, blocks_of, ids_of, rows_of_ids
+from kratos_lite.mesh.subdomain import ALONE, Alone, Subdomain
 from kratos_lite.mesh.topology import Faces
 from kratos_lite.typing import Array, Ints, Mask
 
@@ -30,6 +31,7 @@ class Cells:
     node_ids : (n,) int, ids of the nodes; 1 … n if not given.
     source : name of the file they came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, or None.
+    subdomain : which nodes and cells are own, where many processes share them, or None.
 
     Raises
     ------
@@ -42,6 +44,7 @@ class Cells:
     blocks: tuple[Block, ...]
     source: str
     hanging: HangingNodes | None
+    subdomain: Subdomain | None
 
     def __init__(
         self,
@@ -50,6 +53,7 @@ class Cells:
         node_ids: ArrayLike | None,
         source: str,
         hanging: HangingNodes | None = None,
+        subdomain: Subdomain | None = None,
     ) -> None:
         X = finite(points, "points", ("n", 3), error=MeshError)
         n = len(X)
@@ -60,6 +64,7 @@ class Cells:
             blocks=blocks_of(blocks),
             source=source,
             hanging=hanging,
+            subdomain=subdomain,
         )
         if not self._is_counting:
             ordered = self.node_ids[self._node_order]
@@ -83,6 +88,34 @@ class Cells:
                     f"{self.place(block, cell)} uses node rows {block.nodes[cell].tolist()}; "
                     f"rows are 0 … {self.n_nodes - 1}"
                 )
+
+    # ---- what is own, where many processes share the mesh ----------------------------------
+
+    @property
+    def ranks(self) -> Alone:
+        """The processes that share the mesh."""
+        return ALONE if self.subdomain is None else self.subdomain.ranks
+
+    @property
+    def own_nodes(self) -> Mask:
+        """(n,) bool, the nodes of this process: all, unless others share the mesh."""
+        return np.ones(self.n_nodes, dtype=bool) if self.subdomain is None else self.subdomain.mine
+
+    @property
+    def own_elements(self) -> Mask:
+        """(m,) bool, the elements of this process."""
+        return np.ones(self.n_elements, dtype=bool) if self.subdomain is None else self.subdomain.own_elements
+
+    @cached_property
+    def extent(self) -> Array:
+        """(2, 3) float, m, the lowest and the highest coordinates, of the nodes of all processes.
+
+        Without nodes they are infinite.
+        """
+        low, high = self.points.min(axis=0, initial=np.inf), self.points.max(axis=0, initial=-np.inf)
+        return read_only(np.stack([self.ranks.min(low), self.ranks.max(high)]))
+
+    # ---- nodes and elements ----------------------------------------------------------------
 
     @property
     def n_nodes(self) -> int:

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import Block, Part, blocks_of, select
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, listed, select
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.selection import (
     Where,
     WhereElements,
-    elements_among,
     find_elements,
     find_nodes,
     find_part,
 )
-from kratos_lite.mesh.subdomain import ALONE, Alone, Subdomain
+from kratos_lite.mesh.subdomain import Subdomain
 from kratos_lite.mesh.topology import inverted, mirror
+from kratos_lite.mesh.totals import Totals
 from kratos_lite.records import Tabular, replace
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
@@ -66,7 +67,6 @@ class Mesh(Cells, Tabular):
     """
 
     conditions: tuple[Block, ...]
-    subdomain: Subdomain | None
     _parts: dict[str, Part]
 
     def __init__(
@@ -81,11 +81,9 @@ class Mesh(Cells, Tabular):
         hanging: HangingNodes | None = None,
         subdomain: Subdomain | None = None,
     ) -> None:
-        super().__init__(points, blocks, node_ids, source, hanging)
+        super().__init__(points, blocks, node_ids, source, hanging, subdomain)
         named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
-        vars(self).update(
-            conditions=blocks_of(conditions, "conditions"), _parts=dict(named), subdomain=subdomain
-        )
+        vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
         self._check_rows(self.conditions)
         self._check_parts()
         if subdomain is not None:
@@ -105,6 +103,7 @@ class Mesh(Cells, Tabular):
         for what, (expected, found) in sizes.items():
             if expected != found:
                 raise MeshError(f"a subdomain of {expected} {what} cannot be that of a mesh with {found}")
+        _ = self.extent, self.totals  # while all ranks are here: one of them alone may ask for these later
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""
@@ -163,29 +162,18 @@ class Mesh(Cells, Tabular):
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
 
-    # ---- what is own, where many processes share the mesh ----------------------------------
-
-    @property
-    def ranks(self) -> Alone:
-        """The processes that share the mesh."""
-        return ALONE if self.subdomain is None else self.subdomain.ranks
-
-    @property
-    def own_nodes(self) -> Mask:
-        """(n,) bool, the nodes of this process: all, unless others share the mesh."""
-        return np.ones(self.n_nodes, dtype=bool) if self.subdomain is None else self.subdomain.mine
-
-    @property
-    def own_elements(self) -> Mask:
-        """(m,) bool, the elements of this process."""
-        return np.ones(self.n_elements, dtype=bool) if self.subdomain is None else self.subdomain.own_elements
-
     @property
     def own_conditions(self) -> Mask:
         """(c,) bool, the conditions of this process."""
         if self.subdomain is None:
             return np.ones(self.n_conditions, dtype=bool)
         return self.subdomain.own_conditions
+
+    @cached_property
+    def totals(self) -> Totals:
+        """How many nodes, elements and conditions all processes have, also by block and part."""
+        own = self.own_nodes, self.own_elements, self.own_conditions
+        return Totals(self.ranks, self.blocks, self.conditions, own, self._parts)
 
     # ---- parts -----------------------------------------------------------------------------
 
@@ -213,7 +201,7 @@ class Mesh(Cells, Tabular):
         MeshError
             If there is no such part, or several.
         """
-        return find_part(name, self._parts, self.points)
+        return find_part(name, self._parts, self)
 
     def add_part(self, name: str, where: Where) -> None:
         """Give nodes a name.
@@ -238,16 +226,18 @@ class Mesh(Cells, Tabular):
         if not isinstance(name, str) or not name:
             raise MeshError(f"a part needs a name; got {name!r}")
         rows = self.nodes(where)
-        if not len(rows):
+        if not self.ranks.any(len(rows) > 0):
             raise MeshError(f"no node is chosen for part {name!r}")
         if name in self._parts:
-            if set(self._parts[name].nodes.tolist()) != set(rows.tolist()):
+            if self.ranks.any(set(self._parts[name].nodes.tolist()) != set(rows.tolist())):
                 raise MeshError(
                     f"there is a part {name!r} with other nodes already, on which supports and loads may "
                     "rely; take another name, or make the mesh anew"
                 )
             return
         self._parts[name] = Part(nodes=rows)
+        if "totals" in vars(self):
+            self.totals.add({name: self._parts[name]})
 
     def nodes(self, where: Where) -> Ints:
         """Return the rows of nodes, each once and in the order in which they are given.
@@ -271,7 +261,7 @@ class Mesh(Cells, Tabular):
         >>> mesh.nodes(lambda X: X[:, 0] > 0.5)
         array([1])
         """
-        return self.part(where).nodes if isinstance(where, str) else find_nodes(where, self.points)
+        return self.part(where).nodes if isinstance(where, str) else find_nodes(where, self)
 
     def elements(self, where: WhereElements = None) -> Ints:
         """Return the rows of elements.
@@ -293,18 +283,13 @@ class Mesh(Cells, Tabular):
         """
         if where is None:
             return np.arange(self.n_elements)
-        if not isinstance(where, str):
-            return find_elements(where, self)
-        part = self.part(where)
-        rows = part.elements if len(part.elements) else elements_among(part.nodes, self)
-        if not len(rows):
-            raise MeshError(f"part {where!r} has no elements")
-        return rows
+        return find_elements(where, self.part(where) if isinstance(where, str) else None, self)
 
     def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
         """Return which elements contain points, and where in them the points lie.
 
-        A point on a face, edge or node of several elements belongs to the one in the lowest row.
+        A point on a face, edge or node of several elements belongs to the one in the lowest row.  Processes
+        that share a mesh all ask for the same points; each finds those in elements that it holds.
 
         Parameters
         ----------
@@ -370,14 +355,15 @@ class Mesh(Cells, Tabular):
         extent    [0, 1] × [0, 1] × [0, 1] m
         elements  1 KinematicLinear3D4N
         """
-        rows = [("nodes", str(self.n_nodes))]
-        if self.n_nodes:
-            low, high = self.points.min(axis=0), self.points.max(axis=0)
-            sides = [f"[{a + 0.0:g}, {b + 0.0:g}]" for a, b in zip(low, high, strict=True)]  # no -0
+        totals = self.totals
+        rows = [("nodes", str(totals.counts["nodes"]))]
+        if np.isfinite(self.extent).all():
+            sides = [f"[{a + 0.0:g}, {b + 0.0:g}]" for a, b in self.extent.T]  # no -0
             rows.append(("extent", " × ".join(sides) + " m"))
         for label, blocks in (("elements", self.blocks), ("conditions", self.conditions)):
-            rows += [(label, f"{len(block)} {block.name}") for block in blocks if len(block)]
-        return rows + [("part", f"{name}: {part}") for name, part in self.parts.items()]
+            counted = zip(blocks, totals.blocks[label], strict=True)
+            rows += [(label, f"{count} {block.name}") for block, (count,) in counted if count]
+        return rows + [("part", f"{name}: {listed(totals.parts[name])}") for name in self.parts]
 
     def __repr__(self) -> str:
         return f"Mesh({self.n_nodes} nodes, {self.n_elements} elements)"
@@ -412,11 +398,15 @@ class Mesh(Cells, Tabular):
         list of Block
             One block for each shape of faces.
         """
-        if isinstance(where, str) and len(rows := self.part(where).conditions):
+        rows = self.part(where).conditions if isinstance(where, str) else NO_ROWS
+        if self.ranks.any(len(rows) > 0):
             return select(self.conditions, rows)
-        inside = np.zeros(self.n_nodes, dtype=bool)
+        inside, own = np.zeros(self.n_nodes, dtype=bool), self.own_nodes
         inside[self.nodes(where)] = True
-        chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
+        chosen = [
+            block.take(np.asarray(inside[block.nodes].all(axis=1) & own[block.nodes].any(axis=1)))
+            for block in self.boundary  # where no node is own, it is that of the halo
+        ]
         return [block for block in chosen if len(block)]
 
 
