@@ -6,6 +6,8 @@ import pytest
 import kratos_lite as kl
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.errors import MeshError, ModelError
+from kratos_lite.mesh.order import raised
+from kratos_lite.mesh.refinement import refine
 
 
 def whole_mesh(element="Element3D8N"):
@@ -146,3 +148,13 @@ def test_ranks_with_other_blocks_are_refused(ranks):
         return
     with pytest.raises(MeshError, match=r"rank 0 has Element3D8N.*, rank 1 KinematicLinear3D8N"):
         mesh.replace(blocks=blocks)
+
+
+def test_what_needs_the_whole_mesh_is_refused(ranks):
+    mesh = cut(ranks, kl.box(cells=(3, 1, 1)))
+    for change in (refine, raised):
+        if ranks.size == 1:
+            assert change(mesh).mesh.n_nodes > mesh.n_nodes
+        else:
+            with pytest.raises(MeshError, match=f"that {ranks.size} ranks share keeps its elements"):
+                change(mesh)
