@@ -66,7 +66,7 @@ def check_whole(mesh: Mesh) -> None:
     """Raise MeshError for a mesh that several processes share."""
     if mesh.ranks.size > 1:
         raise MeshError(
-            f"a mesh that {mesh.ranks.size} ranks share keeps its elements; refine it, or raise its order, on "
+            f"a mesh that {mesh.ranks.size} ranks share keeps its elements; refine it or raise its order on "
             "one process, write it to a file, and let the ranks read that"
         )
 
