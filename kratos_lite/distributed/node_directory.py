@@ -36,7 +36,7 @@ class NodeDirectory:
     def __init__(self, ranks: Alone, piece: Piece) -> None:
         self.ranks, self.directory = ranks, Directory(ranks, piece.node_ids)
         given = self.directory.given
-        self.points = self._places(given.tell(np.asarray(piece.points, dtype=float)))
+        self.points = _places(self.directory, piece)
         self.order = np.zeros(len(self.directory.ids), dtype=np.int64)
         self.order[given.rows] = given.tell(piece.node_ids if piece.order is None else piece.order)
         self.owner = self._owners(piece)
@@ -50,30 +50,7 @@ class NodeDirectory:
         MeshError
             Nobody knows a node.
         """
-        kinds = list(kinds)
-        ids = distinct(np.concatenate([more, *(kind.nodes.ravel() for kind in kinds)]))
-        asked = self.directory.ask(ids)
-        missing = ids[~asked.has()]
-        if len(missing):
-            raise MeshError(_who_needs(kinds, int(missing[0])))
-        return ids, asked
-
-    def _places(self, given: Array) -> Array:
-        """Return the place of each node; MeshError where ranks give different ones."""
-        rows, sources = self.directory.given.rows, self.directory.given.sources
-        first = np.empty(len(self.directory.ids), dtype=np.int64)
-        first[rows[::-1]] = np.arange(len(rows))[::-1]
-        points = given[first]
-        differ = np.flatnonzero((given != points[rows]).any(axis=1))
-        if len(differ):
-            other = differ[0]
-            row = rows[other]
-            raise MeshError(
-                f"node {self.directory.ids[row]} is at {points[row].tolist()} m on rank "
-                f"{sources[first[row]]}, but at {given[other].tolist()} m on rank {sources[other]}; "
-                "give a node the same place on all ranks, and read parts that were made together"
-            )
-        return points
+        return _asked(self.directory, kinds, more)
 
     def _owners(self, piece: Piece) -> Ints:
         """Return the owner of each node: the one given, or the lowest rank with an element, or the node."""
@@ -112,6 +89,43 @@ class NodeDirectory:
         numbers = np.empty(len(ids), dtype=np.int64)
         numbers[by_order] = first + np.arange(len(ids))
         return ids[by_order], to_owners.back(numbers)
+
+
+def places(ranks: Alone, piece: Piece, kinds: Iterable[Kind]) -> tuple[Ints, Array]:
+    """Return the nodes of cells: ids (n,), ascending, and places (n, 3); all ranks call it."""
+    directory = Directory(ranks, piece.node_ids)
+    table = _places(directory, piece)
+    ids, asked = _asked(directory, kinds)
+    return ids, asked.answer(table)
+
+
+def _asked(directory: Directory, kinds: Iterable[Kind], more: Ints = NO_ROWS) -> tuple[Ints, Asked]:
+    kinds = list(kinds)
+    ids = distinct(np.concatenate([more, *(kind.nodes.ravel() for kind in kinds)]))
+    asked = directory.ask(ids)
+    missing = ids[~asked.has()]
+    if len(missing):
+        raise MeshError(_who_needs(kinds, int(missing[0])))
+    return ids, asked
+
+
+def _places(directory: Directory, piece: Piece) -> Array:
+    """Return the place of each node of a directory; MeshError where ranks give different ones."""
+    rows, sources = directory.given.rows, directory.given.sources
+    given = directory.given.tell(np.asarray(piece.points, dtype=float))
+    first = np.empty(len(directory.ids), dtype=np.int64)
+    first[rows[::-1]] = np.arange(len(rows))[::-1]
+    points: Array = given[first]
+    differ = np.flatnonzero((given != points[rows]).any(axis=1))
+    if len(differ):
+        other = differ[0]
+        row = rows[other]
+        raise MeshError(
+            f"node {directory.ids[row]} is at {points[row].tolist()} m on rank "
+            f"{sources[first[row]]}, but at {given[other].tolist()} m on rank {sources[other]}; "
+            "give a node the same place on all ranks, and read parts that were made together"
+        )
+    return points
 
 
 def _who_needs(kinds: Iterable[Kind], node: int) -> str:

@@ -1,47 +1,126 @@
-"""Partition: which rank gets each element of a mesh."""
+"""Partition: which rank gets each element, so that all have equal work and few neighbors.
+
+METIS cuts the graph of the elements that share faces, on rank 0, where its wheel `pymetis` is installed.
+Else, and for meshes too large for one rank, the ranks halve the mesh together (`bisection`).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import Any
+
 import numpy as np
 
-from kratos_lite.mesh import Mesh
-from kratos_lite.typing import Array, Ints
+from kratos_lite.distributed.bisection import bisected
+from kratos_lite.distributed.directory import Route
+from kratos_lite.distributed.node_directory import places
+from kratos_lite.distributed.pieces import Kind, Piece, aligned, cell_ids
+from kratos_lite.mesh import Block, Faces, Mesh, distinct
+from kratos_lite.mesh.subdomain import ALONE, Alone
+from kratos_lite.records import replace
+from kratos_lite.typing import Ints
+
+METIS_ELEMENTS = 50_000_000
+"""Elements up to which one rank cuts the graph: it takes 3 µs and 200 bytes for each."""
+FEW = 10
+"""Elements a part below which METIS leaves some parts empty."""
 
 
-def parts_of(mesh: Mesh, size: int) -> Ints:
-    """Return a rank for each element: parts of equal work, halved again and again across their longest side.
+def parts_of(mesh: Mesh, ranks: Alone) -> Ints:
+    """Return the rank of each element of a mesh that every rank knows whole.
 
     The work of an element is taken as the square of its number of nodes.
 
     Parameters
     ----------
-    mesh : known whole.
-    size : number of ranks.
+    mesh : the same on all ranks.
+    ranks : that share it.
 
     Returns
     -------
     (m,) int, 0 … size - 1.
     """
-    parts = np.zeros(mesh.n_elements, dtype=np.int64)
-    if size > 1 and mesh.n_elements:
-        centers = np.concatenate(
-            [mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks if len(block)]
-        )
-        work = np.concatenate([np.full(len(block), block.nodes.shape[1] ** 2.0) for block in mesh.blocks])
-        _halve(np.arange(mesh.n_elements), centers, work, 0, size, parts)
-    return parts
+    work = _work(mesh.blocks)
+    if not _takes_metis(ranks, mesh.n_elements):
+        centers = [mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks if len(block)]
+        return bisected(ALONE, np.concatenate([np.zeros((0, 3)), *centers]), work, ranks.size)
+    with ranks.together():
+        parts = metis(mesh.blocks, work, ranks.size) if ranks.rank == 0 else work[:0]
+        return ranks.exchange([parts] * ranks.size)[0]
 
 
-def _halve(rows: Ints, centers: Array, work: Array, first: int, size: int, parts: Ints) -> None:
-    """Give some elements to the ranks first … first + size - 1."""
-    if size == 1 or not len(rows):
-        parts[rows] = first
-        return
-    lower = size // 2
-    x = centers[rows]
-    longest = np.ptp(x, axis=0).argmax()
-    rows = rows[np.lexsort((rows, x[:, longest]))]
-    sums = np.cumsum(work[rows])
-    cut = int(np.searchsorted(sums, sums[-1] * lower / size))
-    _halve(rows[:cut], centers, work, first, lower, parts)
-    _halve(rows[cut:], centers, work, first + lower, size - lower, parts)
+def partitioned(ranks: Alone, piece: Piece) -> Piece:
+    """Return a piece with its elements replaced by those of its part; all the rest stays where it is.
+
+    Parameters
+    ----------
+    ranks : the communicator.
+    piece : what this rank has of a mesh, such as a range of a file.
+
+    Raises
+    ------
+    MeshError
+        Nobody knows a node of an element, or ranks disagree on its place.
+    """
+    with ranks.together():
+        kinds = aligned(ranks, piece.elements)
+        if _takes_metis(ranks, ranks.sum(len(cell_ids(kinds)))):
+            parts = _cut_on_one(ranks, kinds)
+        else:
+            ids, points = places(ranks, piece, kinds)
+            centers = [points[np.searchsorted(ids, kind.nodes)].mean(axis=1) for kind in kinds]
+            parts = bisected(ranks, np.concatenate([points[:0], *centers]), _work(kinds), ranks.size)
+        ends = np.cumsum([len(kind.ids) for kind in kinds])[:-1]
+        routes = [Route(ranks, part) for part in np.split(parts, ends)[: len(kinds)]]
+        moved = [kind.with_table(route.send(kind.table)) for kind, route in zip(kinds, routes, strict=True)]
+        return replace(piece, elements=tuple(moved))
+
+
+def _work(cells: Sequence[Block | Kind]) -> Ints:
+    return np.concatenate(
+        [np.zeros(0, dtype=np.int64), *(np.full(len(c.ids), c.nodes.shape[1] ** 2) for c in cells)]
+    )
+
+
+def _takes_metis(ranks: Alone, n_elements: int) -> bool:
+    """Return whether METIS cuts a mesh of so many elements: as rank 0 says, which does it."""
+    fits = FEW * ranks.size <= n_elements <= METIS_ELEMENTS
+    return ranks.size > 1 and fits and ranks.gather(find_spec("pymetis") is not None)[0]
+
+
+def _cut_on_one(ranks: Alone, kinds: Sequence[Kind]) -> Ints:
+    """Return the ranks of the elements of this rank, which rank 0 has found from the nodes of all."""
+    routes = [Route(ranks, np.zeros(len(kind.ids), dtype=np.int64)) for kind in kinds]
+    nodes = [route.send(kind.nodes) for kind, route in zip(kinds, routes, strict=True)]
+    ids = distinct(np.concatenate([some.ravel() for some in nodes]))
+    blocks = [
+        Block(kind.name, np.searchsorted(ids, some).astype(np.int32), shape=kind.shape)
+        for kind, some in zip(kinds, nodes, strict=True)
+    ]
+    found = metis(blocks, _work(blocks), ranks.size) if ranks.rank == 0 else np.zeros(0, dtype=np.int64)
+    ends = np.cumsum([len(block) for block in blocks])[:-1]
+    parts = [route.back(part) for route, part in zip(routes, np.split(found, ends), strict=True)]
+    return np.concatenate(parts)
+
+
+def metis(blocks: Sequence[Block], work: Ints, size: int) -> Ints:
+    """Return the part of each element, by METIS; elements that share a face are neighbors.
+
+    Source: Karypis & Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392.
+
+    Parameters
+    ----------
+    blocks : of elements.
+    work : (m,) int, of each.
+    size : number of parts, 2 or more.
+    """
+    import pymetis
+
+    faces: Any = Faces(blocks)
+    one, other = faces.element[faces.one], faces.element[faces.other]
+    cells, neighbors = np.concatenate([one, other]), np.concatenate([other, one])
+    order = np.argsort(cells, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(cells, minlength=len(work)))])
+    graph = pymetis.CSRAdjacency(starts, neighbors[order])
+    return np.array(pymetis.part_graph(size, graph, vweights=work).vertex_part, dtype=np.int64)

@@ -12,7 +12,7 @@ STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
 
 def stiffness(ranks, whole, soft=False):
     """Return the model clamped below, of which each rank has its share, and its stiffness."""
-    mesh = scattered(whole, ranks, parts_of(whole, ranks.size))
+    mesh = scattered(whole, ranks, parts_of(whole, ranks))
     model = kl.Model(mesh, STEEL)
     if soft:
         half = np.concatenate([mesh.points[b.nodes].mean(axis=1)[:, 0] > 0.5 for b in mesh.blocks])

@@ -43,7 +43,7 @@ def shared(document: Document, ranks: Alone) -> Document:
     """
     mesh = document.mesh
     tied = [_rows(mesh, constraint) for constraint in document.constraints]
-    own = scattered(mesh, ranks, parts_of(mesh, ranks.size), together=tied)
+    own = scattered(mesh, ranks, parts_of(mesh, ranks), together=tied)
     here = np.isin(mesh.node_ids, own.node_ids)
     kept = [one for one, rows in zip(document.constraints, tied, strict=True) if here[rows].all()]
     return replace(document, mesh=own, constraints=kept)
