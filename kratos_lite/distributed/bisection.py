@@ -29,7 +29,7 @@ def bisected(ranks: Alone, centers: Array, work: Ints, size: int) -> Ints:
     --------
     >>> from kratos_lite.mesh.subdomain import ALONE
     >>> bisected(ALONE, np.eye(4, 3), np.ones(4, dtype=int), 2).tolist()
-    [1, 0, 0, 1]
+    [1, 1, 0, 0]
     """
     group, sizes = np.zeros(len(centers), dtype=np.int64), [size]
     while max(sizes) > 1:
