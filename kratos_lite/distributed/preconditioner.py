@@ -53,7 +53,7 @@ def choose(solver: str, unknowns: int, nearly: bool, given: Mapping[str, str | N
 
     Examples
     --------
-    >>> choose("auto", 1000, False, {})[0], choose("auto", 10**7, False, {})[0]
+    >>> choose("dense", 1000, False, {})[0], choose("auto", 1000, False, {"pc_type": "hypre"})[0]
     ('direct', 'amg')
     """
     if choice(solver, "solver", METHODS) != "auto":
