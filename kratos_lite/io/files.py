@@ -92,14 +92,20 @@ def read_case(
         if ending(path) == ".json":
             from kratos_lite.io.settings import read_settings
 
-            return _case_of_json(read_settings(path), strict, allow_outside, initial_displacement, ranks)
-        if ending(path) == ".py":
+            settings = read_settings(path)
+            case = _case_of_json(settings, strict, allow_outside, initial_displacement, ranks)
+        elif ending(path) == ".py":
             from kratos_lite.io.readers.script import read_script
 
-            return read_script(path)
-        document = read_document(path, strict=strict, ranks=ranks)
-        model = model_from(document, materials=materials, initial_displacement=initial_displacement)
-        return Case(model, files=[path])
+            case = read_script(path)
+        else:
+            document = read_document(path, strict=strict, ranks=ranks)
+            model = model_from(document, materials=materials, initial_displacement=initial_displacement)
+            case = Case(model, files=[path])
+        if case.is_of_model and ranks.size > 1:  # what is noted of a line, each rank has noted
+            found = ranks.gather(case.model.notes)
+            case.model.notes = list(dict.fromkeys(note for notes in found for note in notes))
+        return case
 
 
 def _case_of_json(settings: Settings, strict: bool, outside: bool, initial: bool, ranks: Alone) -> Case:

@@ -10,6 +10,7 @@ from kratos_part_files import write_part_files
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MeshError
+from kratos_lite.records import replace
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 
@@ -47,6 +48,8 @@ def check_shares(ranks, whole, case):
     assert np.array_equal(case.model.supports.fixed, whole.model.supports.fixed[rows])
     assert np.array_equal(case.model.supports.values, whole.model.supports.values[rows])
     assert list(mesh.parts) == list(all_of.parts)
+    assert case.model.notes == whole.model.notes
+    assert list(map(type, case.model.loads)) == list(map(type, whole.model.loads))
 
 
 test_the_shares_make_the_whole.cases = inputs()
@@ -160,3 +163,26 @@ def test_other_numbers_of_part_files_than_ranks(ranks):
         ranks.sum(1)
         if ranks.rank == 0:
             shutil.rmtree(folder)
+
+
+def test_materials_and_loads_that_a_rank_has_nothing_of(ranks):
+    """Each half of a bar has its own material; the load is at one end."""
+    folder = folder_of(ranks)
+    mesh = kl.box((8, 1, 1), (8, 1, 1))
+    (block,) = mesh.blocks
+    mesh = mesh.replace(blocks=[replace(block, properties=np.where(np.arange(8) < 4, 3, 5))])
+    mesh.add_part("end", lambda X: X[:, 0] > 7.9)
+    model = kl.Model(mesh, {3: kl.Isotropic3D(E=1e9, nu=0.3), 5: kl.Isotropic3D(E=3e9, nu=0.2)})
+    model.fix("x-")
+    model.add(kl.Traction("end", (1e6, 0, 0)))
+    if ranks.rank == 0:
+        kl.write(folder / "bar.mdpa", model)
+    ranks.agree()
+    whole = kl.read(folder / "bar.mdpa")
+    found = kl.read_case(folder / "bar.mdpa", comm=ranks).model
+    assert [law.E for law in found._materials] == [law.E for law in whole._materials]
+    assert list(map(type, found.loads)) == list(map(type, whole.loads))
+    assert found.notes == whole.notes
+    of_element = dict(zip(whole.mesh.element_ids.tolist(), whole._material_of.tolist(), strict=True))
+    expected = [of_element[one] for one in found.mesh.element_ids.tolist()]
+    assert found._material_of.tolist() == expected

@@ -12,7 +12,7 @@ from kratos_lite.io.kratos.context import RunContext
 from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
-from kratos_lite.mesh import with_rows
+from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.records import replace
 
 
@@ -43,10 +43,12 @@ def materials_of(
 
 def _assign(entry: Settings, context: RunContext, document: Document, number: int) -> None:
     """Give the elements of the part their properties id."""
-    rows = context.part(entry).elements
-    have = [f"{context.root} (all)", *(name for name, p in context.mesh.parts.items() if len(p.elements))]
+    rows, parts = context.part(entry).elements, context.mesh.parts
+    filled = [len(rows) > 0, *(len(part.elements) > 0 for part in parts.values())]
+    is_there, *filled = context.mesh.ranks.any(np.array(filled)).tolist()
+    have = [f"{context.root} (all)", *(name for name, some in zip(parts, filled, strict=True) if some)]
     text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
-    entry.expect(len(rows), "model_part_name", f"{text} are {', '.join(have)}")
+    entry.expect(is_there, "model_part_name", f"{text} are {', '.join(have)}")
     mask = np.zeros(context.mesh.n_elements, dtype=bool)
     mask[rows] = True
     blocks = [
@@ -97,16 +99,19 @@ def _used(found: dict[int, LinearMaterial], document: Document) -> dict[int, Lin
     """Return the materials that elements have, those of the mesh file too; name elements without any."""
     mesh, used = document.mesh, {}
     for block in mesh.blocks:
-        for number in map(int, np.unique(block.properties)):
+        numbers = mesh.ranks.gather(np.unique(block.properties))  # all ranks have the same materials
+        for number in map(int, np.unique(np.concatenate(numbers))):
             material = found.get(number) or _of_mesh_file(document, number)
             if material is None:
-                cells = np.flatnonzero(block.properties == number)
-                raise ModelError(
-                    f"{mesh.place(block, int(cells[0]))} has no material (property {number}, {len(cells)} "
-                    f"elements of this kind); name its part in the materials file"
-                )
+                raise _without_material(mesh, block, number)
             used[number] = material
     return used
+
+
+def _without_material(mesh: Mesh, block: Block, number: int) -> ModelError:
+    cells = np.flatnonzero(block.properties == number)
+    place = mesh.ranks.first(mesh.place(block, int(cells[0])) if len(cells) else None)
+    return ModelError(f"{place} has no material (property {number}); name its part in the materials file")
 
 
 def _of_mesh_file(document: Document, number: int) -> LinearMaterial | None:

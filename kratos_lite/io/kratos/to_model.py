@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import USED, apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
-from kratos_lite.mesh import Block, distinct, ids_of, rows_of_ids
+from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids, with_rows
 from kratos_lite.typing import Array, Ints
 
 PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
@@ -46,8 +46,9 @@ def model_from(
     _check_variables(document)
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
-    model.notes += _renamed(document.mesh.blocks)
-    used = {int(p) for block in document.mesh.blocks for p in distinct(block.properties)}
+    model.notes += _renamed(document.mesh)
+    found = document.mesh.ranks.gather([distinct(block.properties) for block in document.mesh.blocks])
+    used = {int(p) for blocks in found for numbers in blocks for p in numbers}
     sources = [properties.source for properties in document.properties.values() if properties.source]
     problems = Problems(sources[0] if sources else document.mesh.source)
     for number in sorted(used & document.properties.keys()):
@@ -68,14 +69,17 @@ def model_from(
 
 def check_elements(document: Document) -> None:
     """Raise InputError for every element block of unknown kind that is not empty."""
-    problems = Problems(document.mesh.source)
-    for block in document.mesh.blocks:
-        if len(block) and block.name not in ELEMENTS:
-            line = None if block.lines is None else int(block.lines[0])
+    mesh, problems = document.mesh, Problems(document.mesh.source)
+    for block, at in with_rows(mesh.blocks):
+        if block.name in ELEMENTS:
+            continue
+        if count := mesh.ranks.sum(int(mesh.own_elements[at].sum())):
+            mine = None if block.lines is None or not len(block) else int(block.lines.min())
+            line = min((one for one in mesh.ranks.gather(mine) if one is not None), default=None)
             known = [*ELEMENTS, *(alias for name in ELEMENTS for alias in ELEMENTS.aliases(name))]
             hint = nearest(block.name, known) if "3D" in block.name else ""
             have = ", ".join(sorted(ELEMENTS, key=lambda name: (len(name), name)))
-            text = f"unknown element {block.name!r} ({len(block)} of them);{hint} Known are {have}"
+            text = f"unknown element {block.name!r} ({count} of them);{hint} Known are {have}"
             problems.add(f"{text} and their Kratos names", line)
     problems.raise_if_any()
 
@@ -101,12 +105,12 @@ def _check_spelling(
         problems.add(f"{place}: unknown variable {name}. Did you mean {meant}?")
 
 
-def _renamed(blocks: Sequence[Block]) -> list[str]:
+def _renamed(mesh: Mesh) -> list[str]:
     """Return a note for each kind of element that is solved under another name."""
     notes = {}
-    for block in blocks:
+    for block in mesh.blocks:
         name = ELEMENTS[block.name].__name__ if block.name in ELEMENTS else block.name
-        if len(block) and name != block.name and not is_unnamed(block.name):
+        if mesh.ranks.any(len(block) > 0) and name != block.name and not is_unnamed(block.name):
             large = " with small displacements" if "Lagrangian" in block.name else ""
             notes[block.name] = f"{block.name} is solved as {name}{large}"
     return list(notes.values())
@@ -141,8 +145,9 @@ def _activate(model: Model, u0: Array) -> None:
     it for a guess, which linear statics does not need.
     """
     u0 = np.where(model.supports.fixed, 0.0, u0)
-    count = int(u0.any(axis=1).sum())
-    names = [block.name for block in model.mesh.blocks if len(block)]
+    mesh = model.mesh
+    count = mesh.ranks.sum(int((u0.any(axis=1) & mesh.own_nodes).sum()))
+    names = [block.name for block in mesh.blocks if mesh.ranks.any(len(block) > 0)]
     others = [name for name in names if name.startswith(PRESENT)]
     if count and others:
         text = f"initial DISPLACEMENT of {count} free nodes is not used: {others[0]} takes it for a guess"
@@ -175,10 +180,11 @@ def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) ->
     """Note fixed values that an earlier block gave otherwise."""
     for name, new in components(data.variable, data.values).items():
         if name in values.fixed:
-            changed = (rows >= 0) & values.fixed[name][rows] & (values.nodal[name][rows] != new)
-            if changed.any():
-                more = f" (and {changed.sum() - 1} more)" if changed.sum() > 1 else ""
-                node = data.ids[changed][0]
+            own = (rows >= 0) & model.mesh.own_nodes[rows]
+            changed = own & values.fixed[name][rows] & (values.nodal[name][rows] != new)
+            if count := model.mesh.ranks.sum(int(changed.sum())):
+                more = f" (and {count - 1} more)" if count > 1 else ""
+                node = model.mesh.ranks.first(next(iter(data.ids[changed].tolist()), None))
                 text = f"{name} of node {node}{more} is fixed to another value before; the last one counts"
                 _note(model, data, text)
 
