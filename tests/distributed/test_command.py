@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from kratos_part_files import write_part_files
 from over_ranks import mpirun, needs_mpi
 
 import kratos_lite as kl
@@ -185,3 +186,35 @@ def test_a_folder_that_is_not_there_or_may_not_be_written(beam):
     (beam.parent / "out_1.vtu").write_text("input")
     run = command(2, "solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.pvtu", cwd=beam.parent)
     assert_refused(run, "error: a.pvtu: is an input or another output")
+
+
+# ---- part files -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def parts(tmp_path):
+    """Write a beam that is pulled as part files of two ranks; return their folder."""
+    model = kl.Model(kl.box((4, 1, 1), (8, 2, 2)), LAW)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e6, 0, 0)))
+    kl.write(tmp_path / "beam.mdpa", model)
+    folder = tmp_path / "parts"
+    write_part_files(tmp_path / "beam.mdpa", folder, 2, [0] * 16 + [1] * 16)
+    return folder
+
+
+def test_a_part_file_that_is_missing_or_cut(parts):
+    last = parts / "beam_partitioned" / "beam_1.mdpa"
+    text = last.read_text()
+    last.write_text(text[: len(text) // 2])
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), "beam_1.mdpa:")
+    last.unlink()
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), "error: ", "part file")
+
+
+def test_part_files_that_disagree_on_the_place_of_a_node(parts):
+    last = parts / "beam_partitioned" / "beam_1.mdpa"
+    text = last.read_text()
+    first = re.search(r"Begin Nodes\n (\d+) (\S+) ", text)
+    last.write_text(text.replace(first[0], f"Begin Nodes\n {first[1]} {float(first[2]) + 0.01} "))
+    assert_refused(command(2, "check", parts / "beam.mdpa", "--engine", "petsc"), f"node {first[1]}")
