@@ -1,7 +1,9 @@
 """Files that ranks write together."""
 
 import xml.etree.ElementTree as ElementTree
+from contextlib import contextmanager
 from pathlib import Path
+from shutil import rmtree
 from tempfile import mkdtemp
 
 import meshio
@@ -13,6 +15,7 @@ from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.result import Result
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.io.kratos.expected_values import NodeComparison
 
 LAW = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
 
@@ -42,8 +45,16 @@ def shared(ranks, result, parts):
     return Result(mesh, groups, result.u[rows], reactions, result.loads[rows], result.report)
 
 
-def folder_of_all(ranks):
-    return Path(ranks.first(mkdtemp() if ranks.rank == 0 else None))
+@contextmanager
+def folder_of(ranks):
+    """Give an empty folder, which vanishes at the end."""
+    folder = Path(ranks.first(mkdtemp() if ranks.rank == 0 else None))
+    try:
+        with ranks.together():
+            yield folder
+    finally:
+        if ranks.rank == 0:
+            rmtree(folder)
 
 
 def pieces_of(path):
@@ -70,10 +81,11 @@ def by_node(pieces, name):
 def test_pieces_are_the_whole(ranks, cut, mode):
     serial = whole_result()
     result = shared(ranks, serial, cut(serial.mesh, ranks.size))
-    path = folder_of_all(ranks) / "beam.pvtu"
-    kl.write(path, result, mode)
-    pieces, described, sources = pieces_of(path)
-    assert sorted(path.parent.iterdir()) == sorted([path, *(path.parent / name for name in sources)])
+    with folder_of(ranks) as folder:
+        path = folder / "beam.pvtu"
+        kl.write(path, result, mode)
+        pieces, described, sources = pieces_of(path)
+        assert sorted(one.name for one in folder.iterdir()) == sorted(["beam.pvtu", *sources])
     points, cells = fields(serial)
     assert sum(len(block.data) for piece in pieces for block in piece.cells) == serial.mesh.n_elements
     for name in ("DISPLACEMENT", "REACTION"):
@@ -108,9 +120,9 @@ test_pieces_are_the_whole.cases = [
 
 def test_over_ranks_a_vtu_file_is_a_pvtu_file(ranks):
     serial = whole_result()
-    path = folder_of_all(ranks) / "beam.vtu"
-    kl.write(path, shared(ranks, serial, random(serial.mesh, ranks.size)))
-    names = {one.name for one in path.parent.iterdir()}
+    with folder_of(ranks) as folder:
+        kl.write(folder / "beam.vtu", shared(ranks, serial, random(serial.mesh, ranks.size)))
+        names = {one.name for one in folder.iterdir()}
     many = {"beam.pvtu", *(f"beam_{rank}.vtu" for rank in range(ranks.size))}
     assert names == ({"beam.vtu"} if ranks.size == 1 else many)
 
@@ -121,32 +133,104 @@ def test_formats_of_one_process_are_refused(ranks):
     for name in ("a.html", "a.csv", "a.vtk"):
         if ranks.size > 1:
             with pytest.raises(InputError, match=r"none holds the whole result; write \.pvtu"):
-                kl.write(folder_of_all(ranks) / name, result)
+                kl.write(name, result)
 
 
 def test_an_error_on_one_rank_leaves_what_was_there(ranks):
-    """A number that is not finite, on the last rank only; and a folder where a piece has to go."""
+    """A number that is not finite, on the last rank only."""
     serial = whole_result()
-    parts = np.arange(serial.mesh.n_elements) % ranks.size
-    good = shared(ranks, serial, parts)
-    path = folder_of_all(ranks) / "beam.pvtu"
-    kl.write(path, good)
-    ranks.agree()
-    before = {one: one.read_bytes() for one in path.parent.iterdir()}
+    good = shared(ranks, serial, np.arange(serial.mesh.n_elements) % ranks.size)
     u = good.u.copy()
     u[good.mesh.own_nodes & (ranks.rank == ranks.size - 1)] = np.nan
     bad = Result(good.mesh, good.groups, u, good.reactions, good.loads, good.report)
-    with np.errstate(invalid="ignore"), pytest.raises(SolveError, match="not finite"):
-        kl.write(path, bad)
-    ranks.agree()
-    assert {one: one.read_bytes() for one in path.parent.iterdir()} == before
-    other = folder_of_all(ranks) / "beam.pvtu"
-    if ranks.rank == 0:
-        other.with_name(f"beam_{ranks.size - 1}.vtu").mkdir()
-    ranks.agree()
-    with pytest.raises(InputError, match=f"beam_{ranks.size - 1}.vtu: cannot be written: it is a folder"):
-        kl.write(other, good)
-    ranks.agree()
-    assert [one.name for one in other.parent.iterdir()] == [f"beam_{ranks.size - 1}.vtu"]
-    with pytest.raises(InputError, match="there is no folder"):
-        kl.write(other.parent / "missing" / "beam.pvtu", good)
+    with folder_of(ranks) as folder:
+        path = folder / "beam.pvtu"
+        kl.write(path, good)
+        ranks.agree()
+        before = {one: one.read_bytes() for one in folder.iterdir()}
+        with np.errstate(invalid="ignore"), pytest.raises(SolveError, match="not finite"):
+            kl.write(path, bad)
+        ranks.agree()
+        assert {one: one.read_bytes() for one in folder.iterdir()} == before
+
+
+def test_where_one_rank_cannot_write_none_does(ranks):
+    """A folder stands where the piece of the last rank has to go."""
+    serial = whole_result()
+    result = shared(ranks, serial, np.arange(serial.mesh.n_elements) % ranks.size)
+    last = f"beam_{ranks.size - 1}.vtu"
+    with folder_of(ranks) as folder:
+        if ranks.rank == 0:
+            (folder / last).mkdir()
+        ranks.agree()
+        with pytest.raises(InputError, match=f"{last}: cannot be written: it is a folder"):
+            kl.write(folder / "beam.pvtu", result)
+        ranks.agree()
+        assert [one.name for one in folder.iterdir()] == [last]
+        with pytest.raises(InputError, match="there is no folder"):
+            kl.write(folder / "missing" / "beam.pvtu", result)
+
+
+# ---- expected values ------------------------------------------------------------------------------
+
+
+def compared(result, where, component, expected, allowed):
+    """Return the line that compares a component on nodes with a function of their places."""
+
+    def wanted(result, rows):
+        return expected(result.mesh.points[rows]), np.full(len(rows), allowed)
+
+    return NodeComparison("what", component, result.mesh.nodes(where), wanted)(result)
+
+
+def test_expected_values_are_those_of_one_process(ranks, cut):
+    serial = whole_result()
+    result = shared(ranks, serial, cut(serial.mesh, ranks.size))
+
+    def right(X):
+        return serial.u[[nearest(serial.mesh, x) for x in X], 0]
+
+    def off(X):
+        return right(X) + 1e-6 * (1 + X[:, 1] + 10 * X[:, 2])
+
+    for wanted, allowed in ((right, 1e-12), (off, 1e-9), (off, 1.0)):
+        lines = [compared(one, "x+", "DISPLACEMENT_X", wanted, allowed) for one in (serial, result)]
+        assert lines[0] == lines[1]
+        assert lines[0].startswith(f"check what {'failed' if allowed == 1e-9 else 'passed'} (node ")
+        assert ranks.gather(lines[1]) == [lines[1]] * ranks.size
+
+
+test_expected_values_are_those_of_one_process.cases = [random, first_rank_only]
+
+
+def nearest(mesh, point):
+    return int(np.linalg.norm(mesh.points - point, axis=1).argmin())
+
+
+def test_reactions_are_compared_by_who_owns_the_node(ranks):
+    """At ghosts they are wrong here."""
+    serial = whole_result()
+    result = shared(ranks, serial, random(serial.mesh, ranks.size))
+
+    def wanted(X):
+        return 1e5 * (X[:, 1] + 3 * X[:, 2])
+
+    lines = [compared(one, "x-", "REACTION_Z", wanted, 1e7) for one in (serial, result)]
+    assert lines[0] == lines[1]
+    assert "passed" in lines[0]
+
+
+def test_what_one_rank_cannot_evaluate_is_not_evaluated(ranks):
+    serial = whole_result()
+    result = shared(ranks, serial, random(serial.mesh, ranks.size))
+
+    def wanted(found, rows):
+        if (found.mesh.node_ids[rows] == 1).any():
+            raise ValueError("there is no node 1")
+        return np.zeros(len(rows)), np.ones(len(rows))
+
+    line = NodeComparison("what", "DISPLACEMENT_X", result.mesh.nodes("x-"), wanted)(result)
+    assert line == "check what not evaluated: there is no node 1"
+    none = np.zeros(0, dtype=np.int64)
+    line = NodeComparison("what", "DISPLACEMENT_X", none, wanted)(result)
+    assert line == "check what not evaluated: its part has no nodes"
