@@ -65,7 +65,7 @@ def petsc() -> Any:
         ) from None
     if PETSc.ScalarType().dtype.kind != "f":
         raise InputError("petsc4py is one for complex numbers; install one for real numbers")
-    atexit.register(_destroy_all)  # PETSc itself ends when Python has ended, which its objects may call
+    atexit.register(_keep_all)
     return PETSc
 
 
@@ -73,9 +73,13 @@ LIVE: WeakSet[Any] = WeakSet()
 """What holds objects of PETSc and has not been destroyed."""
 
 
-def _destroy_all() -> None:
+def _keep_all() -> None:
+    """Keep PETSc from destroying what is left: it ends after Python, which its objects may call.
+
+    To destroy them here would wait for other ranks, which may have ended in another way.
+    """
     for one in list(LIVE):
-        one.destroy()
+        one.keep()
 
 
 @lru_cache(maxsize=1)

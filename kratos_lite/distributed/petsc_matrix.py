@@ -46,6 +46,8 @@ def petsc_matrix(ranks: Alone, K: BlockMatrix, rows: Ints, number: Ints, held: M
     A.setType(PETSc.Mat.Type.AIJ)
     counts = _counts(K, rows, number)
     A.setPreallocationNNZ(tuple(np.repeat(3 * one, 3).astype(np.int32) for one in counts))
+    # without rows, PETSc does not see that room was made, and would wait for the others in assembly
+    A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     A.setOption(PETSc.Mat.Option.NO_OFF_PROC_ENTRIES, True)
     lengths = np.concatenate([[0], np.cumsum(np.diff(K.indptr)[rows])])
     start = 0

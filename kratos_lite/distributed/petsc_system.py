@@ -347,6 +347,12 @@ class PetscSystem:
                 one.destroy()
         self._solver = self._A = self._T = None
 
+    def keep(self) -> None:
+        """Leave matrix and solver to the end of the process."""
+        for one in (None if self._solver is None else self._solver.ksp, self._A, self._T):
+            if one is not None:
+                one.incRef()
+
 
 def _whole(mesh: Mesh) -> Subdomain:
     """Return the subdomain of a process that has the whole mesh."""
