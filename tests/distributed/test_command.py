@@ -1,10 +1,12 @@
 """`mpirun -n P kratos-lite … --engine petsc`: one command over many processes, and what goes wrong in it."""
 
+import os
 import re
+import subprocess
 
 import pytest
 from kratos_part_files import write_part_files
-from over_ranks import mpirun, needs_mpi
+from over_ranks import PYTHON, ROOT, mpirun, needs_mpi
 
 import kratos_lite as kl
 
@@ -72,6 +74,21 @@ def test_copies_that_are_wanted_each_solve(beam):
     run = command(2, "solve", beam, "--engine", "own", cwd=beam.parent)
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("largest displacement") == 2
+
+
+def test_processes_that_another_mpi_has_started(beam):
+    """Each would be alone, and take itself for rank 0."""
+    environment = {**os.environ, "PMI_RANK": "0", "PMI_SIZE": "2", "PYTHONPATH": str(ROOT)}
+    run = subprocess.run(
+        [PYTHON, "-m", "kratos_lite", "solve", str(beam), "--engine", "petsc"],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+        env=environment,
+    )
+    assert run.returncode == 2
+    assert "2 processes have been started, but mpi4py sees 1" in run.stderr
 
 
 # ---- what is refused before a file is read ----------------------------------------------------------
