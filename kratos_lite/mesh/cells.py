@@ -115,6 +115,34 @@ class Cells:
         low, high = self.points.min(axis=0, initial=np.inf), self.points.max(axis=0, initial=-np.inf)
         return read_only(np.stack([self.ranks.min(low), self.ranks.max(high)]))
 
+    def first_element(self, chosen: Mask) -> int | None:
+        """Return the row of the first element of a mask (m,); None where only another process has that.
+
+        The first is the one in the first block with the lowest id.  None if no process has any.
+        """
+        if self.subdomain is None:
+            return int(chosen.argmax()) if chosen.any() else None
+        rows = np.flatnonzero(chosen)
+        number = np.repeat(np.arange(len(self.blocks)), [len(block) for block in self.blocks])[rows]
+        ids = self.element_ids[rows]
+        best = np.lexsort((ids, number))[:1]
+        mine = (int(number[best[0]]), int(ids[best[0]])) if len(rows) else None
+        known = [one for one in self.ranks.gather(mine) if one is not None]
+        return int(rows[best[0]]) if mine is not None and mine == min(known) else None
+
+    def first_node(self, chosen: Mask) -> int | None:
+        """Return the row of the first node of a mask (n,); None where only another process has that.
+
+        Over many processes, the first is the one with the lowest id.  None if no process has any.
+        """
+        if self.subdomain is None:
+            return int(chosen.argmax()) if chosen.any() else None
+        rows = np.flatnonzero(chosen)
+        none = np.iinfo(np.int64).max
+        mine = int(self.node_ids[rows].min(initial=none))
+        first = self.ranks.min(mine)
+        return int(self.node_rows(mine)) if first == mine < none else None
+
     # ---- nodes and elements ----------------------------------------------------------------
 
     @property

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.typing import Array, Ints, Mask, Numbers
+from kratos_lite.typing import Ints, Mask, Numbers
 
 
 class Alone:
@@ -54,6 +54,21 @@ class Alone:
         arrays : one for each rank, with as many rows as there is to send; all of one type and row shape.
         """
         return list(arrays)
+
+    def send(self, to: Ints, values: Numbers) -> list[Any]:
+        """Send each row of values (k, ...) to a rank (k,); return what each rank has sent here."""
+        order = np.argsort(to, kind="stable")
+        ends = np.cumsum(np.bincount(to, minlength=self.size))[:-1]
+        return self.exchange(np.split(values[order], ends))
+
+    def ask(self, to: Ints, questions: Numbers, answer: Callable[[Any], Any]) -> Any:
+        """Return what ranks (k,) answer to questions (k, ...), each for itself: (k, ...)."""
+        came = self.send(to, questions)
+        ends = np.cumsum([len(one) for one in came])[:-1]
+        replies = np.concatenate(self.exchange(np.split(answer(np.concatenate(came)), ends)))
+        found = np.empty_like(replies)
+        found[np.argsort(to, kind="stable")] = replies
+        return found
 
     def agree(self) -> None:
         """Raise on all ranks the error that one of them has met."""
@@ -131,7 +146,7 @@ class Subdomain:
             out[rows] = came
         return out
 
-    def add(self, values: Array) -> Array:
+    def add(self, values: Numbers) -> Any:
         """Return nodal values (n, ...) summed over the ranks that have the node; all ranks call it."""
         ghosts, wanted = self._plan
         out = np.array(values)

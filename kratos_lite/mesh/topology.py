@@ -55,12 +55,12 @@ def _table(columns: Sequence[Sequence[int]]) -> Rows:
 def set_keys(groups: Sequence[Sets]) -> NDArray[np.uint64]:
     """Return a number for each set: the sum of mixed numbers of its nodes, equal for equal sets."""
     highest = max((int(cells.max(initial=-1)) for cells, _ in groups), default=-1)
-    key = _mixed(np.arange(highest + 1, dtype=np.uint64))
+    key = mixed(np.arange(highest + 1, dtype=np.uint64))
     sums = [key[cells[:, list(picked)]].sum(axis=1) for cells, columns in groups for picked in columns]
     return np.concatenate([np.zeros(0, np.uint64), *sums])
 
 
-def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Return numbers that look random: SplitMix64, Steele, Lea & Flood, OOPSLA (2014) 453-472."""
     x = x + np.uint64(0x9E3779B97F4A7C15)
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

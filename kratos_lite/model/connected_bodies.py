@@ -19,12 +19,14 @@ class Bodies:
     Attributes
     ----------
     part : (n,) int, the first body of each node, -1 for nodes without elements.
-    node, body : all pairs, sorted by node.
+    node, body : all pairs, sorted by node; of the own nodes, where ranks share the mesh.
+    count : number of bodies.
     """
 
     part: Ints
     node: Ints
     body: Ints
+    count: int
 
     @property
     def joints(self) -> tuple[Ints, Ints]:
@@ -32,52 +34,98 @@ class Bodies:
         further = self.body != self.part[self.node]
         return self.node[further], self.body[further]
 
-    def frames(self, points: Array) -> tuple[Array, Array]:
+    def joined(self, mesh: Mesh) -> tuple[Ints, Ints, Array]:
+        """Return the first and the further body of each joint, and its place (k, 3), of all ranks."""
+        node, second = self.joints
+        found = mesh.ranks.gather((self.part[node], second, mesh.points[node]))
+        one, other, X = (np.concatenate(values) for values in zip(*found, strict=True))
+        return one, other, X
+
+    def frames(self, mesh: Mesh) -> tuple[Array, Array]:
         """Return the center (b, 3) and the size (b,) of each body."""
-        order = np.argsort(self.body, kind="stable")
-        X, start = points[self.node[order]], np.flatnonzero(np.diff(self.body[order], prepend=-1))
-        low, high = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
+        low, high = extents(mesh, self.node, self.body, self.count)
         return (low + high) / 2, np.maximum((high - low).max(axis=1), np.finfo(float).tiny)
+
+    def described(self, mesh: Mesh) -> tuple[Ints, Ints]:
+        """Return the number of nodes of each body (b,), and the id of its first one."""
+        own = mesh.own_nodes[self.node]
+        node, body = self.node[own], self.body[own]
+        row = np.full(self.count, len(mesh.node_ids))
+        row[body[::-1]] = node[::-1]
+        ids = np.append(mesh.node_ids, np.iinfo(np.int64).max)
+        return mesh.ranks.sum(np.bincount(body, minlength=self.count)), mesh.ranks.min(ids[row])
+
+
+def extents(mesh: Mesh, node: Ints, group: Ints, count: int) -> tuple[Array, Array]:
+    """Return the lowest and highest coordinates (count, 3) of nodes (k,) by their group (k,)."""
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    if len(node):
+        order = np.argsort(group, kind="stable")
+        X, start = mesh.points[node[order]], np.flatnonzero(np.diff(group[order], prepend=-1))
+        there = group[order][start]
+        low[there], high[there] = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
+    return mesh.ranks.min(low), mesh.ranks.max(high)
 
 
 def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
     """Return the bodies of a mesh: sets of elements that are joined by faces."""
-    faces = faces or mesh.all_faces
-    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
-    root = components(mesh.n_elements, joined)
-    is_root = root == np.arange(len(root))
-    body = (np.cumsum(is_root) - 1)[root]
-    found = _of_elements(mesh, body)
-    while len(pairs := _locked(mesh.points, found)):
-        label = components(int(body.max()) + 1, pairs)
-        body = np.searchsorted(distinct(label), label)[body]
-        found = _of_elements(mesh, body)
+    body, count = bodies_of_elements(mesh, faces or mesh.all_faces)
+    found = _of_elements(mesh, body, count)
+    while len(pairs := _locked(mesh, found)):
+        label = components(count, pairs)
+        known = distinct(label)
+        body, count = np.searchsorted(known, label)[body], len(known)
+        found = _of_elements(mesh, body, count)
     return found
 
 
-def _locked(points: Array, found: Bodies) -> Ints:
+def bodies_of_elements(mesh: Mesh, faces: Faces) -> tuple[Ints, int]:
+    """Return the number of the body of each element (m,), and how many bodies there are."""
+    joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
+    root = components(mesh.n_elements, joined)
+    is_root = root == np.arange(len(root))
+    body, count = (np.cumsum(is_root) - 1)[root], int(is_root.sum())
+    if mesh.subdomain is None:
+        return body, count
+    from kratos_lite.model.shared_bodies import numbered  # a quick start without it
+
+    return numbered(mesh, body, count)
+
+
+def _locked(mesh: Mesh, found: Bodies) -> Ints:
     """Return pairs (k, 2), among many bodies, that share three nodes not in a line: neither can turn."""
-    node, second = found.joints
-    if len(node) < 3 or found.body.max() < FEW:
+    if found.count <= FEW:
         return np.zeros((0, 2), dtype=np.int64)
-    key = found.part[node] * (found.body.max() + 1) + second
+    one, other, X = found.joined(mesh)
+    if len(one) < 3:
+        return np.zeros((0, 2), dtype=np.int64)
+    key = one * found.count + other
     order = np.argsort(key, kind="stable")
-    X, start = points[node[order]], np.flatnonzero(np.diff(key[order], prepend=-1))
+    X, start = X[order], np.flatnonzero(np.diff(key[order], prepend=-1))
     count = np.diff(np.append(start, len(order)))
     group = np.repeat(np.arange(len(start)), count)
     arms = X - (np.add.reduceat(X, start) / count[:, None])[group]
     spread = np.linalg.svd(np.add.reduceat(arms[:, :, None] * arms[:, None, :], start), compute_uv=False)
     flat = spread[:, 1] > 1e-8 * spread[:, 0]
-    return np.stack([found.part[node], second], axis=1)[order[start[flat]]]
+    return np.stack([one, other], axis=1)[order[start[flat]]]
 
 
-def _of_elements(mesh: Mesh, body: Ints) -> Bodies:
+def _of_elements(mesh: Mesh, body: Ints, count: int) -> Bodies:
     """Return the bodies of the nodes from those of the elements."""
+    found = _of_local_elements(mesh, body, count)
+    if mesh.subdomain is None:
+        return found
+    # of ghosts, not all elements are here
+    part, own = mesh.subdomain.fetch(found.part), mesh.own_nodes[found.node]
+    return Bodies(part, found.node[own], found.body[own], count)
+
+
+def _of_local_elements(mesh: Mesh, body: Ints, count: int) -> Bodies:
     part = np.full(mesh.n_nodes, -1)
     if not body.any():
         part[mesh.used_nodes()] = 0
         node = np.flatnonzero(part == 0)
-        return Bodies(part, node, np.zeros_like(node))
+        return Bodies(part, node, np.zeros_like(node), count)
     pairs = []
     for block, at in with_rows(mesh.blocks):
         owner = np.broadcast_to(body[at, None], block.nodes.shape)
@@ -86,10 +134,9 @@ def _of_elements(mesh: Mesh, body: Ints) -> Bodies:
     node = np.flatnonzero(part >= 0)
     shared = [(nodes[mask], owner[mask]) for nodes, owner in pairs if (mask := part[nodes] != owner).any()]
     if not shared:
-        return Bodies(part, node, part[node])
+        return Bodies(part, node, part[node], count)
     further, owner = (np.concatenate(both) for both in zip(*shared, strict=True))
-    count = int(body.max()) + 1
     every = np.concatenate([node * count + part[node], further.astype(np.int64) * count + owner])
     node, owner = np.divmod(distinct(every), count)
     part[node[::-1]] = owner[::-1]
-    return Bodies(part, node, owner)
+    return Bodies(part, node, owner, count)

@@ -15,6 +15,7 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
+from kratos_lite.model.checks import Kinds
 from kratos_lite.model.spurious_modes import has_chains
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -49,22 +50,26 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
     return max(0, *found)
 
 
-def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+def check_rules(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | None = None) -> list[str]:
     """Check rules that replace those of their classes, and classes that are not of the library.
+
+    Over ranks, `kinds` are those of all.
 
     Raises MeshError where det J ≤ 0 at a point of such a rule, and ModelError for an own class with hourglass
     modes that it does not state; returns warnings of all others.
     """
-    replaced = [group for group in groups if group.rule is not group.element.rule]
-    for group in replaced:
-        _check_points(mesh, group)
+    for group in groups:
+        if group.rule is not group.element.rule:
+            _check_points(mesh, group)
+    kinds = groups if kinds is None else kinds
+    replaced = [kind for kind in kinds if kind.rule is not kind.element.rule]
     said = [
         f"{element.__name__} with {_points(rule)} has {_modes(n)}; its own rule has {_points(element.rule)} "
         f"and {hourglass_modes(element, element.rule) or 'none'}"
         for element, rule in dict.fromkeys((group.element, group.rule) for group in replaced)
         if (n := hourglass_modes(element, rule)) > 0
     ]
-    own = dict.fromkeys(g.element for g in groups if g.rule is g.element.rule and not g.is_proven)
+    own = dict.fromkeys(g.element for g in kinds if g.rule is g.element.rule and not g.is_proven)
     return list(dict.fromkeys(said)) + [text for element in own if (text := _check_class(element))]
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.errors import MAX_PROBLEMS, ModelError
-from kratos_lite.mesh import NO_ROWS, Faces, Mesh, components, distinct, equal_sets, with_rows
-from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
+from kratos_lite.mesh import NO_ROWS, Mesh, components, distinct
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.supports import Supports
 from kratos_lite.records import record
@@ -29,55 +28,6 @@ PASSES, PROBES = 12, 12
 """Passes that leave of a motion nothing but what is free, and motions at random that make them."""
 
 
-def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
-    """Warn of elements with the same nodes, and of faces joined at their corners only."""
-    faces = faces or mesh.all_faces
-    warnings = []
-    one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
-    if len(one):
-        ids = mesh.element_ids
-        a, b = sorted((ids[one[0]].item(), ids[other[0]].item()))
-        warnings.append(f"{len(one)} elements have the same nodes as another ({a} and {b}): both count")
-    one, other = faces.non_conforming()
-    if len(one):
-        a, b = sorted(mesh.element_ids[faces.element[[one[0], other[0]]]].tolist())
-        warnings.append(
-            f"{len(one)} pairs of elements ({a} and {b}) share the corners of a face but not its further "
-            "nodes: the mesh is non-conforming there; use elements of the same order on both sides"
-        )
-    halves = _halved_squares(mesh)
-    if len(halves):
-        warnings.append(
-            f"{len(halves)} four-sided faces (the first of element {mesh.element_ids[halves[0]]}) meet "
-            "triangles: the mesh is non-conforming there; put pyramids or wedges between"
-        )
-    return warnings
-
-
-def _halved_squares(mesh: Mesh) -> Ints:
-    """Return the elements with a four-sided face of which three corners are a triangular face."""
-    sizes = {len(corners(face)) for block in mesh.blocks if len(block) for face in faces_of(block)}
-    if sizes != {3, 4}:
-        return NO_ROWS
-    triangles: list[Sets] = []
-    thirds: list[Sets] = []
-    elements = [NO_ROWS]
-    for block, at in with_rows(mesh.blocks):
-        found = [corners(face) for face in faces_of(block)]
-        triangles.append((block.nodes, [face for face in found if len(face) == 3]))
-        for square in (face for face in found if len(face) == 4):
-            thirds.append((block.nodes, [square[:i] + square[i + 1 :] for i in range(4)]))
-            elements.append(np.arange(at.start, at.stop))
-    keys = set_keys(triangles + thirds)
-    n_triangles = sum(len(cells) * len(columns) for cells, columns in triangles)
-    meets, start = [], n_triangles
-    for cells, columns in thirds:
-        stop = start + len(cells) * len(columns)
-        meets.append(np.isin(keys[start:stop].reshape(4, -1), keys[:n_triangles]).any(axis=0))
-        start = stop
-    return np.concatenate(elements)[np.concatenate(meets)]
-
-
 def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) -> Ints:
     """Raise ModelError that names the rigid modes which the supports leave free, part by part.
 
@@ -85,36 +35,44 @@ def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) 
     that neither nodes nor constraints tie to others.
     """
     found = found or bodies(mesh)
-    equations = _equations(found, supports)
-    frames = found.frames(mesh.points)
+    frames = found.frames(mesh)
+    equations = _equations(mesh, found, supports)
+    if mesh.subdomain is not None:
+        equations = _of_all_ranks(mesh, frames, equations)
     group_of = _groups(len(frames[0]), equations)
-    problems = []
+    problems: list[tuple[int, str]] = []
+    hanging = np.concatenate(found.joined(mesh)[:2]) if found.count > 1 else NO_ROWS
     for group, mine in zip(*_by_group(group_of, equations), strict=True):
         modes = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
-        problems += _name_modes(mesh, found, group, modes)
+        problems += _name_modes(group, modes, hanging)
         if len(problems) >= MAX_PROBLEMS:
             break
     if problems:
-        shown = "; ".join(problems[:MAX_PROBLEMS])
+        shown = "; ".join(_sentences(mesh, found, problems[:MAX_PROBLEMS]))
         raise ModelError(f"the supports leave rigid-body modes free: {shown}. Fix more nodes or components")
     return np.where(found.part >= 0, group_of[found.part], -1)
 
 
 @record(frozen=True)
 class _Constraints:
-    """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight."""
+    """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight.
+
+    Or, in place of degrees of freedom and weights, what the modes of the body are in each entry, (k, 6).
+    """
 
     row: Ints
     dof: Ints
     body: Ints
     weight: Array
+    on_modes: Array | None = None
 
     def take(self, rows: Ints) -> _Constraints:
         """Return some of the entries."""
-        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
+        values = None if self.on_modes is None else self.on_modes[rows]
+        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows], values)
 
 
-def _equations(found: Bodies, supports: Supports) -> _Constraints:
+def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
     """Return fixed components, constraints, and the equal motion of bodies where they are joined."""
     part, (node, second) = found.part, found.joints
     row, dof, weight = supports.constraint_rows()
@@ -128,6 +86,22 @@ def _equations(found: Bodies, supports: Supports) -> _Constraints:
     weight = np.concatenate([weight, ones, -ones])
     known = body >= 0
     return _Constraints(row[known], dof[known], body[known], weight[known])
+
+
+def _of_all_ranks(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> _Constraints:
+    """Return the equations of all ranks in few rows, on the modes of the bodies."""
+    from kratos_lite.model.shared_bodies import compressed  # a quick start without it
+
+    mine = compressed(equations.row, equations.body, _on_modes(mesh, frames, equations))
+    row, body, values, count = [NO_ROWS], [NO_ROWS], [np.zeros((0, 6))], 0
+    for members, R in (one for found in mesh.ranks.gather(mine) for one in found):
+        r, b = len(R), len(members)
+        row.append(np.repeat(np.arange(count, count + r), b))
+        body.append(np.tile(members, r))
+        values.append(R.reshape(r * b, 6))
+        count += r
+    rows, every = np.concatenate(row), np.concatenate(body)
+    return _Constraints(rows, 0 * rows, every, np.ones(len(rows)), np.concatenate(values))
 
 
 def _groups(n_bodies: int, equations: _Constraints) -> Ints:
@@ -159,7 +133,7 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
     """
     rows = distinct(equations.row)
     row = np.searchsorted(rows, equations.row)
-    if len(rows) > 2 * SAMPLE * len(group):
+    if len(rows) > 2 * SAMPLE * len(group) and equations.on_modes is None:
         count = SAMPLE * len(group)
         chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3
         some = np.full(len(rows), -1)
@@ -180,7 +154,8 @@ def _spectrum(
     """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
-    C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
+    if equations.on_modes is None:  # of all ranks, they are scaled already
+        C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
     return values, directions
@@ -193,6 +168,8 @@ def _columns(group: Ints, equations: _Constraints) -> Ints:
 
 def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> Array:
     """Return what the six modes of its body are in each entry of equations, (k, 6)."""
+    if equations.on_modes is not None:
+        return equations.on_modes
     node, axis = np.divmod(equations.dof, 3)
     R = rigid_modes(mesh.points[node], frames[0][equations.body]).reshape(-1, 3, 6)
     R = R[np.arange(len(R)), axis]
@@ -213,7 +190,7 @@ def _free_modes_of_many(
     count, n = int(row.max()) + 1, 6 * len(group)
     value = _on_modes(mesh, frames, equations)
     largest = np.zeros(count)
-    np.maximum.at(largest, row, np.abs(value).max(axis=1))
+    np.maximum.at(largest, row, np.abs(value).max(axis=1) if equations.on_modes is None else 1.0)
     places = np.repeat(row, 6), _columns(group, equations).ravel()
     C = diags_array(1 / np.maximum(largest, np.finfo(float).tiny)) @ csr_array(
         (value.ravel(), places), shape=(count, n)
@@ -227,20 +204,24 @@ def _free_modes_of_many(
     return list(motions.reshape(-1, 6, PROBES))
 
 
-def _name_modes(mesh: Mesh, found: Bodies, group: Ints, modes: list[Array]) -> list[str]:
-    """Return one sentence for each part that can still move, for as many as are shown."""
-    named: list[str] = []
-    for p, free in zip(group, modes, strict=True):
+def _name_modes(group: Ints, modes: list[Array], hanging: Ints) -> list[tuple[int, str]]:
+    """Return body and free motions of each that can still move, for as many as are shown."""
+    named: list[tuple[int, str]] = []
+    for p, free in zip(group.tolist(), modes, strict=True):
         if len(named) < MAX_PROBLEMS and (words := _motions(free)):
-            nodes = found.node[found.body == p]
-            if found.body.max() == 0:
-                who = f"the body ({len(nodes)} nodes)"
-            else:
-                who = f"the part of node {mesh.node_ids[nodes[0]]} ({len(nodes)} nodes)"
-            hangs = len(group) > 1 and np.isin(nodes, found.joints[0]).any()
-            hint = " (it hangs on a node or an edge only)" if hangs else ""
-            named.append(f"{who} can still move: {words}{hint}")
+            hangs = len(group) > 1 and (hanging == p).any()
+            named.append((p, words + (" (it hangs on a node or an edge only)" if hangs else "")))
     return named
+
+
+def _sentences(mesh: Mesh, found: Bodies, problems: list[tuple[int, str]]) -> list[str]:
+    """Return a sentence for each body that can still move."""
+    count, first = found.described(mesh)
+    return [
+        f"the {'body' if found.count == 1 else f'part of node {first[p]}'} ({count[p]} nodes) "
+        f"can still move: {words}"
+        for p, words in problems
+    ]
 
 
 def _motions(free: Array) -> str:

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, element_class, element_groups_of
+from kratos_lite.assembly.element_groups import (
+    ElementGroup,
+    Kind,
+    element_class,
+    element_groups_of,
+    kinds_over_ranks,
+)
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import (
     NON_LOCKING,
@@ -168,19 +174,29 @@ class Solid:
             unnamed,
         )
 
-    def chosen(self, groups: Sequence[ElementGroup] = ()) -> str:
+    def kinds(
+        self, groups: Sequence[ElementGroup], unnamed: str = NON_LOCKING
+    ) -> Sequence[ElementGroup | Kind]:
+        """Return the groups, or where ranks share the mesh the kinds of elements of all ranks."""
+        if self.mesh.subdomain is None:
+            return groups
+        known = self._materials, self._material_of, self._rules, self._rule_of
+        return kinds_over_ranks(self.mesh, *known, self.formulation, unnamed)
+
+    def chosen(self, groups: Sequence[ElementGroup | Kind] = ()) -> str:
         """Return which formulation was chosen and why, in one line; "" where names of elements say it.
 
         Parameters
         ----------
-        groups : of `element_groups`.
+        groups : of `element_groups`, or `kinds`.
 
         Returns
         -------
         Such as ``non_locking, as the mesh names none: EnhancedStrain3D8N``.
         """
         found = dict.fromkeys(_kind(group) for group in groups)
-        unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
+        blocks = [is_unnamed(block.name) for block in self.mesh.blocks if len(block)]
+        unnamed = self.mesh.ranks.any(any(blocks))
         if self.formulation is None and not unnamed:
             return ""
         why = "as the mesh names none" if self.formulation is None else "as asked for"
@@ -260,7 +276,7 @@ class Solid:
         return checks.check_geometry(self.mesh, self.formulation)
 
 
-def _kind(group: ElementGroup) -> str:
+def _kind(group: ElementGroup | Kind) -> str:
     """Return the name of the element of a group, with its material where that decides about it."""
     name = group.element.__name__
     return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name

@@ -43,26 +43,27 @@ def check_spurious_modes(
     for group in groups:
         if has_chains(group.element) and group.rule is group.element.rule:
             reduced[group.rows] = True
-    if not reduced.any():
+    if not mesh.ranks.any(bool(reduced.any())):
         return
     across = OppositeFaces(mesh, faces)
+    for open_ in faces.non_conforming():
+        across.mate[open_] = -1
     ends = _ends(across, reduced)
     fixed = np.zeros(mesh.points.shape, dtype=bool) if supports is None else supports.fixed
-    mate = across.mate.copy()
-    for open_ in faces.non_conforming():
-        mate[open_] = -1
-    mirrored, held = _supported(across, ends[mate[ends] < 0], fixed)
-    joined: Mask = np.any(((mate >= 0) | mirrored)[ends], axis=2)  # (m, 3)
+    mirrored, held = _supported(across, ends[across.outer[ends]], fixed)
+    joined: Mask = np.any((~across.outer | mirrored)[ends], axis=2)  # (m, 3)
     rows = faces.element[ends[:, 0, 0]]
     sound = ~reduced
     sound[rows[joined.sum(axis=1) >= 2]] = True
-    held |= (mate >= 0) & sound[faces.element[mate]]
+    held |= across.beyond(sound[faces.element])
     chained = np.all(joined[:, :, None] & held[ends], axis=2)
-    free = ~sound[rows] & ~np.any(chained, axis=1)
-    if free.any():
-        row = int(rows[np.argmax(free)])
+    free = np.zeros(mesh.n_elements, dtype=bool)
+    free[rows] = ~sound[rows] & ~np.any(chained, axis=1)
+    free &= mesh.own_elements
+    count, row = mesh.ranks.sum(int(free.sum())), mesh.first_element(free)
+    if row is not None:
         raise ModelError(
-            f"element {mesh.element_ids[row]} ({_name(groups, row)}) can deform without stress: {free.sum()} "
+            f"element {mesh.element_ids[row]} ({_name(groups, row)}) can deform without stress: {count} "
             "elements have neighbors along one axis at most, and 2x2x2 points do not see all of their "
             "deformations; take BBar3D20N or KinematicLinear3D20N, or more elements side by side"
         )
@@ -81,7 +82,7 @@ def _ends(across: OppositeFaces, reduced: Mask) -> Ints:
         if len(cells) and block.shape is not None:
             pairs = np.array([(i, j) for i, j in enumerate(opposite_of(block.shape)) if i < j])
             found.append(across.number(number, pairs, cells[:, None, None]))
-    return np.concatenate(found)
+    return np.concatenate([np.zeros((0, 3, 2), dtype=np.int64), *found])
 
 
 def _supported(across: OppositeFaces, outer: Ints, fixed: Mask) -> tuple[Mask, Mask]:

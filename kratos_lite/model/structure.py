@@ -15,7 +15,9 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model import checks, connected_bodies
 from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
+from kratos_lite.model.coincident_nodes import check_coincident
 from kratos_lite.model.equal import key_of
+from kratos_lite.model.joints import check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.supported_solid import SupportedSolid
@@ -139,6 +141,10 @@ class Structure(SupportedSolid, Tabular):
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
+        with self.mesh.ranks.together():
+            self._add(load, name, override)
+
+    def _add(self, load: Load, name: str | None, override: bool) -> None:
         load.check(self.mesh)
         key, named = key_of(load), self.named_loads
         if name is not None:
@@ -222,7 +228,8 @@ class Structure(SupportedSolid, Tabular):
         MeshError, ModelError, InputError
             With every element or part that is wrong.
         """
-        return self.checked()[2]
+        with self.mesh.ranks.together():
+            return self.checked()[2]
 
     def checked(self, *, free: bool = False) -> tuple[list[ElementGroup], NDArray[np.int64], list[str]]:
         """Return what a static solution starts from, of a model that passes all checks.
@@ -235,7 +242,8 @@ class Structure(SupportedSolid, Tabular):
 
         Returns
         -------
-        Element groups, the part of each node (n,), and warnings.
+        Element groups, the part of each node (n,), and warnings.  Over ranks, the groups are those of one,
+        the warnings those of all.
 
         Raises
         ------
@@ -245,23 +253,23 @@ class Structure(SupportedSolid, Tabular):
         mesh = self.mesh
         warnings = self.check_geometry()
         groups = self.element_groups()
+        kinds = self.kinds(groups)
         used, faces = mesh.used_nodes(), mesh.all_faces
-        if not all(group.is_proven for group in groups):
+        if mesh.subdomain is not None:
+            used = mesh.subdomain.fetch(used)  # a ghost may have its elements elsewhere
+        if not all(kind.is_proven for kind in kinds):
             from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
 
-            warnings += check_rules(mesh, groups)
-        warnings += rigid_body_mode_check.check_joints(mesh, faces)
-        warnings += checks.check_coincident(mesh, used, self.supports.constraints)
-        warnings += checks.check_scales(mesh, groups)
-        warnings += check_locking(mesh, groups, self.supports, faces)
-        if any(group.element.spurious_modes for group in groups):
+            warnings += check_rules(mesh, groups, kinds)
+        warnings += check_joints(mesh, faces)
+        warnings += check_coincident(mesh, used, self.supports.own_constraints)
+        warnings += checks.check_scales(mesh, kinds)
+        warnings += check_locking(mesh, groups, self.supports, faces, kinds)
+        if any(kind.element.spurious_modes for kind in kinds):
             from kratos_lite.model.spurious_modes import check_spurious_modes  # rarely needed
 
             check_spurious_modes(mesh, groups, self.supports, faces)
-        if not used.all():
-            lost = mesh.node_ids[~used]
-            shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
-            warnings.append(f"{len(lost)} nodes belong to no element and carry no equations: {shown}")
+        warnings += _without_elements(mesh, used)
         part: NDArray[np.int64] = np.where(used, 0, -1)
         if not free:
             bodies = connected_bodies.bodies(mesh, faces)
@@ -279,7 +287,8 @@ class Structure(SupportedSolid, Tabular):
         return [*self.notes, *checks.unusual_constants(self._used_materials())]
 
     def _used_materials(self) -> list[LinearMaterial]:
-        counts = np.bincount(self._material_of + 1, minlength=1)[1:]
+        found = np.bincount(self._material_of[self.mesh.own_elements] + 1, minlength=len(self._materials) + 1)
+        counts = self.mesh.ranks.sum(found)[1:]
         return [self._materials[i] for i in np.flatnonzero(counts)]
 
     # ---- summary ------------------------------------------------------------------------------
@@ -291,15 +300,17 @@ class Structure(SupportedSolid, Tabular):
         -------
         Labels and values.
         """
-        without = int((self._material_of < 0).sum())
+        sums = (self._material_of < 0)[self.mesh.own_elements], self.supports.fixed[self.mesh.own_nodes]
+        counts = np.array([*(mask.sum() for mask in sums), len(self.supports.own_constraints)])
+        without, fixed, constraints = self.mesh.ranks.sum(counts).tolist()
         rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
-        rows.append(("fixed", f"{int(self.supports.fixed.sum())} components"))
+        rows.append(("fixed", f"{fixed} components"))
         rows += [("support", str(fixing)) for fixing in self.supports.named.values()]
-        if self.supports.constraints:
-            rows.append(("constraints", str(len(self.supports.constraints))))
+        if constraints:
+            rows.append(("constraints", str(constraints)))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
         rows += [("load", f"{names.get(id(load), '')}{load!r}") for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
@@ -308,6 +319,18 @@ class Structure(SupportedSolid, Tabular):
     def __repr__(self) -> str:
         name = type(self).__name__
         return f"{name}({self.mesh.n_nodes} nodes, {self.mesh.n_elements} elements, {len(self.loads)} loads)"
+
+
+def _without_elements(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
+    """Return a warning of the nodes that no element uses, by the mask (n,) of those used."""
+    lost = mesh.node_ids[~used & mesh.own_nodes]
+    count = mesh.ranks.sum(len(lost))
+    if not count:
+        return []
+    found = np.concatenate(mesh.ranks.gather(lost[:5]))
+    first = (found if mesh.subdomain is None else np.sort(found))[:5]
+    shown = " ".join(map(str, first)) + (" …" if count > 5 else "")
+    return [f"{count} nodes belong to no element and carry no equations: {shown}"]
 
 
 def _place(loads: list[Load], wanted: object) -> int | None:

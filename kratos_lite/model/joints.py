@@ -1,0 +1,82 @@
+"""Joints of elements: where they have the same nodes, or share corners but not what lies between."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kratos_lite.mesh import NO_ROWS, Faces, Mesh, equal_sets, with_rows
+from kratos_lite.mesh.topology import Sets, corners, faces_of, set_keys
+from kratos_lite.typing import Ints
+
+
+def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
+    """Warn of elements with the same nodes, and of faces joined at their corners only."""
+    faces = faces or mesh.all_faces
+    warnings = []
+    one, other = equal_sets([(block.nodes, [range(block.nodes.shape[1])]) for block in mesh.blocks])
+    count, ids = _pairs(mesh, one, other)
+    if count:
+        warnings.append(f"{count} elements have the same nodes as another ({ids}): both count")
+    open_ = faces.non_conforming()
+    count, ids = _pairs(mesh, *(faces.element[chosen] for chosen in open_))
+    if count:
+        warnings.append(
+            f"{count} pairs of elements ({ids}) share the corners of a face but not its further "
+            "nodes: the mesh is non-conforming there; use elements of the same order on both sides"
+        )
+    count, ids = _pairs(mesh, *2 * [_halved_squares(mesh)])
+    if count:
+        warnings.append(
+            f"{count} four-sided faces (the first of element {ids.split()[0]}) meet "
+            "triangles: the mesh is non-conforming there; put pyramids or wedges between"
+        )
+    return warnings
+
+
+def _pairs(mesh: Mesh, one: Ints, other: Ints) -> tuple[int, str]:
+    """Return how many pairs of elements all ranks have, each once, and the ids of the first."""
+    if mesh.subdomain is not None:
+        return _pairs_over_ranks(mesh, one, other)
+    if not len(one):
+        return 0, ""
+    a, b = sorted(mesh.element_ids[[one[0], other[0]]].tolist())
+    return len(one), f"{a} and {b}"
+
+
+def _pairs_over_ranks(mesh: Mesh, one: Ints, other: Ints) -> tuple[int, str]:
+    """Return the same over ranks, of which each gives all pairs that it has; few are expected."""
+    number = np.repeat(np.arange(len(mesh.blocks)), [len(block) for block in mesh.blocks])
+    ids = mesh.element_ids
+    found = np.stack([number[one], ids[one], number[other], ids[other]], axis=1)
+    turned = (found[:, 0] > found[:, 2]) | ((found[:, 0] == found[:, 2]) & (found[:, 1] > found[:, 3]))
+    found[turned] = found[turned][:, [2, 3, 0, 1]]
+    every = np.concatenate(mesh.ranks.gather(found))
+    if not len(every):
+        return 0, ""
+    pairs = np.unique(every, axis=0)
+    a, b = sorted(pairs[0, [1, 3]].tolist())
+    return len(pairs), f"{a} and {b}"
+
+
+def _halved_squares(mesh: Mesh) -> Ints:
+    """Return the elements with a four-sided face of which three corners are a triangular face."""
+    sizes = {len(corners(face)) for block in mesh.blocks if len(block) for face in faces_of(block)}
+    if sizes != {3, 4}:
+        return NO_ROWS
+    triangles: list[Sets] = []
+    thirds: list[Sets] = []
+    elements = [NO_ROWS]
+    for block, at in with_rows(mesh.blocks):
+        found = [corners(face) for face in faces_of(block)]
+        triangles.append((block.nodes, [face for face in found if len(face) == 3]))
+        for square in (face for face in found if len(face) == 4):
+            thirds.append((block.nodes, [square[:i] + square[i + 1 :] for i in range(4)]))
+            elements.append(np.arange(at.start, at.stop))
+    keys = set_keys(triangles + thirds)
+    n_triangles = sum(len(cells) * len(columns) for cells, columns in triangles)
+    meets, start = [], n_triangles
+    for cells, columns in thirds:
+        stop = start + len(cells) * len(columns)
+        meets.append(np.isin(keys[start:stop].reshape(4, -1), keys[:n_triangles]).any(axis=0))
+        start = stop
+    return np.concatenate(elements)[np.concatenate(meets)]
