@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
+from kratos_lite.mesh import Mesh
+from kratos_lite.model.checks import equilibrium
+from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.linear_solver import Solution, choose
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import function_or_none
@@ -54,6 +57,30 @@ def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
         "force_error": balance[0],
         "moment_error": balance[1],
     }
+
+
+def initial_noise(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
+    """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
+    ranks, u0 = model.mesh.ranks, model.initial_displacement
+    largest = ranks.max(0.0 if u0 is None else float(np.abs(u0).max(initial=0.0)))
+    size = ranks.sum(float((forces[model.mesh.own_nodes] ** 2).sum())) ** 0.5
+    return float(max(np.finfo(float).eps * norm * largest, tolerance * size))
+
+
+def balance_of(
+    mesh: Mesh, external: Array, forces: Array, reactions: Array, inner: Array, noise: float, unknowns: int
+) -> tuple[float, float]:
+    """Return what forces and moments miss to equilibrium, relative; `noise` in N is that of one unknown.
+
+    `forces` are `external` ones without those of the initial stress, `inner` those of the stresses, (n, 3).
+    """
+    own = mesh.own_nodes
+    # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
+    here = np.array([np.count_nonzero(values[own]) for values in (forces, reactions)])
+    loaded, held = mesh.ranks.sum(here).tolist()
+    points, external, reactions, inner = (values[own] for values in (mesh.points, external, reactions, inner))
+    rounding = (unknowns**0.5 if loaded else held) * noise
+    return equilibrium(points, external, reactions, inner, rounding, mesh.ranks)
 
 
 def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:

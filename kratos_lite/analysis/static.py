@@ -8,10 +8,18 @@ import numpy as np
 
 from kratos_lite.analysis.engines import System, displacements, engine_of, release, system_of
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
+from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.small_deformations import check_deformation
-from kratos_lite.analysis.solution_checks import Phases, check_arguments, judge, quality
+from kratos_lite.analysis.solution_checks import (
+    Phases,
+    balance_of,
+    check_arguments,
+    initial_noise,
+    judge,
+    quality,
+)
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model import checks
 from kratos_lite.model.equal import equal_loads
@@ -158,7 +166,9 @@ class StaticAnalysis:
         with self._phase("check"):
             version = model.version
             self.groups, self.part, self.warnings = model.checked()
+            self.kinds = model.kinds(self.groups)
             self._used = self.part >= 0
+            self._n_used, self._n_unused = self._count(self._used), self._count(~self._used)
             self._read_supports()
             self.initial = initial_loads(model, self.groups)
             self.release()
@@ -176,14 +186,18 @@ class StaticAnalysis:
         moved.flat[np.array(pushed, dtype=np.int64)] = True
         self._moved = _any_axis(moved)
         self._held = ~_any_axis(~supports.fixed) & ~self._moved
-        self._fixed = int((supports.fixed if self._used.all() else supports.fixed[self._used]).sum())
+        own = self._used & self.model.mesh.own_nodes
+        fixed = supports.fixed if own.all() else supports.fixed[own]
+        self._fixed = self.ranks.sum(int(fixed.sum()))
 
     def _follow(self) -> None:
         """Take over what has changed in the model."""
         supports = self.model.supports
-        if self._version != self.model.version:
+        changed = self._version != self.model.version, self._value_version != supports.value_version
+        prepare, read = self.ranks.any(np.array(changed)).tolist()
+        if prepare:
             self._prepare()
-        elif self._value_version != supports.value_version:
+        elif read:
             held = self._held
             self._read_supports()
             if self.ranks.any(not np.array_equal(held, self._held)):
@@ -203,6 +217,8 @@ class StaticAnalysis:
         with phase("load"):
             mesh, fixed = self.model.mesh, self.model.supports.fixed
             external = self.model.supports.on_masters(external_loads(mesh, self.groups, loads))
+            if mesh.subdomain is not None:
+                external = mesh.subdomain.fetch(external)  # at ghosts, not all of it is here
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
             checks.check_carried(mesh, forces, self._used)
@@ -218,8 +234,8 @@ class StaticAnalysis:
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
-        idle = checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
-        return self.warnings + idle + equal_loads(case.loads)
+        idle = checks.check_loads(case.loads, self.kinds, case.forces, self.model.supports)
+        return self.warnings + idle + equal_loads(case.loads, self.ranks)
 
     def _system_of(self, moving: Mask) -> System:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""
@@ -256,24 +272,28 @@ class StaticAnalysis:
                 u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
                 warnings += system.warnings
                 u = self._complete(u, system, case.moving)
-                noise *= float(np.abs(u).max(initial=0.0))
+                noise *= self.ranks.max(float(np.abs(u).max(initial=0.0)))
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
-            # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
-            count = (3 * int(self._used.sum())) ** 0.5 if case.forces.any() else np.count_nonzero(reactions)
+            if model.mesh.subdomain is not None:
+                reactions = model.mesh.subdomain.fetch(reactions)
             inner = model.supports.on_masters(stress_load(model, self.groups, u))
-            rounding = count * max(noise, self._initial_noise(case.forces))
-            balance = checks.equilibrium(model.mesh.points, case.external, reactions, inner, rounding)
+            if self.initial is not None and self.system is not None:
+                rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
+            else:
+                rounding = 0.0
+            forces = case.external, case.forces, reactions, inner
+            balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * self._n_used)
             if tolerance is None:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
-            warnings += check_deformation(model, self.groups, u)
+            warnings += check_deformation(model, self.kinds, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        origin = _Origin(self, case.loads, model.version)
+        origin = Origin(self, case.loads, model.version)
         return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin)
 
     def release(self) -> None:
@@ -302,7 +322,8 @@ class StaticAnalysis:
         self._follow()
         supports = self.model.supports
         moved = np.where(supports.fixed, motion, 0.0)
-        if motion.any() and not moved.any():
+        motions = self.ranks.any(np.array([motion.any(), moved.any()]))
+        if motions[0] and not motions[1]:
             raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
         moving = self._parts_with(_any_axis(load != 0) | _any_axis(moved != 0))
         if not moving.any():
@@ -310,14 +331,6 @@ class StaticAnalysis:
         system = self._system_of(moving)
         displaced, at_rest = (displacements(self.model, system, u) for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
-
-    def _initial_noise(self, forces: Array) -> float:
-        """Return what rounding and the solver leave of the forces of an initial state, in N."""
-        if self.initial is None or self.system is None:
-            return 0.0
-        u0 = 0.0 if self.model.initial_displacement is None else self.model.initial_displacement
-        rounding = np.finfo(float).eps * self.system.norm * np.abs(u0).max(initial=0.0)
-        return float(max(rounding, self.tolerance * np.linalg.norm(forces)))
 
     def _report(
         self,
@@ -327,16 +340,18 @@ class StaticAnalysis:
         balance: tuple[float, float],
         warnings: list[str],
     ) -> Report:
+        own = self.model.mesh.own_nodes
+        slaves = self.ranks.sum(sum(bool(own[slave // 3]) for slave in self.model.supports.slaves()))
         return Report(
-            unknowns=3 * int(self._used.sum()) - self._fixed - len(self.model.supports.slaves()),
-            total_load=case.external.sum(axis=0),
-            total_reaction=reactions.sum(axis=0),
+            unknowns=3 * self._n_used - self._fixed - slaves,
+            total_load=self.ranks.sum(case.external[own].sum(axis=0)),
+            total_reaction=self.ranks.sum(reactions[own].sum(axis=0)),
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
             notes=self.model.remarks(),
             skipped=self._skipped(case.moving),
-            formulation=self.model.chosen(self.groups),
+            formulation=self.model.chosen(self.kinds),
         )
 
     def _at_rest(self) -> Array:
@@ -353,13 +368,17 @@ class StaticAnalysis:
             u[self._used & ~moving[self.part]] = 0.0
         return u
 
+    def _count(self, nodes: Mask) -> int:
+        """Return how many of some nodes, a mask (n,), all ranks have."""
+        return int(self.ranks.sum(int((nodes & self.model.mesh.own_nodes).sum())))
+
     def _skipped(self, moving: Mask) -> list[str]:
         """Return what this solution did without, in words."""
         skipped = []
         if not moving.any():
             skipped.append("assembly and solution, as nothing moves")
         elif not moving.all():
-            count = int((~moving[self.part] & self._used).sum())
+            count = self._count(~moving[self.part] & self._used)
             skipped.append(
                 f"{int((~moving).sum())} of {len(moving)} parts ({count} nodes), as nothing moves them"
             )
@@ -367,33 +386,11 @@ class StaticAnalysis:
             skipped.append(f"{self._still} elements, as all their nodes are held")
         if self._fixed:
             skipped.append(f"{self._fixed} prescribed degrees of freedom")
-        if not self._used.all():
-            skipped.append(f"{int((~self._used).sum())} nodes without elements")
+        if self._n_unused:
+            skipped.append(f"{self._n_unused} nodes without elements")
         if moving.any() and self.system:
             skipped += self.system.skipped
         return skipped
-
-
-@record(frozen=True, eq=False)
-class _Origin:
-    """An analysis with its loads, and the version of its model, when it was solved."""
-
-    analysis: StaticAnalysis
-    loads: list[Load]
-    version: tuple[int, int]
-
-    @property
-    def model(self) -> Structure:
-        return self._unchanged().model
-
-    def adjoint(self, load: Array, motion: Array) -> Array:
-        return self._unchanged().adjoint(load, motion)
-
-    def _unchanged(self) -> StaticAnalysis:
-        """Return the analysis of the model as it was."""
-        if self.version != self.analysis.model.version:
-            raise ModelError("the model has changed since this solution; solve it again")
-        return self.analysis
 
 
 def _any_axis(mask: Mask) -> Mask:

@@ -118,7 +118,15 @@ class Cells:
     def first_element(self, chosen: Mask) -> int | None:
         """Return the row of the first element of a mask (m,); None where only another process has that.
 
-        The first is the one in the first block with the lowest id.  None if no process has any.
+        All processes ask.  The first is the one in the first block with the lowest id.
+
+        Parameters
+        ----------
+        chosen : (m,) bool.
+
+        Returns
+        -------
+        The row, or None, as where no process has any.
         """
         if self.subdomain is None:
             return int(chosen.argmax()) if chosen.any() else None
@@ -133,7 +141,15 @@ class Cells:
     def first_node(self, chosen: Mask) -> int | None:
         """Return the row of the first node of a mask (n,); None where only another process has that.
 
-        Over many processes, the first is the one with the lowest id.  None if no process has any.
+        All processes ask; of several, the first is the one with the lowest id.
+
+        Parameters
+        ----------
+        chosen : (n,) bool.
+
+        Returns
+        -------
+        The row, or None, as where no process has any.
         """
         if self.subdomain is None:
             return int(chosen.argmax()) if chosen.any() else None

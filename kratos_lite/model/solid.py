@@ -177,7 +177,17 @@ class Solid:
     def kinds(
         self, groups: Sequence[ElementGroup], unnamed: str = NON_LOCKING
     ) -> Sequence[ElementGroup | Kind]:
-        """Return the groups, or where ranks share the mesh the kinds of elements of all ranks."""
+        """Return the groups, or the kinds of elements of all ranks where these share the mesh.
+
+        Parameters
+        ----------
+        groups : of `element_groups`.
+        unnamed : as for these.
+
+        Returns
+        -------
+        The groups, or kinds in the order of the groups of one process.
+        """
         if self.mesh.subdomain is None:
             return groups
         known = self._materials, self._material_of, self._rules, self._rule_of

@@ -40,7 +40,7 @@ def shared(ranks, result, parts):
     """The displacements and reactions of a result on what each rank holds of its mesh; ghosts are wrong."""
     mesh = scattered(result.mesh, ranks, parts)
     rows = result.mesh.node_rows(mesh.node_ids)
-    groups = kl.Model(mesh, LAW).element_groups() if mesh.n_elements else []
+    groups = kl.Model(mesh, LAW).element_groups()
     reactions = np.where(mesh.own_nodes[:, None], result.reactions[rows], 1e30)
     return Result(mesh, groups, result.u[rows], reactions, result.loads[rows], result.report)
 
