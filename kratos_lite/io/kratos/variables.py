@@ -136,7 +136,7 @@ class Variables:
         for axis in "XYZ":
             name = f"DISPLACEMENT_{axis}"
             rows = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
-            if len(rows):
+            if self.mesh.ranks.any(len(rows) > 0):  # all ranks fix something, or none
                 model.fix(rows, axis.lower(), self.nodal.scalar(name)[rows, None], override=True)
         others = [name for name in sorted(self.fixed) if not name.startswith("DISPLACEMENT_")]
         others = [name for name in others if self.mesh.ranks.any(self.fixed[name].any())]
