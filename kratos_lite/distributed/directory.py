@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.mesh import distinct
-from kratos_lite.mesh.blocks import rows_of_ids
+from kratos_lite.distributed.lookup import Lookup, merged
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.typing import Ints, Mask
 
@@ -67,8 +66,8 @@ class Asked:
     def __init__(self, ranks: Alone, ids: Ints, known: Ints | None = None) -> None:
         self._route = Route(ranks, home(ranks, ids))
         arrived = self._route.send(ids)
-        self.known = distinct(arrived) if known is None else known
-        self.sources, self.rows = self._route.sources, rows_of_ids(self.known, arrived)
+        self.known = merged(arrived) if known is None else known
+        self.sources, self.rows = self._route.sources, Lookup(self.known).rows(arrived)
 
     def tell(self, values: Any) -> Any:
         """Return at the directory, (q, ...), what the ranks say of their ids, (k, ...)."""

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite.distributed.directory import Route, all_of
+from kratos_lite.distributed.lookup import Lookup, merged
 from kratos_lite.distributed.node_directory import NodeDirectory
 from kratos_lite.distributed.pieces import Kind, cell_ids
-from kratos_lite.mesh import NO_ROWS, distinct, rows_of_ids
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.typing import Ints, Mask
 
 
-def with_halo(nodes: NodeDirectory, kinds: tuple[Kind, ...], layers: int) -> tuple[tuple[Kind, ...], Mask]:
-    """Return the elements that are here with some layers around the own nodes, and which of them are own.
+def with_halo(
+    nodes: NodeDirectory, kinds: tuple[Kind, ...], layers: int
+) -> tuple[tuple[Kind, ...], Mask, Ints]:
+    """Return the elements here, with layers around the own nodes; which are own; and the ids of their nodes.
 
     Parameters
     ----------
@@ -21,25 +23,20 @@ def with_halo(nodes: NodeDirectory, kinds: tuple[Kind, ...], layers: int) -> tup
     kinds : own elements, the same kinds on all ranks.
     layers : of elements.
     """
-    ranks, found = nodes.ranks, kinds
-    touched = _nodes_of(kinds)
+    ranks, here = nodes.ranks, merged(nodes.own, nodes.touched)
     ids, holders = nodes.directory.ids, nodes.owner
+    halo = [kind.table[:0] for kind in kinds]
     for layer in range(layers):
         if layer:  # the nodes that are here hold the next layer
-            ids = distinct(np.append(nodes.own, _nodes_of(found)))
-            holders = np.full(len(ids), ranks.rank)
-        at, there = all_of(ranks, ids, holders[:, None], touched)
+            ids, holders = here, np.full(len(here), ranks.rank)
+        at, there = all_of(ranks, ids, holders[:, None], nodes.touched)
         others = there[:, 0] != ranks.rank
-        at, there = at[others], there[others, 0]
-        found = tuple(
-            kind.with_table(np.concatenate([kind.table, _sent(ranks, kind, at, there)])) for kind in kinds
-        )
-    return found, rows_of_ids(cell_ids(kinds), cell_ids(found)) >= 0
-
-
-def _nodes_of(kinds: tuple[Kind, ...]) -> Ints:
-    """Return the ids of the nodes of cells, ascending."""
-    return distinct(np.concatenate([NO_ROWS, *(kind.nodes.ravel() for kind in kinds)]))
+        halo = [_sent(ranks, kind, at[others], there[others, 0]) for kind in kinds]
+        here = merged(here, *(table[:, 3:] for table in halo))
+    found = tuple(
+        kind.with_table(np.concatenate([kind.table, table])) for kind, table in zip(kinds, halo, strict=True)
+    )
+    return found, Lookup(cell_ids(kinds)).rows(cell_ids(found)) >= 0, here
 
 
 def to_owners(nodes: NodeDirectory, kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:
@@ -58,10 +55,12 @@ def _sent(ranks: Alone, kind: Kind, ids: Ints, holders: Ints) -> Ints:
     """
     order = np.argsort(ids, kind="stable")
     ids, holders = ids[order], holders[order]
-    first = np.searchsorted(ids, kind.nodes)
-    counts = np.searchsorted(ids, kind.nodes, side="right") - first
-    cells = np.repeat(np.arange(len(kind.ids)), counts.sum(axis=1))
-    counts, first = counts.ravel(), first.ravel()
-    at = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
-    pairs = distinct(cells * ranks.size + holders[at])
+    starts = np.flatnonzero(np.append(True, ids[1:] != ids[:-1])) if len(ids) else ids
+    counts = np.diff(np.append(starts, len(ids)))
+    rows = Lookup(ids[starts]).rows(kind.nodes)
+    cells, columns = np.nonzero(rows >= 0)
+    rows = rows[cells, columns]
+    counts, starts = counts[rows], starts[rows]
+    at = np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    pairs = merged(np.repeat(cells, counts) * ranks.size + holders[at])
     return Route(ranks, pairs % ranks.size).send(kind.table[pairs // ranks.size])

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from kratos_lite.distributed.directory import Asked, Directory, Route
+from kratos_lite.distributed.lookup import merged
 from kratos_lite.distributed.pieces import Kind, Piece
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh import NO_ROWS, distinct
+from kratos_lite.mesh import NO_ROWS
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.typing import Array, Ints
 
@@ -25,6 +26,7 @@ class NodeDirectory:
     Attributes
     ----------
     own : (k,) int, ids of the own nodes of this rank, in their order.
+    touched : (t,) int, ids of the nodes of the elements that this rank gives, ascending.
     points, order, owner, numbers : of the nodes that this rank looks after.
 
     Raises
@@ -55,7 +57,7 @@ class NodeDirectory:
     def _owners(self, piece: Piece) -> Ints:
         """Return the owner of each node: the one given, or the lowest rank with an element, or the node."""
         size, given = self.ranks.size, self.directory.given
-        _, touching = self.ask(piece.elements)
+        self.touched, touching = self.ask(piece.elements)
         lowest, named = np.full((2, len(self.directory.ids)), size)
         np.minimum.at(lowest, given.rows, size + given.sources)
         np.minimum.at(lowest, touching.rows, touching.sources)
@@ -101,7 +103,7 @@ def places(ranks: Alone, piece: Piece, kinds: Iterable[Kind]) -> tuple[Ints, Arr
 
 def _asked(directory: Directory, kinds: Iterable[Kind], more: Ints = NO_ROWS) -> tuple[Ints, Asked]:
     kinds = list(kinds)
-    ids = distinct(np.concatenate([more, *(kind.nodes.ravel() for kind in kinds)]))
+    ids = merged(more, *(kind.nodes for kind in kinds))
     asked = directory.ask(ids)
     missing = ids[~asked.has()]
     if len(missing):

@@ -14,9 +14,10 @@ import numpy as np
 
 from kratos_lite.distributed.bisection import bisected
 from kratos_lite.distributed.directory import Route
+from kratos_lite.distributed.lookup import Lookup, merged
 from kratos_lite.distributed.node_directory import places
 from kratos_lite.distributed.pieces import Kind, Piece, aligned, cell_ids
-from kratos_lite.mesh import Block, Faces, Mesh, distinct
+from kratos_lite.mesh import Block, Faces, Mesh
 from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
@@ -69,7 +70,8 @@ def partitioned(ranks: Alone, piece: Piece) -> Piece:
             parts = _cut_on_one(ranks, kinds)
         else:
             ids, points = places(ranks, piece, kinds)
-            centers = [points[np.searchsorted(ids, kind.nodes)].mean(axis=1) for kind in kinds]
+            rows = Lookup(ids)
+            centers = [points[rows.rows(kind.nodes)].mean(axis=1) for kind in kinds]
             parts = bisected(ranks, np.concatenate([points[:0], *centers]), _work(kinds), ranks.size)
         ends = np.cumsum([len(kind.ids) for kind in kinds])[:-1]
         routes = [Route(ranks, part) for part in np.split(parts, ends)[: len(kinds)]]
@@ -93,9 +95,9 @@ def _cut_on_one(ranks: Alone, kinds: Sequence[Kind]) -> Ints:
     """Return the ranks of the elements of this rank, which rank 0 has found from the nodes of all."""
     routes = [Route(ranks, np.zeros(len(kind.ids), dtype=np.int64)) for kind in kinds]
     nodes = [route.send(kind.nodes) for kind, route in zip(kinds, routes, strict=True)]
-    ids = distinct(np.concatenate([some.ravel() for some in nodes]))
+    here = Lookup(merged(*nodes))
     blocks = [
-        Block(kind.name, np.searchsorted(ids, some).astype(np.int32), shape=kind.shape)
+        Block(kind.name, here.rows(some).astype(np.int32), shape=kind.shape)
         for kind, some in zip(kinds, nodes, strict=True)
     ]
     found = metis(blocks, _work(blocks), ranks.size) if ranks.rank == 0 else np.zeros(0, dtype=np.int64)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.distributed.directory import Asked, all_of
+from kratos_lite.distributed.lookup import Lookup, merged
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh import NO_ROWS, Block, Part, distinct, rows_of_ids
+from kratos_lite.mesh import NO_ROWS, Block, Part
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import field, record, replace
 from kratos_lite.shapes import Shape
@@ -47,8 +48,8 @@ class Kind:
     @property
     def table(self) -> Ints:
         """(m, 3 + k) int, all of it in one array: ids, properties, lines and nodes."""
-        lines = -np.ones(len(self.ids)) if self.lines is None else self.lines
-        return np.column_stack([self.ids, self.properties, lines, self.nodes]).astype(np.int64)
+        lines = np.full(len(self.ids), -1) if self.lines is None else self.lines
+        return np.column_stack([self.ids, self.properties, lines, self.nodes])
 
     def with_table(self, table: Ints) -> Kind:
         """Return the kind of other cells, in order."""
@@ -159,7 +160,7 @@ def _members(ranks: Alone, names: list[str], parts: dict[str, Part], what: str, 
         return [NO_ROWS] * len(names)
     numbers = np.repeat(np.arange(len(names)), [len(one) for one in given])
     found, part = all_of(ranks, np.concatenate(given), numbers[:, None], ids)
-    rows = rows_of_ids(ids, found)
-    pairs = distinct(part[:, 0] * max(len(ids), 1) + rows)
+    rows = Lookup(ids).rows(found)
+    pairs = merged(part[:, 0] * max(len(ids), 1) + rows)
     ends = np.searchsorted(pairs, np.arange(1, len(names)) * max(len(ids), 1))
     return [one % max(len(ids), 1) for one in np.split(pairs, ends)]

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.distributed.halo import to_owners, with_halo
+from kratos_lite.distributed.lookup import Lookup
 from kratos_lite.distributed.node_directory import NodeDirectory
 from kratos_lite.distributed.pieces import Kind, Piece, aligned, check_once, parts_here
 from kratos_lite.distributed.scatter import scattered
-from kratos_lite.mesh import Block, Mesh, rows_of_ids
+from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import ids_of
 from kratos_lite.mesh.subdomain import Alone, Subdomain
 from kratos_lite.records import replace
@@ -58,9 +59,9 @@ def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str =
         check_once(ranks, elements, "element")
         check_once(ranks, conditions, "condition")
         nodes = NodeDirectory(ranks, piece)
-        elements, own = with_halo(nodes, elements, layers)
+        elements, own, here = with_halo(nodes, elements, layers)
         conditions = to_owners(nodes, conditions)
-        here, asked = nodes.ask((*elements, *conditions), np.concatenate([nodes.own, piece.wanted]))
+        here, asked = nodes.ask(conditions, np.append(here, piece.wanted))
         order = np.argsort(asked.answer(nodes.order), kind="stable")
         here, owner = here[order], asked.answer(nodes.owner)[order]
         blocks, faces = _blocks(here, elements), _blocks(here, conditions)
@@ -80,8 +81,8 @@ def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str =
 
 def _blocks(node_ids: Ints, kinds: tuple[Kind, ...]) -> list[Block]:
     """Return the blocks of kinds of cells whose nodes are all here."""
-    order = np.argsort(node_ids, kind="stable")
-    return [kind.block(rows_of_ids(node_ids, kind.nodes, order)) for kind in kinds]
+    here = Lookup(node_ids)
+    return [kind.block(here.rows(kind.nodes)) for kind in kinds]
 
 
 def piece_of(mesh: Mesh) -> Piece:

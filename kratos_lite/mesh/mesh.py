@@ -103,7 +103,8 @@ class Mesh(Cells, Tabular):
         for what, (expected, found) in sizes.items():
             if expected != found:
                 raise MeshError(f"a subdomain of {expected} {what} cannot be that of a mesh with {found}")
-        _ = self.extent, self.totals  # while all ranks are here: one of them alone may ask for these later
+        # while all ranks are here: one of them alone may ask for these later
+        _ = self.extent, self.totals, subdomain.offsets
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""

@@ -59,6 +59,7 @@ def test_a_rank_alone_may_ask_for_the_summary(ranks):
     mesh = ends(ranks, whole_mesh())
     if ranks.rank == 0:
         assert "60" in str(mesh)
+        assert mesh.subdomain.n_all == mesh.totals.counts["nodes"] == 60
         assert mesh.extent.shape == (2, 3)
         assert mesh.nodes("tip").shape <= (2,)
 
