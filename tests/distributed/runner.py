@@ -35,12 +35,16 @@ def calls(module, word):
 
 def run(test, given, ranks):
     """Return what a test raises on any rank, by rank."""
+    found = None
     try:
         with ranks.together():
-            test(ranks, *given)
-        found = None
+            try:
+                test(ranks, *given)
+            except BaseException:
+                found = traceback.format_exc()  # what is shared with the others does not say where
+                raise
     except BaseException:
-        found = traceback.format_exc()
+        found = found or traceback.format_exc()
     return ranks.gather(found)
 
 
@@ -56,7 +60,7 @@ def main(arguments):
             failed, passed = failed + bool(found), passed + (not found)
             if ranks.rank == 0:
                 print(f"{'FAILED' if found else 'passed'} {Path(path).stem}::{label}", flush=True)
-                print("".join(found[:1]), end="", flush=True)
+                print(max(found, key=len, default=""), end="", flush=True)  # that of the cause
     if ranks.rank == 0:
         print(f"{passed} passed, {failed} failed on {ranks.size} ranks", flush=True)
     return int(failed > 0)
