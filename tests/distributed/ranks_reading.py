@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ from kratos_part_files import write_part_files
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MeshError
+from kratos_lite.io.formats import ranks as reading
+from kratos_lite.io.formats.mdpa.ranks import read_mdpa_by_ranks
+from kratos_lite.mesh import ids_of
 from kratos_lite.records import replace
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
@@ -30,7 +34,22 @@ def read(path, **options):
         return None, str(error)
 
 
-def test_the_shares_make_the_whole(ranks, path):
+@contextmanager
+def ranges(bytes_of_file):
+    """Let files of so many bytes be read by ranges."""
+    before, reading.LARGE = reading.LARGE, bytes_of_file
+    try:
+        yield
+    finally:
+        reading.LARGE = before
+
+
+def test_the_shares_make_the_whole(ranks, path, large):
+    with ranges(large):
+        check_input(ranks, path)
+
+
+def check_input(ranks, path):
     whole, expected = read(path)
     case, error = read(path, comm=ranks)
     assert error == expected
@@ -50,9 +69,79 @@ def check_shares(ranks, whole, case):
     assert list(mesh.parts) == list(all_of.parts)
     assert case.model.notes == whole.model.notes
     assert list(map(type, case.model.loads)) == list(map(type, whole.model.loads))
+    for name, part in all_of.parts.items():
+        for what, ids, every in (
+            ("nodes", mesh.node_ids, all_of.node_ids),
+            ("elements", mesh.element_ids, all_of.element_ids),
+            ("conditions", ids_of(mesh.conditions), ids_of(all_of.conditions)),
+        ):
+            inside = np.isin(ids, every[getattr(part, what)])
+            assert np.array_equal(np.sort(getattr(mesh.parts[name], what)), np.flatnonzero(inside)), what
+    u0, whole_u0 = case.model.initial_displacement, whole.model.initial_displacement
+    if whole_u0 is not None and whole_u0[rows].any():
+        assert np.array_equal(u0, whole_u0[rows])
 
 
-test_the_shares_make_the_whole.cases = inputs()
+test_the_shares_make_the_whole.cases = [(path, large) for path in inputs() for large in (0, 10**9)]
+
+
+def malformed():
+    return sorted(
+        path for path in (CASES.parent / "bad").glob("*") if path.suffix in (".mdpa", ".json", ".elem")
+    )
+
+
+def test_malformed_files_give_the_error_of_one_process(ranks, path, large):
+    with ranges(large):
+        expected, found = read(path)[1], read(path, comm=ranks)[1]
+    assert found == expected
+    assert len(set(ranks.gather(found))) == 1
+
+
+test_malformed_files_give_the_error_of_one_process.cases = [
+    (path, large) for path in malformed() for large in (0, 10**9) if large == 0 or path.suffix == ".mdpa"
+]
+
+
+def test_a_large_file_is_read_by_ranges(ranks, element):
+    """Of a file of ordinary form, nobody reads all; values, loads and constraints come along."""
+    folder = folder_of(ranks)
+    try:
+        path, _ = parts_of_beam(ranks, folder, element=element)
+        if ranks.rank == 0:
+            text = path.read_text(encoding="utf-8")
+            tie = "Begin Constraints LinearMasterSlaveConstraint DISPLACEMENT_Y DISPLACEMENT_Y\n"
+            path.write_bytes(
+                (text + tie + "1 0.0 [1.0] 40 44\nEnd Constraints\n").replace("\n", "\r\n").encode()
+            )
+        ranks.sum(1)
+        whole = kl.read_case(path)
+        document = read_mdpa_by_ranks(path, ranks, strict=True)  # no error: it was not read whole
+        assert document.mesh.subdomain.n_all == whole.model.mesh.n_nodes
+        with ranges(0):
+            case = kl.read_case(path, comm=ranks)
+        check_shares(ranks, whole, case)
+        found = {one.slave for of_rank in ranks.gather(_by_ids(case.model)) for one in of_rank}
+        assert found == {one.slave for one in _by_ids(whole.model)}
+    finally:
+        ranks.sum(1)
+        if ranks.rank == 0:
+            shutil.rmtree(folder)
+
+
+test_a_large_file_is_read_by_ranges.cases = [
+    "KinematicLinear3D8N",
+    "KinematicLinear3D27N",
+    "KinematicLinear3D4N",
+]
+
+
+def _by_ids(model):
+    """Return the constraints of a model with ids of nodes in place of rows."""
+    ids = model.mesh.node_ids
+    return [
+        replace(one, slave=3 * int(ids[one.slave // 3]) + one.slave % 3) for one in model.supports.constraints
+    ]
 
 
 def folder_of(ranks):

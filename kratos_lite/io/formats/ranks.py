@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,16 @@ import numpy as np
 from kratos_lite.distributed.partition import parts_of
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.io.formats.document import Constraint, Document
+from kratos_lite.io.formats.mdpa.ranges import Unusual
+from kratos_lite.io.formats.mdpa.ranks import read_mdpa_by_ranks
 from kratos_lite.io.formats.part_files import part_files, read_part_files
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
+
+LARGE = 4_000_000
+"""Bytes of an `.mdpa` file from which each rank reads a range of it; smaller ones are read whole by all."""
 
 
 def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bool], Document]) -> Document:
@@ -27,8 +33,12 @@ def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bo
     strict : of `.mdpa` files, as for one process.
     read : reads the whole file.
     """
-    files = part_files(path)
-    return read_part_files(files, path, ranks, strict) if files else shared(read(path, strict), ranks)
+    if files := part_files(path):
+        return read_part_files(files, path, ranks, strict)
+    if path.suffix.lower() == ".mdpa" and path.is_file() and path.stat().st_size >= LARGE:
+        with suppress(Unusual):
+            return read_mdpa_by_ranks(path, ranks, strict)
+    return shared(read(path, strict), ranks)
 
 
 def shared(document: Document, ranks: Alone) -> Document:

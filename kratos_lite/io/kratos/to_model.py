@@ -119,19 +119,20 @@ def _renamed(mesh: Mesh) -> list[str]:
 def _fill(values: Variables, document: Document, model: Model) -> None:
     """Put the data blocks of a document into variables."""
     mesh, problems = document.mesh, Problems()
+    any_rank = mesh.ranks.any
     for data in document.nodal_data:
         if not _fits(data, model, problems, mesh.source):
             continue
         rows = mesh.node_rows(data.ids)
         known = rows >= 0
-        if data.values.size:
+        if any_rank(data.values.size > 0):
             _note_overridden(values, data, rows, model)
             values.nodal.put(data.variable, rows[known], data.values[known])
-        if data.fixed.any():
+        if any_rank(bool(data.fixed.any())):
             values.fix(data.variable, rows[known & data.fixed])
     for data in document.condition_data:
         rows = rows_of_ids(ids_of(mesh.conditions), data.ids)
-        if data.values.size and _fits(data, model, problems, mesh.source):
+        if any_rank(data.values.size > 0) and _fits(data, model, problems, mesh.source):
             values.conditional.put(data.variable, rows[rows >= 0], data.values[rows >= 0])
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
@@ -165,7 +166,7 @@ def _note(model: Model, data: Data, text: str) -> None:
 def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
     """Whether the values have the size of their variable; note what is unused, refuse what is wrong."""
     wanted = (3,) if data.variable in SPLIT else ()
-    if not data.values.size or data.values.shape[1:] == wanted:
+    if not model.mesh.ranks.any(data.values.size > 0) or data.values.shape[1:] == wanted:
         return True
     size = list(data.values.shape[1:]) or "of one number"
     if data.variable in VECTORS or data.variable in LOADING:

@@ -93,9 +93,9 @@ def test_pieces_and_threads():
 
 def test_words_are_found_as_python_finds_them(monkeypatch):
     data = b"Begin A\nBegin\tB Beginning xBegin EEnd End\n End B\fEnd A End"
-    expected = scan._statements(data)
+    expected = scan.statements(data)
     monkeypatch.setattr(scan, "SMALL", 0)
-    assert scan._statements(data) == expected == [0, 8, 38, 43, 49, 55]
+    assert scan.statements(data) == expected == [0, 8, 38, 43, 49, 55]
 
 
 def test_a_mistake_deep_in_a_large_file_is_located(tmp_path):

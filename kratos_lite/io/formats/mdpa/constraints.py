@@ -12,19 +12,21 @@ from kratos_lite.typing import Ints
 CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
 
 
-def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constraint]:
+def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[Constraint]:
     """Return the rows ``id constant [w1, w2] slave master1 master2`` of a block.
 
-    The variables in the header are the slave's and then one for each master, or one for all.
+    The variables in the header are the slave's and then one for each master, or one for all.  Nodes must be
+    among those given, if any are.
     """
     if len(frame.arguments) < 2:
         source.problem("expected 'Begin Constraints NAME SLAVE_VARIABLE [MASTER_VARIABLE …]'", frame.offset)
         return []
-    known = set(nodes.tolist())
+    known = None if nodes is None else set(nodes.tolist())
 
     def read(at: int, end: int) -> tuple[Constraint, int]:
         constraint, after = _constraint(source, frame, (at, end))
-        missing = [node for node, _ in (constraint.slave, *constraint.masters) if node not in known]
+        named = [node for node, _ in (constraint.slave, *constraint.masters)]
+        missing = [] if known is None else [node for node in named if node not in known]
         if missing:
             raise ValueError(f"there is no node {missing[0]}")
         return constraint, after

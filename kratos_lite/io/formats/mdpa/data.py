@@ -18,8 +18,8 @@ WORDS = {"NodalData": "node", "ElementalData": "element", "ConditionalData": "co
 IS_FIXED = rb"\s*([^\s\[(]+)"
 
 
-def read_data(source: Source, frame: Frame, known: Ints) -> Data:
-    """Return one block of nodal, elemental or conditional data; `known` are the ids in the mesh."""
+def read_data(source: Source, frame: Frame, known: Ints | None) -> Data:
+    """Return one block of nodal, elemental or conditional data; its ids must be among `known`, if given."""
     variable, word = frame.arguments[0], WORDS[frame.name]
     kind, span = kind_of(variable), frame.spans[0]
     if kind is None:
@@ -41,7 +41,8 @@ def read_data(source: Source, frame: Frame, known: Ints) -> Data:
         data = _data(source, frame, rows, values)
         if word == "node":
             data.fixed = rows.ints[:, 1] == 1
-    _note_missing(source, data, word, known)
+    if known is not None:
+        _note_missing(source, data, word, known)
     return data
 
 

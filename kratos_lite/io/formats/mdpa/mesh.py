@@ -65,7 +65,7 @@ def read_blocks(source: Source, frames: list[Frame], mesh: Mesh) -> list[Block]:
 def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     name, word = frame.arguments[0], WORDS[frame.name]
     head = 1 if word == "geometry" else 2
-    width = _width(frame.name, name)
+    width = width_of(frame.name, name)
     known = width is not None
     if width is None:
         width = max(width_of_first_line(source, frame.spans[0]) - head, 0)
@@ -81,7 +81,7 @@ def _read_block(source: Source, frame: Frame, mesh: Mesh) -> Block:
     return Block(name, np.maximum(nodes, 0), ids, properties, shape, rows.lines)
 
 
-def _width(kind: str, name: str) -> int | None:
+def width_of(kind: str, name: str) -> int | None:
     """Return the number of nodes that a name promises, or None if only the rows can tell."""
     if kind == "Geometries":
         match = re.search(r"\dD(\d{1,3})N?$", name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kratos_lite.errors import nearest
 from kratos_lite.io.formats.cells import already, repeated
-from kratos_lite.io.formats.document import Document, Properties
+from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.formats.mdpa.data import read_data
 from kratos_lite.io.formats.mdpa.mesh import read_blocks, read_mesh
 from kratos_lite.io.formats.mdpa.parts import PartReader
@@ -53,14 +53,19 @@ def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
             source.note(f"block {frame.name} is skipped.{hint}", frame.offset)
     document = _read(source, frames)
     source.problems.raise_if_any()
-    document.notes = sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
+    document.notes = sorted_notes(source)
     return document
+
+
+def sorted_notes(source: Source) -> list[Note]:
+    """Return the notes of a source, each once, by line."""
+    return sorted(dict.fromkeys(source.notes), key=lambda note: note.line)
 
 
 def _read(source: Source, frames: dict[str, list[Frame]]) -> Document:
     """Return the document; first what others refer to, whatever the order in the file."""
-    properties = _read_properties(source, frames["Properties"])
-    tables = _read_tables(source, frames["Table"])
+    properties = read_properties(source, frames["Properties"])
+    tables = read_tables(source, frames["Table"])
     mesh = read_mesh(source, frames, list(properties))
     # References to what is broken already would only be reported as missing.
     source.problems.raise_if_any()
@@ -93,7 +98,8 @@ def _numbers(numbers: Iterable[int]) -> Ints:
     return np.array(list(numbers), dtype=np.int64)
 
 
-def _read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
+def read_properties(source: Source, frames: list[Frame]) -> dict[int, Properties]:
+    """Return the Properties of some frames by their ids."""
     found: dict[int, Properties] = {}
     for frame in frames:
         number = _number(source, frame, found, zero=True)
@@ -107,7 +113,8 @@ def _read_properties(source: Source, frames: list[Frame]) -> dict[int, Propertie
     return found
 
 
-def _read_tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
+def read_tables(source: Source, frames: list[Frame]) -> dict[int, Any]:
+    """Return the tables of some frames by their ids."""
     found: dict[int, Table] = {}
     for frame in frames:
         number = _number(source, frame, found)

@@ -106,7 +106,7 @@ def scan(source: Source) -> Frame:
     """
     root = Frame("", 0)
     stack, cursor = [root], 0
-    for offset in _statements(source.data):
+    for offset in statements(source.data):
         if offset < cursor:
             continue
         stack[-1].spans.append((cursor, offset))
@@ -129,7 +129,7 @@ def scan(source: Source) -> Frame:
     return root
 
 
-def _statements(data: bytes) -> list[int]:
+def statements(data: bytes) -> list[int]:
     """Return the offsets of the words Begin and End."""
     text = kernels("text") if len(data) > SMALL else None
     found: list[int] = []
