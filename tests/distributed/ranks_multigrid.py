@@ -23,7 +23,7 @@ def stiffness(ranks, whole, soft=False):
     number = np.full(mesh.n_nodes, -1)
     number[rows] = sum(counts[: ranks.rank]) + np.arange(len(rows))
     number = mesh.subdomain.fetch(number)
-    groups = model.element_groups() if mesh.n_elements else []
+    groups = model.element_groups()
     return mesh, SharedStiffness(ranks, mesh.points, groups, rows, number, free)
 
 
@@ -107,7 +107,7 @@ def test_an_empty_rank_takes_part(ranks):
     rows = np.flatnonzero(mesh.own_nodes & free.any(axis=1))
     number = np.full(mesh.n_nodes, -1)
     number[rows] = np.arange(len(rows))
-    groups = model.element_groups() if mesh.n_elements else []
+    groups = model.element_groups()
     K = SharedStiffness(ranks, mesh.points, groups, rows, number, free)
     b = np.ones(K.own)
     x, steps = conjugate_gradients(ranks, K, K.multigrid(), b)

@@ -143,8 +143,9 @@ def _mesh_file(source: Settings, folder: Path, outside: bool, ranks: Alone) -> t
         from kratos_lite.io.formats.part_files import part_files  # one process does without it
 
         path = folder / (source.text("input_filename") + ".mdpa")
-        if part_files(path):
-            return path, ""
+        for place in (path, folder / path.name):
+            if part_files(place):
+                return place, ""
     return find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
 
 
