@@ -38,6 +38,7 @@ class Krylov:
     A : matrix of PETSc.
     chosen : options that we choose; its own prefix keeps them from other solvers.
     given : options of the user, which win.
+    most : iterations.
 
     Attributes
     ----------
@@ -45,10 +46,16 @@ class Krylov:
     prefix : of its options.
     """
 
-    def __init__(self, A: Any, chosen: Mapping[str, str | None], given: Mapping[str, str | None]) -> None:
+    def __init__(
+        self,
+        A: Any,
+        chosen: Mapping[str, str | None],
+        given: Mapping[str, str | None],
+        most: int = MAX_ITERATIONS,
+    ) -> None:
         self.prefix = f"{PREFIX}{next(NUMBERS)}_"
         self.options, self.given = {**chosen, **given}, dict(given)
-        self._A, self._is_ready = A, False
+        self._A, self._is_ready, self.most = A, False, most
         self._error: BaseException | None = None
         self._share: Share | None = None
         with plain_errors():
@@ -134,7 +141,7 @@ class Krylov:
         ksp.setInitialGuessNonzero(near)
         ksp.setTolerances(
             rtol=tolerance if "ksp_rtol" not in self.given else None,
-            max_it=MAX_ITERATIONS if "ksp_max_it" not in self.given else None,
+            max_it=self.most if "ksp_max_it" not in self.given else None,
         )
         self._share = Share(tolerance, progress) if progress else None
         self._size = 0.0

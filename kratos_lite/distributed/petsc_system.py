@@ -32,9 +32,12 @@ from kratos_lite.mesh.subdomain import ALONE, Subdomain
 from kratos_lite.native import kernels
 from kratos_lite.records import record, replace
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 
+PATIENCE = 5 * MAX_ITERATIONS
+"""Iterations where nothing else is left, as ν near 0.5 needs many."""
 CURE = (
     "look for thin elements, nearly free parts or plain elements with ν near 0.5 "
     "(formulation='non_locking' takes others), or ask for solver='direct'"
@@ -222,7 +225,8 @@ class PetscSystem:
             set_multigrid(self._solver.ksp, K)
 
     def _iteration(self, A: Any, multigrid: bool) -> Krylov:
-        return Krylov(A, options_of(self.method, self._given, multigrid), self._given)
+        most = MAX_ITERATIONS if self.unknowns <= FALLBACK_LIMIT else PATIENCE
+        return Krylov(A, options_of(self.method, self._given, multigrid), self._given, most)
 
     def _masters(self) -> dict[int, dict[int, float]]:
         """Return the weights of the masters of own slaves, by the numbers of equations."""
