@@ -17,6 +17,8 @@ from kratos_lite.io.writers.table import write_table
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
 
+LEFT_OUT = "displacement and reaction by node: no rank knows those of all; the pieces of a .pvtu hold them"
+
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
     """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv.
@@ -99,20 +101,14 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def write_json(path: str | Path, result: Result) -> None:
-    """Write the table, and displacements and reactions (m, N) by node id."""
+    """Write the table and, of a mesh on one process, displacements and reactions (m, N) by node id."""
     import json
 
     from kratos_lite import __version__
 
-    ids = list(map(str, result.mesh.node_ids.tolist()))
-    held = np.flatnonzero((result.reactions != 0).any(axis=1))
-    content = {
-        "kratos_lite": __version__,
-        "units": "SI",
-        **summary(result),
-        "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
-        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
-    }
+    ranks = result.mesh.ranks
+    content = {"kratos_lite": __version__, "units": "SI", **summary(result)}
+    content |= _by_node(result) if ranks.size == 1 else {"ranks": ranks.size, "left_out": LEFT_OUT}
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -120,4 +116,16 @@ def write_json(path: str | Path, result: Result) -> None:
             f"{path}: not written: some results exceed the numbers that a computer holds (1.8e308); "
             "look for loads, supports or constants in wrong units"
         ) from None
-    write_whole(path, text.encode())
+    with ranks.together():
+        if ranks.rank == 0:
+            write_whole(path, text.encode())
+
+
+def _by_node(result: Result) -> dict[str, Any]:
+    """Return displacements, and reactions where there are any, by node id."""
+    ids = list(map(str, result.mesh.node_ids.tolist()))
+    held = np.flatnonzero((result.reactions != 0).any(axis=1))
+    return {
+        "displacement": dict(zip(ids, result.u.tolist(), strict=True)),
+        "reaction": dict(zip([ids[row] for row in held], result.reactions[held].tolist(), strict=True)),
+    }
