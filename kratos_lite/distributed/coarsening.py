@@ -14,10 +14,9 @@ import numpy as np
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import record
+from kratos_lite.solvers.multigrid import STRENGTH
 from kratos_lite.typing import Array, Ints
 
-STRENGTH = 0.005
-"""|A_ij| below this share of sqrt(|A_ii| |A_jj|) means a stiffness contrast: the nodes do not aggregate."""
 LEAST_GAIN = 0.9
 """Unknowns of a level to those of the level above, beyond which coarsening has come to a halt."""
 

@@ -15,13 +15,9 @@ from kratos_lite.distributed.coarsening import Coarser, coarsened
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.native import kernels
-from kratos_lite.records import record
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.solvers.multigrid import DEGREE, RATIO
+from kratos_lite.typing import Array, Mask
 
-DEGREE = 2
-"""Degree of the Chebyshev smoother."""
-RATIO = 12.0
-"""Largest to smallest eigenvalue that a smoother has to damp."""
 FULL = 600
 """Unknowns of all ranks that are factorized on each."""
 FULL_LIMIT = 3000
@@ -30,20 +26,6 @@ LANCZOS = 15
 """Steps that estimate the largest eigenvalue."""
 MARGIN = 1.15
 """Factor on it for the steps not made."""
-
-
-@record(eq=False)
-class Interpolation:
-    """From the corners of quadratic elements to all their nodes.
-
-    Attributes
-    ----------
-    indptr, indices, weights : rows of own nodes, columns by place on the linear level.
-    """
-
-    indptr: Ints
-    indices: Ints
-    weights: Array
 
 
 class Level:

@@ -22,13 +22,11 @@ from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.native import kernels
 from kratos_lite.records import replace
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
+from kratos_lite.solvers.constrained_system import LARGEST_CONTRAST
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import multigrid
 from kratos_lite.solvers.plate_level import plate_axes
 from kratos_lite.typing import Array, Ints, Mask, Progress
-
-LARGEST_CONTRAST = 1e3
-"""Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
 
 
 class OneProcess:
