@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cases, curves, distributed, effectivity, report, requested, scenes, sets
+from benchmarks import cases, curves, distributed, effectivity, report, requested, scaling, scenes, sets
 from benchmarks import stall as stalling
 from benchmarks.driver import ROOT, Driver, Run, as_json, results, scratch
 from benchmarks.programs import HELPERS, PROGRAMS
@@ -115,7 +115,7 @@ def main(words: Sequence[str] | None = None) -> int:
             python, options.elements, options.cells, options.repeats or 3, options.limit or 1800.0
         )
         distributed.write(found)
-        print(distributed.goals(found["rows"]), end="")
+        print(scaling.goals(found["rows"]), end="")
         return 0
     if options.command == "references":
         return references(options.cells or (4, 8, 16))

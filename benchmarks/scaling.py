@@ -76,9 +76,8 @@ def scaling(rows: Sequence[Row]) -> str:
             times = [f"{seconds:.2f}" for seconds in (row["mesh"], phases["assemble"], phases["solve"])]
             sizes = [f"{kind} {'×'.join(map(str, row['cells']))}", f"{row['unknowns']}", f"{row['ranks']}"]
             ends = [f"{row['seconds']:.2f}", f"{row['iterations']}", efficiency, serial]
-            lines.append(
-                [*sizes, *times, *ends, f"{per_unknown(row):.2f}", f"{row.get('difference', 0):.0e}"]
-            )
+            off = f"{row['difference']:.0e}" if "difference" in row else ""
+            lines.append([*sizes, *times, *ends, f"{per_unknown(row):.2f}", off])
     heads = ["cells", "unknowns", "ranks", "mesh s", "assembly s", "set-up and solver s", "solution s"]
     heads += ["iterations", "efficiency", "/ serial", "kB per unknown", "difference"]
     return table(heads, lines)
@@ -112,6 +111,7 @@ def plan(found: Row) -> str:
     lines = []
     for kind in dict.fromkeys(row["kind"] for row in found["rows"]):
         two = chosen(found["rows"], kind=kind, engine="petsc", ranks=MOST_RANKS)
+        two = [row for row in two if row["iterations"]]
         if not two:
             continue
         largest = max(two, key=lambda row: row["unknowns"])
@@ -177,8 +177,9 @@ three directions, to a relative residual of {tolerance:g}; each rank makes its s
 ratios, not seconds. Ranks of one machine share its memory, and say nothing about a network.
 
 {goals}
-Efficiency is that of mesh and solution. Memory is the most that a rank holds above its imports, over its
-share of the unknowns. Serial is the own engine on one thread.
+Efficiency is that of mesh and solution; the weak one is the time for one share on one rank over that for two
+shares on two. Memory is the most that a rank holds above its imports, over its share of the unknowns. Serial
+is the own engine on one thread.
 
 ## Strong and weak
 

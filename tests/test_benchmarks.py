@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_ranks import needs_mpi
 from scenes import OURS
 from scipy import sparse
 
@@ -24,6 +25,7 @@ from benchmarks import (  # noqa: E402
     ale,
     cases,
     curves,
+    distributed,
     driver,
     hard_scenes,
     motion,
@@ -344,6 +346,17 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
     # 8 iterations more for 6e6 / 3e3 unknowns; a rank of 5e5 takes a sixth of the 26 s, half of it in solve
     assert "| 8N 1e9 | 2000 | 2200 | 10.0 | 100.0 | 26 | 5 |" in text
     assert "- 8N 10x10x10 plain, 2 ranks: killed\n" in text
+
+
+@needs_mpi
+def test_engines_over_ranks_solve_the_same_block(capsys):
+    found = distributed.run(None, None, [3], 1, 300.0)
+    assert [row.get("failed") for row in found["rows"]] == [None] * 14
+    for row in found["rows"]:
+        assert row.get("difference", 0.0) < 1e-8
+        assert row["imports"] > 0
+    assert {row["kind"] for row in found["files"]} == {"8N", "27N"}
+    assert "| 8N 3×3×3 |" in scaling.page(found)
 
 
 # ---- sets, results and report --------------------------------------------------------------------------
