@@ -52,8 +52,11 @@ def test_addresses_and_words_are_the_same_everywhere(project):
 def test_requirements_are_the_same_everywhere(project):
     required = project["dependencies"]
     assert json.loads(text("codemeta.json"))["softwareRequirements"] == required
-    recipe = re.findall(r"- (\w+ >=[\d.]+)", text("conda/recipe.yaml").split("  run:")[1])
+    run, optional = text("conda/recipe.yaml").split("  run:")[1].split("  run_constraints:")
+    recipe = re.findall(r"- (\w+ >=[\d.]+)", run)
     assert [line.replace(" ", "") for line in recipe] == required
+    extra = [line.split(";")[0] for line in project["optional-dependencies"]["mpi"]]
+    assert {line.replace(" ", "") for line in re.findall(r"- (\w+ >=[\d.]+)", optional)} <= set(extra)
     oldest = dict(line.split("==") for line in text(".ci/oldest.txt").split() if "==" in line)
     bounds = dict(line.split(">=") for line in (*required, *project["optional-dependencies"]["view"]))
     for name, version in bounds.items():

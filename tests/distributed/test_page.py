@@ -1,0 +1,54 @@
+"""The commands and the script of docs/howto/cluster.md do what the page says."""
+
+import re
+import shlex
+
+import pytest
+from over_ranks import ROOT, mpirun, needs_mpi
+
+TEXT = (ROOT / "docs" / "howto" / "cluster.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^mpirun -n (\d+) \S*kratos-lite ([^#\n]*)$", TEXT, re.M)
+OPTIONS = re.findall(r"^\| `(--\w+ [^`]*)` \|", TEXT, re.M)
+(SCRIPT,) = re.findall(r"```\{code-block\} python\n:caption: block.py[^\n]*\n(.*?)```", TEXT, re.DOTALL)
+
+pytestmark = needs_mpi
+
+
+@pytest.mark.parametrize(("ranks", "words"), COMMANDS)
+def test_commands_run(ranks, words, tmp_path):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    run = mpirun(ranks, "-m", "kratos_lite", *shlex.split(words), seconds=120, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "largest displacement" in run.stdout
+    for name in re.findall(r"-o (\S+)", words):
+        assert (tmp_path / name).exists()
+
+
+def test_the_script_runs(tmp_path):
+    (tmp_path / "block.py").write_text(SCRIPT, encoding="utf-8")
+    run = mpirun(2, "block.py", seconds=120, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "backward error" in run.stdout
+    assert sorted(path.name for path in tmp_path.glob("*vtu")) == ["block.pvtu", "block_0.vtu", "block_1.vtu"]
+
+
+@pytest.mark.parametrize("words", OPTIONS)
+def test_options_are_taken(words, tmp_path):
+    cube = ROOT / "examples" / "gravity_cube.mdpa"
+    run = mpirun(
+        2,
+        "-m",
+        "kratos_lite",
+        "solve",
+        cube,
+        "--engine",
+        "petsc",
+        *shlex.split(words),
+        seconds=120,
+        cwd=tmp_path,
+    )
+    assert run.returncode == 0, run.stderr
+    assert "warning" not in run.stdout + run.stderr
+    for wanted in ("gamg", "hypre", "mumps"):
+        if wanted in words:
+            assert wanted in run.stdout
