@@ -19,13 +19,15 @@ STOPPED = {
     "DIVERGED_INDEFINITE_PC": "the preconditioner is not positive definite (iteration {})",
     "DIVERGED_INDEFINITE_MAT": "the matrix is not positive definite (iteration {})",
     "DIVERGED_NANORINF": "a number is not finite (iteration {})",
-    "DIVERGED_PC_FAILED": "the factorization failed: a pivot is 0, or memory is too little",
+    "DIVERGED_PCSETUP_FAILED": "the factorization failed: a pivot is 0, or memory is too little",
 }
 """Reasons of PETSc, in words."""
 NUMBERS = count()
 EPSILON = float(np.finfo(float).eps)
 MAXIMUM = 3
 """PETSc's number of the maximum norm."""
+NO_DIGITS = 1e-2
+"""Rounding of A x, as a share of b, from which a factorization has solved nothing."""
 REFINEMENTS = 2
 """Solutions for what is left where the true residual is too large."""
 
@@ -129,6 +131,8 @@ class Krylov:
             iterations += more
             x.axpy(1.0, step)
         error = left.norm(MAXIMUM) / (norm * x.norm(MAXIMUM) + b.norm(MAXIMUM))
+        if not iterations and 2 * EPSILON * norm * x.norm() > NO_DIGITS * size:
+            failure = failure or f"{self.name}: the matrix is singular: parts are free to move, or nearly so"
         left.destroy()
         step.destroy()
         return iterations, float(error), failure

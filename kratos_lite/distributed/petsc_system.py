@@ -43,6 +43,8 @@ CURE = (
     "(formulation='non_locking' takes others), or ask for solver='direct'"
 )
 """What helps where an iteration fails."""
+CURE_OF_FACTORS = "look for nearly free parts or a large stiffness contrast, or take more memory"
+"""What helps where a factorization fails."""
 
 
 @record(eq=False)
@@ -294,7 +296,7 @@ class PetscSystem:
             solver, reason = self._solver_made(), failure
             count, error, failure = solver.solve(b, x, tolerance, self._norm, self.progress)
         if failure:
-            raise SolveError(f"{failure}; {CURE}")
+            raise SolveError(f"{failure}; {CURE if self.method == 'amg' else CURE_OF_FACTORS}")
         if left := solver.unused():
             words = " ".join(f"-{one}" for one in left)
             self.warnings = [f"PETSc has not used these options: {words}; they may be misspelt"]

@@ -251,6 +251,19 @@ def test_an_iteration_that_fails_is_told_where_options_ask_for_it(ranks):
     share.system.destroy()
 
 
+def test_a_body_that_nothing_holds(ranks, solver):
+    share = Share(ranks, clamped(), solver=solver)
+    groups, held = share.system.groups, share.system._prescribed
+    held.fixed[:] = False
+    free = PetscSystem(share.mesh, groups, held, solver=solver)
+    with pytest.raises(SolveError, match="singular"):
+        free.solve(share.forces[share.rows])
+    free.destroy()
+
+
+test_a_body_that_nothing_holds.cases = ["direct", "amg"]
+
+
 def test_a_type_that_does_not_exist_is_an_input_error(ranks):
     share = Share(ranks, clamped(), options="-pc_type gamgg")
     with pytest.raises(InputError, match="gamgg"):
