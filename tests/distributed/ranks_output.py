@@ -1,5 +1,6 @@
 """Files that ranks write together."""
 
+import json
 import xml.etree.ElementTree as ElementTree
 from contextlib import contextmanager
 from pathlib import Path
@@ -134,6 +135,28 @@ def test_formats_of_one_process_are_refused(ranks):
         if ranks.size > 1:
             with pytest.raises(InputError, match=r"none holds the whole result; write \.pvtu"):
                 kl.write(name, result)
+
+
+def test_a_summary_has_what_ranks_know_together(ranks):
+    """Reactions are wrong at ghosts here."""
+    serial = whole_result()
+    for name, axis, place in (("clamped", 0, 0.0), ("edge", 1, 1.0)):
+        serial.mesh.add_part(name, lambda X, axis=axis, place=place: X[:, axis] == place)
+    result = shared(ranks, serial, random(serial.mesh, ranks.size))
+    with folder_of(ranks) as folder:
+        kl.write(folder / "beam.json", result)
+        ranks.agree()
+        found = json.loads((folder / "beam.json").read_text())
+    if ranks.size == 1:
+        assert len(found["displacement"]) == serial.mesh.n_nodes
+        return
+    assert "displacement" not in found
+    assert "pieces of a .pvtu" in found["left_out"]
+    assert found["smallest_displacements"] == serial.u.min(axis=0).tolist()
+    assert found["largest_displacements"] == serial.u.max(axis=0).tolist()
+    for name in ("clamped", "edge"):
+        expected = serial.reaction(name).sum(axis=0)
+        assert np.abs(np.array(found["reaction_of_parts"][name]) - expected).max() < 1e-3
 
 
 def test_an_error_on_one_rank_leaves_what_was_there(ranks):

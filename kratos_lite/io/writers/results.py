@@ -108,7 +108,7 @@ def write_json(path: str | Path, result: Result) -> None:
 
     ranks = result.mesh.ranks
     content = {"kratos_lite": __version__, "units": "SI", **summary(result)}
-    content |= _by_node(result) if ranks.size == 1 else {"ranks": ranks.size, "left_out": LEFT_OUT}
+    content |= _by_node(result) if ranks.size == 1 else _of_all(result)
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -119,6 +119,22 @@ def write_json(path: str | Path, result: Result) -> None:
     with ranks.together():
         if ranks.rank == 0:
             write_whole(path, text.encode())
+
+
+def _of_all(result: Result) -> dict[str, Any]:
+    """Return what ranks know together in place of values of nodes: extremes, and resultants of parts."""
+    mesh, own = result.mesh, result.mesh.own_nodes
+    ranks, u = mesh.ranks, result.u[own]
+    reactions = np.where(own[:, None], result.reactions, 0.0)
+    sums = [reactions[part.nodes].sum(axis=0) for part in mesh.parts.values()]
+    totals = dict(zip(mesh.parts, ranks.sum(np.reshape(sums, (-1, 3))), strict=True))
+    return {
+        "ranks": ranks.size,
+        "smallest_displacements": ranks.min(u.min(axis=0, initial=np.inf)).tolist(),
+        "largest_displacements": ranks.max(u.max(axis=0, initial=-np.inf)).tolist(),
+        "reaction_of_parts": {name: total.tolist() for name, total in totals.items() if total.any()},
+        "left_out": LEFT_OUT,
+    }
 
 
 def _by_node(result: Result) -> dict[str, Any]:
