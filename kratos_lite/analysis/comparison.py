@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kratos_lite import voigt
+from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.report import vector
 from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import volumes
@@ -109,6 +110,8 @@ def compare(first: Result, second: Result) -> Comparison:
         One of them is no result.
     MeshError
         No node of the first lies in the mesh of the second.
+    ModelError
+        Several processes share a mesh.
 
     Examples
     --------
@@ -123,7 +126,7 @@ def compare(first: Result, second: Result) -> Comparison:
     (True, True)
     """
     for result, name in ((first, "first"), (second, "second")):
-        instance(result, name, Result, "model.solve()")
+        check_whole(instance(result, name, Result, "model.solve()").mesh, "a comparison of results")
     mesh, used = first.mesh, first.mesh.used_nodes()
     same = mesh is second.mesh or np.array_equal(mesh.points, second.mesh.points)
     if same:

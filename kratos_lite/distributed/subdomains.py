@@ -5,8 +5,6 @@ Each id is looked after by one rank, which the others ask: no rank sees all of t
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from kratos_lite.distributed.halo import to_owners, with_halo
@@ -17,10 +15,9 @@ from kratos_lite.distributed.scatter import scattered
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import ids_of
 from kratos_lite.mesh.subdomain import Alone, Subdomain
-from kratos_lite.records import replace
-from kratos_lite.typing import Ints, Mask
+from kratos_lite.typing import Ints
 
-__all__ = ["grown", "piece_of", "scattered", "subdomain_mesh"]
+__all__ = ["scattered", "subdomain_mesh"]
 
 
 def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str = "") -> Mesh:
@@ -49,10 +46,12 @@ def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str =
 
     Examples
     --------
-    >>> from kratos_lite import box
     >>> from kratos_lite.mesh.subdomain import ALONE
-    >>> subdomain_mesh(ALONE, piece_of(box())).subdomain.numbers.tolist()
-    [0, 1, 2, 3, 4, 5, 6, 7]
+    >>> one = Kind("KinematicLinear3D4N", np.array([[4, 2, 7, 9]]), np.array([1]), np.array([1]))
+    >>> piece = Piece((one,), node_ids=np.array([2, 4, 7, 9]), points=np.eye(4, 3))
+    >>> mesh = subdomain_mesh(ALONE, piece)
+    >>> mesh.node_ids.tolist(), mesh.blocks[0].nodes.tolist()
+    ([2, 4, 7, 9], [[1, 0, 2, 3]])
     """
     with ranks.together():
         elements, conditions = aligned(ranks, piece.elements), aligned(ranks, piece.conditions)
@@ -83,48 +82,3 @@ def _blocks(node_ids: Ints, kinds: tuple[Kind, ...]) -> list[Block]:
     """Return the blocks of kinds of cells whose nodes are all here."""
     here = Lookup(node_ids)
     return [kind.block(here.rows(kind.nodes)) for kind in kinds]
-
-
-def piece_of(mesh: Mesh) -> Piece:
-    """Return what a rank has of a mesh, by ids: the nodes, and its own cells."""
-
-    def kinds(blocks: tuple[Block, ...], own: Mask) -> tuple[Kind, ...]:
-        ends = np.cumsum([0, *map(len, blocks)])
-        mine = [block.take(own[a:b]) for block, a, b in zip(blocks, ends, ends[1:], strict=False)]
-        return tuple(
-            Kind(b.name, mesh.node_ids[b.nodes], b.ids, b.properties, b.shape, b.lines, place)
-            for place, b in enumerate(mine)
-        )
-
-    ids: dict[str, Any] = {
-        "nodes": mesh.node_ids,
-        "elements": mesh.element_ids,
-        "conditions": ids_of(mesh.conditions),
-    }
-    share = mesh.subdomain
-    return Piece(
-        kinds(mesh.blocks, mesh.own_elements),
-        kinds(mesh.conditions, mesh.own_conditions),
-        mesh.node_ids,
-        mesh.points,
-        None if share is None else share.owner,
-        np.arange(mesh.n_nodes) if share is None else share.numbers,
-        {
-            name: replace(part, **{what: ids[what][getattr(part, what)] for what in ids})
-            for name, part in mesh.parts.items()
-        },
-        mesh.node_ids,
-    )
-
-
-def grown(mesh: Mesh, layers: int = 2) -> Mesh:
-    """Return what a rank holds with another number of layers of elements around its own nodes.
-
-    The own nodes stand in the same order and keep their numbers; all ranks call it.
-
-    Parameters
-    ----------
-    mesh : with a subdomain.
-    layers : of elements.
-    """
-    return subdomain_mesh(mesh.ranks, piece_of(mesh), layers=layers, source=mesh.source)

@@ -5,8 +5,9 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.distributed.pieces import Kind, Piece
-from kratos_lite.distributed.subdomains import grown, piece_of, scattered, subdomain_mesh
+from kratos_lite.distributed.subdomains import scattered, subdomain_mesh
 from kratos_lite.errors import MeshError
+from kratos_lite.mesh import ids_of
 
 
 def mixed():
@@ -37,11 +38,25 @@ def quadratic():
     return kl.box(cells=(3, 2, 4), element="KinematicLinear3D20N")
 
 
+def kinds_of(mesh, blocks):
+    """Return blocks by the ids of their nodes."""
+    return [
+        Kind(b.name, mesh.node_ids[b.nodes], b.ids, b.properties, b.shape, b.lines, place)
+        for place, b in enumerate(blocks)
+    ]
+
+
+def part_by_ids(mesh, part):
+    conditions = ids_of(mesh.conditions)[part.conditions]
+    ids = {"nodes": mesh.node_ids[part.nodes], "elements": mesh.element_ids[part.elements]}
+    return kl.Part(**ids, conditions=conditions, properties=part.properties, data=part.data)
+
+
 def pieces(mesh, ranks, parts, seed=7):
     """Return what a rank is to give: its elements, and any share of all the rest, some of it twice."""
     random = np.random.default_rng(seed)
-    whole = piece_of(mesh)
-    ends = np.cumsum([len(kind.ids) for kind in whole.elements])[:-1]
+    elements, conditions = kinds_of(mesh, mesh.blocks), kinds_of(mesh, mesh.conditions)
+    ends = np.cumsum([len(kind.ids) for kind in elements])[:-1]
 
     def mine(size):
         return random.integers(ranks.size, size=size) == ranks.rank
@@ -51,6 +66,7 @@ def pieces(mesh, ranks, parts, seed=7):
         rest = kind.shape, None, kind.place
         return Kind(kind.name, kind.nodes[at], kind.ids[at], kind.properties[at], *rest)
 
+    parts_by_ids = {name: part_by_ids(mesh, part) for name, part in mesh.parts.items()}
     nodes = mine(mesh.n_nodes) | (np.arange(mesh.n_nodes) % 5 == 0)
     shares = {
         name: kl.Part(
@@ -60,15 +76,15 @@ def pieces(mesh, ranks, parts, seed=7):
             properties=part.properties,
             data=part.data,
         )
-        for name, part in whole.parts.items()
+        for name, part in parts_by_ids.items()
         if name != "nothing" or ranks.rank == ranks.size - 1
     }
     own = np.split(parts == ranks.rank, ends)
     return Piece(
-        tuple(take(kind, at) for kind, at in zip(whole.elements, own, strict=True)),
-        tuple(take(kind, mine(len(kind.ids))) for kind in whole.conditions),
-        whole.node_ids[nodes],
-        whole.points[nodes],
+        tuple(take(kind, at) for kind, at in zip(elements, own, strict=True)),
+        tuple(take(kind, mine(len(kind.ids))) for kind in conditions),
+        mesh.node_ids[nodes],
+        mesh.points[nodes],
         parts=shares,
     )
 
@@ -137,20 +153,6 @@ test_pieces.cases = [
     for cut in (random_ranks, all_on_the_last, in_order)
     for layers in (1, 2)
 ]
-
-
-def test_more_layers_keep_numbers_and_own_nodes(ranks):
-    whole = mixed()
-    parts = random_ranks(whole, ranks.size)
-    mesh = subdomain_mesh(ranks, pieces(whole, ranks, parts))
-    wide = grown(mesh, 2)
-    check_numbers(ranks, wide, whole)
-    mine = mesh.own_nodes
-    assert np.array_equal(mesh.node_ids[mine], wide.node_ids[wide.own_nodes])
-    assert np.array_equal(mesh.subdomain.numbers[mine], wide.subdomain.numbers[wide.own_nodes])
-    expected = scattered(whole, ranks, parts, 2)
-    assert np.array_equal(np.sort(wide.element_ids), np.sort(expected.element_ids))
-    assert set(expected.node_ids) <= set(wide.node_ids)
 
 
 def test_a_given_owner_and_wanted_nodes(ranks):

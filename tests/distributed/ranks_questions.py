@@ -159,3 +159,15 @@ def test_what_needs_the_whole_mesh_is_refused(ranks):
         else:
             with pytest.raises(MeshError, match=f"that {ranks.size} ranks share keeps its elements"):
                 change(mesh)
+
+
+def test_a_comparison_needs_the_whole_mesh(ranks):
+    mesh = cut(ranks, kl.box(cells=(3, 1, 1)))
+    model = kl.Model(mesh, kl.Isotropic3D(1e6, 0.3))
+    model.fix("x-")
+    result = model.solve(engine="petsc")
+    if ranks.size == 1:
+        assert kl.compare(result, result).displacement.maximum == 0
+    else:
+        with pytest.raises(ModelError, match="a comparison of results needs the whole mesh"):
+            kl.compare(result, result)
