@@ -25,9 +25,9 @@ class NodeDirectory:
 
     Attributes
     ----------
-    own : (k,) int, ids of the own nodes of this rank, in their order.
+    own : (k,) int, ids of the own nodes of this rank, ascending.
     touched : (t,) int, ids of the nodes of the elements that this rank gives, ascending.
-    points, order, owner, numbers : of the nodes that this rank looks after.
+    points, owner, numbers : of the nodes that this rank looks after.
 
     Raises
     ------
@@ -37,10 +37,7 @@ class NodeDirectory:
 
     def __init__(self, ranks: Alone, piece: Piece) -> None:
         self.ranks, self.directory = ranks, Directory(ranks, piece.node_ids)
-        given = self.directory.given
         self.points = _places(self.directory, piece)
-        self.order = np.zeros(len(self.directory.ids), dtype=np.int64)
-        self.order[given.rows] = given.tell(piece.node_ids if piece.order is None else piece.order)
         self.owner = self._owners(piece)
         self.own, self.numbers = self._numbered()
 
@@ -83,14 +80,14 @@ class NodeDirectory:
         return np.where(named < size, named, lowest)
 
     def _numbered(self) -> tuple[Ints, Ints]:
-        """Return the own nodes in order, and the numbers of those that this rank looks after."""
+        """Return the own nodes, ascending, and the numbers of those that this rank looks after."""
         to_owners = Route(self.ranks, self.owner)
-        ids, order = to_owners.send(self.directory.ids), to_owners.send(self.order)
-        by_order = np.argsort(order, kind="stable")
+        ids = to_owners.send(self.directory.ids)
+        order = np.argsort(ids, kind="stable")
         first = sum(self.ranks.gather(len(ids))[: self.ranks.rank])
         numbers = np.empty(len(ids), dtype=np.int64)
-        numbers[by_order] = first + np.arange(len(ids))
-        return ids[by_order], to_owners.back(numbers)
+        numbers[order] = first + np.arange(len(ids))
+        return ids[order], to_owners.back(numbers)
 
 
 def places(ranks: Alone, piece: Piece, kinds: Iterable[Kind]) -> tuple[Ints, Array]:

@@ -79,8 +79,6 @@ class Piece:
     node_ids, points : (n,) int and (n, 3) float in m, the nodes that this rank knows, whether or not it needs
         them; several ranks may know the same.
     owners : (n,) int, the rank that is to own each of these nodes, -1 if any; or None.
-    order : (n,) int, the nodes stand in this order; if not given, in that of the ids.  All ranks that
-        know a node agree.
     parts : named parts, with ids of nodes, elements and conditions where those of a mesh have rows; each rank
         knows any share of a part.
     wanted : (w,) int, ids of nodes that are to be here in any case, as ghosts unless they are own.
@@ -91,7 +89,6 @@ class Piece:
     node_ids: Ints = NO_ROWS
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     owners: Ints | Rows | None = None
-    order: Ints | None = None
     parts: dict[str, Part] = field(default_factory=dict)
     wanted: Ints = NO_ROWS
 

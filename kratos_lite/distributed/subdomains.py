@@ -36,8 +36,8 @@ def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str =
     Returns
     -------
     Mesh
-        Nodes in their order, cells of each block in theirs; all ranks have the same blocks and parts, some of
-        them empty.
+        Nodes by their ids, cells of each block in their order; all ranks have the same blocks and parts, some
+        of them empty.
 
     Raises
     ------
@@ -61,20 +61,19 @@ def subdomain_mesh(ranks: Alone, piece: Piece, *, layers: int = 1, source: str =
         elements, own, here = with_halo(nodes, elements, layers)
         conditions = to_owners(nodes, conditions)
         here, asked = nodes.ask(conditions, np.append(here, piece.wanted))
-        order = np.argsort(asked.answer(nodes.order), kind="stable")
-        here, owner = here[order], asked.answer(nodes.owner)[order]
+        owner = asked.answer(nodes.owner)
         blocks, faces = _blocks(here, elements), _blocks(here, conditions)
         lowest = [owner[block.nodes].min(axis=1, initial=ranks.size) for block in faces]
         own_conditions = np.concatenate([np.zeros(0, dtype=np.int64), *lowest]) == ranks.rank
         have = {"nodes": here, "elements": ids_of(blocks), "conditions": ids_of(faces)}
         return Mesh(
-            asked.answer(nodes.points)[order],
+            asked.answer(nodes.points),
             blocks,
             node_ids=here,
             conditions=faces,
             parts=parts_here(ranks, piece.parts, have),
             source=source,
-            subdomain=Subdomain(ranks, owner, asked.answer(nodes.numbers)[order], own, own_conditions),
+            subdomain=Subdomain(ranks, owner, asked.answer(nodes.numbers), own, own_conditions),
         )
 
 
