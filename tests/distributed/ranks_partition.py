@@ -1,7 +1,7 @@
 """Parts of equal work, whoever has which element; with METIS and without."""
 
 import numpy as np
-from ranks_pieces import mixed, pieces, random_ranks
+from mesh_pieces import mixed, pieces, random_ranks
 
 import kratos_lite as kl
 from kratos_lite.distributed import partition

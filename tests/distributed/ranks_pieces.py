@@ -2,95 +2,12 @@
 
 import numpy as np
 import pytest
+from mesh_pieces import mixed, pieces, quadratic, random_ranks
 
 import kratos_lite as kl
 from kratos_lite.distributed.pieces import Kind, Piece
 from kratos_lite.distributed.subdomains import scattered, subdomain_mesh
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh import ids_of
-
-
-def mixed():
-    """Bricks, wedges and tetrahedra with faces, parts and a node of no element; no ids in order."""
-    random = np.random.default_rng(5)
-    box = kl.box(cells=(4, 3, 3))
-    bricks, more = box.blocks[0].nodes[:20], box.blocks[0].nodes[20:]
-    wedges = more[:8][:, [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]].reshape(-1, 6)
-    tetrahedra = more[8:][:, [[0, 1, 3, 4], [1, 2, 3, 6]]].reshape(-1, 4)
-    cells = {"KinematicLinear3D8N": bricks, "KinematicLinear3D6N": wedges, "KinematicLinear3D4N": tetrahedra}
-    ids = np.split(1 + random.permutation(20 + 16 + 16), [20, 36])
-    blocks = [kl.Block(n, c, np.sort(i), i % 3) for (n, c), i in zip(cells.items(), ids, strict=True)]
-    mesh = kl.Mesh(np.vstack([box.points, [[9.0, 9, 9]]]), blocks)
-    faces = next(face for face in mesh.boundary if face.nodes.shape[1] == 4)
-    conditions = [
-        kl.Block("SurfaceLoadCondition3D4N", faces.nodes, 10 * np.arange(len(faces)), 4, faces.shape)
-    ]
-    parts = {
-        "some": kl.Part(nodes=np.arange(0, 40, 3), elements=np.arange(5, 40), data={"A": 1}),
-        "some.faces": kl.Part(conditions=np.arange(3, 25), nodes=[80, 3], properties=(4,)),
-        "nothing": kl.Part(),
-    }
-    node_ids = np.sort(random.permutation(1000)[: mesh.n_nodes])
-    return kl.Mesh(mesh.points, blocks, node_ids=node_ids, conditions=conditions, parts=parts)
-
-
-def quadratic():
-    return kl.box(cells=(3, 2, 4), element="KinematicLinear3D20N")
-
-
-def kinds_of(mesh, blocks):
-    """Return blocks by the ids of their nodes."""
-    return [
-        Kind(b.name, mesh.node_ids[b.nodes], b.ids, b.properties, b.shape, b.lines, place)
-        for place, b in enumerate(blocks)
-    ]
-
-
-def part_by_ids(mesh, part):
-    conditions = ids_of(mesh.conditions)[part.conditions]
-    ids = {"nodes": mesh.node_ids[part.nodes], "elements": mesh.element_ids[part.elements]}
-    return kl.Part(**ids, conditions=conditions, properties=part.properties, data=part.data)
-
-
-def pieces(mesh, ranks, parts, seed=7):
-    """Return what a rank is to give: its elements, and any share of all the rest, some of it twice."""
-    random = np.random.default_rng(seed)
-    elements, conditions = kinds_of(mesh, mesh.blocks), kinds_of(mesh, mesh.conditions)
-    ends = np.cumsum([len(kind.ids) for kind in elements])[:-1]
-
-    def mine(size):
-        return random.integers(ranks.size, size=size) == ranks.rank
-
-    def take(kind, chosen):
-        at = np.random.default_rng(1).permutation(np.flatnonzero(chosen))
-        rest = kind.shape, None, kind.place
-        return Kind(kind.name, kind.nodes[at], kind.ids[at], kind.properties[at], *rest)
-
-    parts_by_ids = {name: part_by_ids(mesh, part) for name, part in mesh.parts.items()}
-    nodes = mine(mesh.n_nodes) | (np.arange(mesh.n_nodes) % 5 == 0)
-    shares = {
-        name: kl.Part(
-            nodes=part.nodes[mine(len(part.nodes)) | (part.nodes % 4 == 0)],
-            elements=part.elements[mine(len(part.elements))],
-            conditions=part.conditions[mine(len(part.conditions))],
-            properties=part.properties,
-            data=part.data,
-        )
-        for name, part in parts_by_ids.items()
-        if name != "nothing" or ranks.rank == ranks.size - 1
-    }
-    own = np.split(parts == ranks.rank, ends)
-    return Piece(
-        tuple(take(kind, at) for kind, at in zip(elements, own, strict=True)),
-        tuple(take(kind, mine(len(kind.ids))) for kind in conditions),
-        mesh.node_ids[nodes],
-        mesh.points[nodes],
-        parts=shares,
-    )
-
-
-def random_ranks(mesh, size):
-    return np.random.default_rng(3).integers(size, size=mesh.n_elements)
 
 
 def all_on_the_last(mesh, size):
