@@ -1,0 +1,3 @@
+"""What `runner.py` runs is for several processes alone."""
+
+collect_ignore_glob = ["ranks_*.py", "runner.py"]
