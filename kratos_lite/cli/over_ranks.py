@@ -13,7 +13,6 @@ from kratos_lite.errors import InputError, KratosLiteError
 from kratos_lite.io.writers.endings import check_result, check_result_of_ranks
 
 OF_STATICS = ("modes", "time", "restart", "state", *OF_TIME)
-ON_ONE_PROCESS = "is for one process; leave it out, or --engine petsc"
 EXPECTED = (KratosLiteError, ArithmeticError, OSError)
 """Errors that a command may meet on any rank, while no other waits for PETSc."""
 
@@ -22,9 +21,9 @@ def refuse_serial_options(options: Namespace) -> None:
     """Raise InputError for an option that does not go with PETSc."""
     refuse(options, OF_STATICS, "does not go with --engine petsc, which solves statics; leave one out")
     refuse(options, ("rotation", "translation"), "does not go with --engine petsc, which solves statics")
-    refuse(options, ("error",), ON_ONE_PROCESS)
+    refuse(options, ("error",), "is for one process; leave it out, or --engine petsc")
     if Path(options.input).suffix.lower() == ".py":
-        raise InputError(f"{options.input}: scripts {ON_ONE_PROCESS}")
+        raise InputError(f"{options.input}: scripts are for one process; leave --engine petsc out")
     parsed(options.petsc)
 
 

@@ -55,6 +55,28 @@ def test_options_of_petsc_belong_to_the_engine(beam, run):
     assert run("solve", "beam.mdpa", "--petsc", "-ksp_view").refuses("--petsc belongs to --engine petsc")
 
 
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--modes", "3"], "--modes does not go with --engine petsc"),
+        (["--time", "1e-3:5"], "--time does not go with --engine petsc"),
+        (["--lumped"], "--lumped does not go with --engine petsc"),
+        (["--rotation", "z:3"], "--rotation does not go with --engine petsc"),
+        (["--error", "1%"], "--error is for one process"),
+        (["--petsc", "-ksp_type cg gmres"], "'gmres' is no option and the value of none"),
+        (["--petsc", "ksp_view"], "'ksp_view' is no option"),
+        (["--petsc", "-ksp_type 'cg"], "cannot be read"),
+    ],
+)
+def test_what_petsc_does_not_do_is_refused_before_anything_is_read(run, words, text):
+    assert run("solve", "no.mdpa", "--engine", "petsc", *words).refuses(text)
+
+
+def test_a_body_is_not_solved_by_petsc(run, tmp_path):
+    (tmp_path / "body.py").write_text("raise SystemError('is not run')")
+    assert run("solve", tmp_path / "body.py", "--engine", "petsc").refuses("scripts are for one process")
+
+
 def test_without_petsc_the_cure_is_named(beam):
     text = (
         "import sys\nsys.modules['mpi4py'] = sys.modules['petsc4py'] = None\n"
