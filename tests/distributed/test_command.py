@@ -8,6 +8,7 @@ import subprocess
 import pytest
 from kratos_part_files import write_part_files
 from over_ranks import PYTHON, ROOT, mpirun, needs_mpi
+from run_files import CLAMP, GRAVITY, box_mdpa, materials, process, push, run_file, write
 
 import kratos_lite as kl
 
@@ -281,3 +282,22 @@ def test_a_rank_that_is_killed_while_it_writes(beam):
     after = {path: path.read_bytes() for path in beam.parent.iterdir()}
     assert {path: after[path] for path in before} == before
     assert [data for path, data in after.items() if path not in before] == [b"half"]
+
+
+def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path):
+    """A run file of Kratos with checks; the same lines as on one process."""
+    (tmp_path / "box.mdpa").write_text(box_mdpa())
+    write(tmp_path, materials("Structure.Body", 7850.0, 2e9, 0.3), "materials.json")
+    checks = [
+        process("check_scalar_to_nodes_process", f"Structure.{part}", f"DISPLACEMENT_{axis}", value=value)
+        for part, axis, value in (("Bottom", "X", 0.0), ("Bottom", "X", "0.001*x**2"), ("Top", "Z", 1.0))
+    ]
+    write(tmp_path, run_file([CLAMP], [GRAVITY, push(1e6)], checks=checks))
+    serial = command(1, "solve", tmp_path)
+    run = command(3, "solve", tmp_path, "--engine", "petsc")
+    assert serial.returncode == run.returncode == 3
+    said_of = [
+        [line for line in one.stdout.splitlines() if line.startswith("check ")] for one in (serial, run)
+    ]
+    assert said_of[0] == said_of[1]
+    assert [" passed " in line for line in said_of[1]] == [True, False, False]
