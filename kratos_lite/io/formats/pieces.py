@@ -10,6 +10,7 @@ import numpy as np
 from kratos_lite.distributed.directory import all_of
 from kratos_lite.distributed.pieces import Kind, Piece
 from kratos_lite.distributed.subdomains import subdomain_mesh
+from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document
 from kratos_lite.mesh import Block, Mesh, ids_of, rows_of_ids
 from kratos_lite.mesh.subdomain import Alone
@@ -67,28 +68,48 @@ def spread(ranks: Alone, given: Sequence[Data], ids: Ints) -> list[Data]:
 
     Where an id has several values of a variable, those of the lowest rank count.
     """
-    found: dict[tuple[str, int], Any] = {}
-    for all_of_rank in ranks.gather(
-        [(one.variable, one.line, one.source, one.values.shape[1:]) for one in given]
-    ):
-        for number, (variable, *rest) in enumerate(all_of_rank):
-            turn = sum(one[0] == variable for one in all_of_rank[:number])
-            found.setdefault((variable, turn), rest)
     out = []
-    for (variable, turn), (line, source, shape) in found.items():
+    for (variable, turn), (line, source, shape) in _variables(ranks, given).items():
         mine = [one for one in given if one.variable == variable][turn : turn + 1]
-        table = [_table(one) for one in mine] or [np.zeros((0, 1 + int(np.prod(shape, dtype=int))))]
         own = np.concatenate([np.zeros(0, dtype=np.int64), *(one.ids for one in mine)])
-        width = int(ranks.max(table[0].shape[1]))
+        width = 0 if shape is None else int(np.prod(shape, dtype=int))
+        none = np.zeros((0, 1 + width))
         came: Ints
         values: Array
-        came, values = all_of(ranks, own, _widened(table[0], width), ids)
+        table = np.concatenate([none, *(_table(one) for one in mine if len(one.ids))])
+        came, values = all_of(ranks, own, table, ids)
         rows = rows_of_ids(ids, came)
         first = np.unique(rows, return_index=True)[1]
         came, values = came[first], values[first]
-        numbers: Array = values[:, 1:].reshape(len(came), *shape) if width > 1 else np.zeros(0)
+        numbers: Array = values[:, 1:].reshape(len(came), *(shape or ())) if width else np.zeros(0)
         out.append(Data(variable, came, values[:, 0] > 0, numbers, line, source))
     return out
+
+
+def _variables(ranks: Alone, given: Sequence[Data]) -> dict[tuple[str, int], list[Any]]:
+    """Return line, source and shape of one value of each block of values, by variable and turn.
+
+    The shape is that on the ranks that have values, None where nobody has any.
+    """
+    found: dict[tuple[str, int], list[Any]] = {}
+    for all_of_rank in ranks.gather([(one.variable, one.line, one.source, shape_of(one)) for one in given]):
+        for number, (variable, line, source, shape) in enumerate(all_of_rank):
+            turn = sum(one[0] == variable for one in all_of_rank[:number])
+            known = found.setdefault((variable, turn), [line, source, shape])
+            known[2] = shape if known[2] is None else known[2]
+            if shape not in (None, known[2]):
+                raise InputError(
+                    f"{source or variable}: {variable} has values of size {list(shape)} in line {line}, but "
+                    f"of size {list(known[2])} on another rank; give all the same size"
+                )
+    return found
+
+
+def shape_of(data: Data) -> tuple[int, ...] | None:
+    """Return the shape of one value, (0,) of a flag; None where there are none."""
+    if not len(data.ids):
+        return None
+    return data.values.shape[1:] if data.values.size else (0,)
 
 
 def _table(data: Data) -> Array:
@@ -96,7 +117,3 @@ def _table(data: Data) -> Array:
     m = len(data.ids)
     numbers = data.values.reshape(m, -1) if data.values.size else np.zeros((m, 0))
     return np.column_stack([data.fixed.astype(float), numbers])
-
-
-def _widened(table: Array, width: int) -> Array:
-    return table if table.shape[1] == width else np.zeros((len(table), width))

@@ -14,6 +14,7 @@ from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import USED, apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
+from kratos_lite.io.text import MAX_ID
 from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids, with_rows
 from kratos_lite.typing import Array, Ints
 
@@ -179,13 +180,15 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
 
 def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) -> None:
     """Note fixed values that an earlier block gave otherwise."""
+    here, ranks = rows >= 0, model.mesh.ranks
+    rows, ids = rows[here], data.ids[here]
     for name, new in components(data.variable, data.values).items():
         if name in values.fixed:
-            own = (rows >= 0) & model.mesh.own_nodes[rows]
-            changed = own & values.fixed[name][rows] & (values.nodal[name][rows] != new)
-            if count := model.mesh.ranks.sum(int(changed.sum())):
+            fixed = model.mesh.own_nodes[rows] & values.fixed[name][rows]
+            changed = fixed & (values.nodal[name][rows] != new[here])
+            if count := ranks.sum(int(changed.sum())):
                 more = f" (and {count - 1} more)" if count > 1 else ""
-                node = model.mesh.ranks.first(next(iter(data.ids[changed].tolist()), None))
+                node = ranks.min(int(ids[changed].min(initial=MAX_ID)))
                 text = f"{name} of node {node}{more} is fixed to another value before; the last one counts"
                 _note(model, data, text)
 

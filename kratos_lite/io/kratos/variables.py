@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.model import Model
+from kratos_lite.io.text import MAX_ID
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.conditions import ConditionLoads
@@ -199,7 +200,7 @@ class Variables:
                 ("nodes", self.nodal.loaded(variable) & ~on_nodes, of_nodes, NO_CONDITION),
             ):
                 if count := mesh.ranks.sum(int((idle & own).sum())):
-                    first = mesh.ranks.first(next(iter(ids[idle & own].tolist()), None))
+                    first = mesh.ranks.min(int(ids[idle & own].min(initial=MAX_ID)))
                     where = f"{count} {word} (first {first})"
                     notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
 

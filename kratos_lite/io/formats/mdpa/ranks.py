@@ -21,7 +21,7 @@ from kratos_lite.io.formats.mdpa.reader import read_properties, read_tables, sor
 from kratos_lite.io.formats.mdpa.rows import Layout, Rows, read_rows
 from kratos_lite.io.formats.mdpa.scan import TOP, Frame
 from kratos_lite.io.formats.mdpa.values import read_values
-from kratos_lite.io.formats.pieces import joined
+from kratos_lite.io.formats.pieces import joined, shape_of
 from kratos_lite.io.names import condition_shape, element_shape
 from kratos_lite.mesh import NO_ROWS, Mesh, Part, distinct
 from kratos_lite.mesh.subdomain import Alone
@@ -74,8 +74,10 @@ def read_mdpa_by_ranks(path: Path, ranks: Alone, strict: bool) -> Document:
     nodes.require(constraint_nodes)
     for what, of in known.items():
         of.require(np.concatenate([NO_ROWS, *(getattr(part, what) for part in parts.values())]))
-        for number in range(ranks.max(len(data[what]))):
-            of.require(data[what][number].ids, once=True)
+        for one in data[what]:
+            of.require(one.ids, once=True)
+            if len({shape for shape in ranks.gather(shape_of(one)) if shape is not None}) > 1:
+                raise Unusual("values of different sizes")
     piece = partitioned(ranks, Piece(elements, conditions, node_ids, points, parts=parts))
     return joined(ranks, document, piece, str(path))
 
