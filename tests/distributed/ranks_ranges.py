@@ -10,6 +10,7 @@ from ranks_run_files import forces
 
 import kratos_lite as kl
 from kratos_lite.io.formats import ranks as reading
+from kratos_lite.io.formats.mdpa.reader import read_mdpa
 
 EXTRA = [
     "Begin Table 1 TIME PRESSURE\n 0 1\n 1 2\nEnd Table\n",
@@ -184,6 +185,26 @@ def test_a_rank_without_nodes(ranks):
     text = box_text((1, 1, 1))
     assert check(ranks, text) == ""
     assert check(ranks, text + EXTRA[6]) == ""
+
+
+def test_what_is_odd_is_read_by_one_rank(ranks):
+    """A comment over lines: no ranges, but no other rank than 0 has all of the file."""
+    text, seen = "/* a comment\nof two lines */\n" + box_text((2, 2, 3)), []
+
+    def read_one(path, strict):
+        seen.append(path)
+        return read_mdpa(path, strict=strict)
+
+    with file_of(ranks, text) as path:
+        document = reading.read_shared(path, ranks, True, read_one)
+    assert ranks.gather(len(seen)) == [1] + [0] * (ranks.size - 1)
+    assert document.mesh.subdomain.n_all == 36
+
+
+def test_repeated_values_count_as_in_the_file(ranks):
+    """The last value of a node counts, wherever it stands."""
+    rows = "1 1 0.5\n 5 1 0.5\n 1 1 0.25\n 5 0 0.125\n"
+    assert check(ranks, box_text((1, 1, 2)) + f"Begin NodalData DISPLACEMENT_X\n {rows}End NodalData\n") == ""
 
 
 def test_values_of_different_sizes(ranks):

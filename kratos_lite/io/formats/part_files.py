@@ -11,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kratos_lite.distributed.pieces import Piece
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
-from kratos_lite.io.formats.pieces import joined, kinds_of
-from kratos_lite.mesh import ids_of
+from kratos_lite.io.formats.pieces import joined, piece_of
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
@@ -87,19 +85,7 @@ def read_part_files(files: dict[int, Path], path: Path, ranks: Alone, strict: bo
         owners = _owners(document, mine, ranks)
         nodal = [one for one in document.nodal_data if one.variable != OWNER]
         notes = [note for note in document.notes if not re.search(f"CommunicatorData|{OWNER}", note.text)]
-        ids = {"nodes": mesh.node_ids, "elements": mesh.element_ids, "conditions": ids_of(mesh.conditions)}
-        parts = {
-            name: replace(part, **{what: of[getattr(part, what)] for what, of in ids.items()})
-            for name, part in mesh.parts.items()
-        }
-        piece = Piece(
-            kinds_of(mesh, mesh.blocks),
-            kinds_of(mesh, mesh.conditions),
-            mesh.node_ids,
-            mesh.points,
-            owners,
-            parts=parts,
-        )
+        piece = piece_of(mesh, owners, merge=True)
     return joined(ranks, replace(document, nodal_data=nodal, notes=notes), piece, str(mine))
 
 

@@ -53,8 +53,37 @@ def _touches(constraint: Constraint, mesh: Mesh) -> bool:
     return bool(mesh.own_nodes[rows[rows >= 0]].any())
 
 
-def kinds_of(mesh: Mesh, blocks: Sequence[Block]) -> tuple[Kind, ...]:
-    """Return blocks of a mesh by ids; those of one name become one, as ranks have different ones."""
+def piece_of(mesh: Mesh, owners: Ints | None = None, merge: bool = False) -> Piece:
+    """Return a mesh that this rank has read, by ids.
+
+    Parameters
+    ----------
+    mesh : of one process.
+    owners : as of a `Piece`.
+    merge : make blocks of one name one, as other ranks have different ones.
+    """
+    ids: dict[str, Ints] = {
+        "nodes": mesh.node_ids,
+        "elements": mesh.element_ids,
+        "conditions": ids_of(mesh.conditions),
+    }
+    kinds = _merged if merge else _one_by_one
+    parts = {
+        name: replace(part, **{what: of[getattr(part, what)] for what, of in ids.items()})
+        for name, part in mesh.parts.items()
+    }
+    elements, conditions = kinds(mesh, mesh.blocks), kinds(mesh, mesh.conditions)
+    return Piece(elements, conditions, mesh.node_ids, mesh.points, owners, parts=parts)
+
+
+def _one_by_one(mesh: Mesh, blocks: Sequence[Block]) -> tuple[Kind, ...]:
+    return tuple(
+        Kind(b.name, mesh.node_ids[b.nodes], b.ids, b.properties, b.shape, b.lines, place)
+        for place, b in enumerate(blocks)
+    )
+
+
+def _merged(mesh: Mesh, blocks: Sequence[Block]) -> tuple[Kind, ...]:
     found: dict[str, Kind] = {}
     for block in blocks:
         kind = Kind(block.name, mesh.node_ids[block.nodes], block.ids, block.properties, block.shape)

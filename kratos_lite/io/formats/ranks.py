@@ -8,19 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
-from kratos_lite.distributed.partition import parts_of
+from kratos_lite.distributed.partition import partitioned, parts_of
+from kratos_lite.distributed.pieces import Piece
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.io.formats.document import Constraint, Document
 from kratos_lite.io.formats.mdpa.ranges import Unusual
 from kratos_lite.io.formats.mdpa.ranks import read_mdpa_by_ranks
 from kratos_lite.io.formats.part_files import part_files, read_part_files
-from kratos_lite.mesh import Mesh
+from kratos_lite.io.formats.pieces import joined, piece_of
+from kratos_lite.mesh import Mesh, without_repeats
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
 LARGE = 4_000_000
-"""Bytes of an `.mdpa` file from which each rank reads a range of it; smaller ones are read whole by all."""
+"""Bytes of a file from which no rank but one may hold all of it; smaller ones are read whole by all."""
 
 
 def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bool], Document]) -> Document:
@@ -35,10 +37,49 @@ def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bo
     """
     if files := part_files(path):
         return read_part_files(files, path, ranks, strict)
-    if path.suffix.lower() == ".mdpa" and path.is_file() and path.stat().st_size >= LARGE:
+    size = ranks.gather(path.stat().st_size if path.is_file() else 0)[0]
+    if size < LARGE:
+        return shared(read(path, strict), ranks)
+    if path.suffix.lower() == ".mdpa":
         with suppress(Unusual):
             return read_mdpa_by_ranks(path, ranks, strict)
-    return shared(read(path, strict), ranks)
+    return handed_out(lambda: read(path, strict), ranks)
+
+
+def handed_out(read: Callable[[], Document], ranks: Alone) -> Document:
+    """Return what this rank holds of a document that rank 0 alone reads; all ranks call it.
+
+    Parameters
+    ----------
+    read : returns the document.
+    ranks : that share it.
+    """
+    with ranks.together():
+        whole = read() if ranks.rank == 0 else None
+        if ranks.any(whole is not None and _has_repeated_values(whole)):
+            return shared(whole or read(), ranks)  # in which order they count, only the whole knows
+        rest = ranks.first(None if whole is None else _without_mesh(whole))
+        document = rest if whole is None else replace(whole, mesh=rest.mesh, geometries=[])
+        piece = Piece() if whole is None else piece_of(whole.mesh)
+        del whole
+        return joined(ranks, document, partitioned(ranks, piece), rest.mesh.source)
+
+
+def _has_repeated_values(document: Document) -> bool:
+    given = (*document.nodal_data, *document.condition_data)
+    return any(len(without_repeats(one.ids)) < len(one.ids) for one in given)
+
+
+def _without_mesh(document: Document) -> Document:
+    """Return what all ranks have of a document: all but cells, nodes and values on them."""
+    return replace(
+        document,
+        mesh=Mesh(np.zeros((0, 3)), source=document.mesh.source),
+        nodal_data=[],
+        condition_data=[],
+        element_data=[replace(one, ids=one.ids[:0], values=one.values[:0]) for one in document.element_data],
+        geometries=[],
+    )
 
 
 def shared(document: Document, ranks: Alone) -> Document:
