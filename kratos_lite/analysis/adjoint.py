@@ -65,7 +65,7 @@ def error_of(
 
 def _concentrated(sizes: Array) -> list[str]:
     """Return a warning where few elements contribute most."""
-    if not in_few_elements(sizes):
+    if not in_few_elements(sizes, len(sizes)):
         return []
     return [
         f"few elements contribute most of the error, above all row {int(sizes.argmax())}: near the point "

@@ -7,8 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, Kind, Kinds
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
+from kratos_lite.mesh import Mesh
+from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.loads import Load
 from kratos_lite.model.locking import better_element
 from kratos_lite.model.structure import Structure
@@ -72,9 +74,7 @@ WORST = 3
 """Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
 
 
-def energy_error(
-    recovered: Array, averaged: Array, energy: float, groups: Sequence[ElementGroup]
-) -> ErrorEstimate:
+def energy_error(recovered: Array, averaged: Array, energy: float, kinds: Kinds, mesh: Mesh) -> ErrorEstimate:
     """Return the estimate of squared differences to recovered and to averaged stresses.
 
     Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
@@ -83,56 +83,66 @@ def energy_error(
 
     Parameters
     ----------
-    recovered, averaged : (m,) squared energy norms of the differences in each element, J.
+    recovered, averaged : (m,) squared energy norms of the differences in each element, J; of the elements of
+        other ranks 0.
     energy : ‖u_h‖² of the solution in J, twice its strain energy.
-    groups : the elements, whose kind and material may speak against trusting the estimate.
+    kinds : of the elements, whose class and material may speak against trusting the estimate.
+    mesh : the elements.
     """
     squares = {"recovery": recovered, "averaging": averaged}
-    method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * float(squares[name].sum()))
+    sums = {name: mesh.ranks.sum(float(values.sum())) for name, values in squares.items()}
+    method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * sums[name])
     per_element = SAFETY[method] * np.sqrt(squares[method])
-    absolute = float(np.linalg.norm(per_element))
-    size = energy + float(squares[method].sum())
+    absolute = SAFETY[method] * float(np.sqrt(sums[method]))
+    size = energy + sums[method]
     relative = absolute / size**0.5 if size > 0 else 0.0
-    warnings = _warnings(recovered, averaged, groups) if relative > NEGLIGIBLE else []
-    if len(recovered) == 1 and energy > 0 and not warnings:
+    is_coarse = sums["recovery"] > COARSE**2 * sums["averaging"]
+    warnings = _warnings(recovered, is_coarse, kinds, mesh) if relative > NEGLIGIBLE else []
+    if mesh.totals.counts["elements"] == 1 and energy > 0 and not warnings:
         warnings = ["one element has no neighbors that could show its error"]
     return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
 
 
-def _warnings(recovered: Array, averaged: Array, groups: Sequence[ElementGroup]) -> list[str]:
+def _warnings(recovered: Array, is_coarse: bool, kinds: Kinds, mesh: Mesh) -> list[str]:
     """Return what speaks against trusting an estimate."""
-    warnings, total = [], float(recovered.sum())
-    plain = sorted({group.element.__name__: group.element for group in groups if _locks(group)}.items())
+    warnings, count = [], mesh.totals.counts["elements"]
+    plain = sorted({kind.element.__name__: kind.element for kind in kinds if _locks(kind)}.items())
     locked = {name: better_element(element, "BBar") for name, element in plain}
     if locked:
         warnings.append(
             f"{', '.join(locked)} may lock near ν = ½, and the estimated error may be several times too "
             f"small; take {', '.join(sorted(set(locked.values())))}"
         )
-    if total > COARSE**2 * float(averaged.sum()):
+    if is_coarse:
         warnings.append(
             "recovered stresses are farther from those of the elements than averaged ones: the mesh is too "
             "coarse for them, and the estimated error may be several times too large"
         )
-    if len(recovered) < FEW:
-        warnings.append(f"{len(recovered)} elements are too few to estimate their error by one another")
-    elif in_few_elements(recovered):
+    if count < FEW:
+        warnings.append(f"{count} elements are too few to estimate their error by one another")
+    elif in_few_elements(recovered, count, mesh.ranks):
+        most = mesh.first_element(recovered == mesh.ranks.max(float(recovered.max(initial=0.0))))
+        element = mesh.ranks.first(None if most is None else int(mesh.element_ids[most]))
         warnings.append(
-            f"a large share of the error lies in few elements, most in row {int(recovered.argmax())}: near a "
-            "re-entrant corner, the edge of a support or a concentrated load stresses have no limit"
+            f"a large share of the error lies in few elements, most in element {element}: near a re-entrant "
+            "corner, the edge of a support or a concentrated load stresses have no limit"
         )
     return warnings
 
 
-def in_few_elements(shares: Array) -> bool:
-    """Return whether the hundredth of elements with the largest shares holds much of their sum."""
-    if len(shares) < 20 * WORST:
+def in_few_elements(shares: Array, count: int, ranks: Alone = ALONE) -> bool:
+    """Return whether the hundredth of `count` elements with the largest shares holds much of their sum."""
+    if count < 20 * WORST:
         return False
-    count = max(WORST, len(shares) // 100)
-    return float(np.partition(shares, -count)[-count:].sum()) > FOCUS * float(shares.sum())
+    few = max(WORST, count // 100)
+    largest = np.concatenate(
+        ranks.gather(shares if len(shares) <= few else np.partition(shares, -few)[-few:])
+    )
+    total = ranks.sum(float(shares.sum()))
+    return float(np.partition(largest, -few)[-few:].sum()) > FOCUS * total
 
 
-def _locks(group: ElementGroup) -> bool:
+def _locks(group: ElementGroup | Kind) -> bool:
     """Return whether a plain element has a nearly incompressible material; jumps of pressure show in 10N."""
     shape = group.element.shape
     plain = group.element.formulation == "standard" and not (shape.cell == "tetrahedron" and shape.degree > 1)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.report import Report, element_counts, vector
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.records import Tabular
@@ -45,6 +46,13 @@ class Result(ElementFields, Tabular):
     report : what was solved, how, and how well.
     u0 : (n, 3) displacements in m without stress; none if not given.
     origin : what was solved, for bounds of the error and the errors of quantities.
+    kinds : of the elements of all ranks, where these share the mesh.
+
+    Notes
+    -----
+    Where ranks share the mesh, arrays are those of the nodes and elements of each, and of those around them.
+    What one rank asks for, all ask for: values at points, recovered stresses, estimates of the error, totals
+    and the table are found together, and are those of the whole mesh.
     """
 
     def __init__(
@@ -57,8 +65,9 @@ class Result(ElementFields, Tabular):
         report: Report,
         u0: Array | None = None,
         origin: Origin | None = None,
+        kinds: Kinds | None = None,
     ) -> None:
-        super().__init__(mesh, groups, u, u0)
+        super().__init__(mesh, groups, u, u0, kinds)
         self.reactions = reactions
         self.loads = loads
         for array in (reactions, loads):
@@ -249,6 +258,7 @@ class Result(ElementFields, Tabular):
         choice(method, "method", METHODS)
         if of is None and method == "recovery":
             return self._error
+        check_whole(self.mesh, "the error of a quantity, or its bound by equilibrium,")
         if self._origin is None:
             raise InputError(
                 "the error of a quantity and the bound of an error need the model and the matrix of a static "
@@ -271,7 +281,7 @@ class Result(ElementFields, Tabular):
         from kratos_lite.analysis.error_estimate import energy_error  # as for the recovery
 
         squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
-        return energy_error(*squares, 2 * self.energy(), self.groups)
+        return energy_error(*squares, 2 * self.energy(), self.kinds, self.mesh)
 
     def _stated_error(self) -> str:
         """Return the error for the table: the one that was asked for, which its meshes have corrected."""
@@ -323,6 +333,7 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             PyVista is not installed.
         """
+        check_whole(self.mesh, "a grid of PyVista")
         from kratos_lite.analysis.fields import fields
         from kratos_lite.mesh.vtk import pyvista_grid
 
@@ -345,13 +356,37 @@ class Result(ElementFields, Tabular):
         """
         from kratos_lite.analysis.plot import plot  # a quick start for results
 
+        check_whole(self.mesh, "a picture")
         return plot(self, path, values=values, **options)
 
     # ---- out -----------------------------------------------------------------------------------
 
-    def _place(self, row: int) -> str:
-        (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
-        return f"{self.mesh.element_ids[row]} around {vector(self.mesh.points[nodes[0]].mean(axis=0))} m"
+    def largest_displacement(self) -> tuple[float, int, Array]:
+        """Return the largest displacement of a node, of those of all ranks.
+
+        Returns
+        -------
+        Its size in m, the id of the node, and the displacement (3,) in m.
+        """
+        mesh = self.mesh
+        length = np.linalg.norm(self.u, axis=1)
+        size = mesh.ranks.max(float(length.max(initial=0.0)))
+        node = mesh.first_node((length == size) & mesh.own_nodes)
+        found = None if node is None else (int(mesh.node_ids[node]), self.u[node])
+        return size, *mesh.ranks.first(found)
+
+    def largest_von_mises(self) -> tuple[float, int, Array]:
+        """Return the largest von Mises stress at a Gauss point, of those of all ranks.
+
+        Returns
+        -------
+        In Pa, the id of its element, and the center (3,) of that in m.
+        """
+        mesh, (_, mises, row), found = self.mesh, self._totals, None
+        if row >= 0:
+            (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
+            found = int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
+        return mises, *mesh.ranks.first(found)
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary.
@@ -361,20 +396,20 @@ class Result(ElementFields, Tabular):
         Labels and values.
         """
         mesh, report = self.mesh, self.report
-        length = np.linalg.norm(self.u, axis=1)
-        top = int(length.argmax())
-        energy, mises, row = self._totals
-        kinds = element_counts(mesh, self.groups, report.formulation)
-        largest = f"{length[top]:.6e} m at node {mesh.node_ids[top]}, {vector(self.u[top])} m"
-        forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
+        length, node, u = self.largest_displacement()
+        mises, element, center = self.largest_von_mises()
+        kinds = element_counts(mesh, self.kinds, report.formulation)
+        own = mesh.own_nodes
+        forces = mesh.ranks.sum(float(np.abs(self.loads[own]).sum() + np.abs(self.reactions[own]).sum()))
+        place = f"in element {element} around {vector(center)} m"
         return [
-            ("nodes", f"{mesh.n_nodes}"),
+            ("nodes", f"{mesh.totals.counts['nodes']}"),
             ("elements", ", ".join(f"{count} {name}" for name, count in kinds.items())),
             *report.load_rows(forces),
-            ("largest displacement", largest),
-            ("strain energy", f"{energy:.6e} J"),
+            ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
+            ("strain energy", f"{self.energy():.6e} J"),
             ("estimated error", self._stated_error()),
-            ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) in element {self._place(row)}"),
+            ("largest von Mises", f"{mises:.6e} Pa (at a Gauss point) {place}"),
             *report.solution_rows(),
             *[("warning", text) for text in self._error.warnings],
         ]

@@ -6,9 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
+from kratos_lite.assembly.element_groups import Kinds
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import ALONE, Alone
-from kratos_lite.model.checks import Kinds, young_moduli
+from kratos_lite.model.checks import young_moduli
 from kratos_lite.model.structure import Structure
 from kratos_lite.registry import remembered
 from kratos_lite.typing import Array, Ints

@@ -294,7 +294,7 @@ class StaticAnalysis:
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = Origin(self, case.loads, model.version)
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin)
+        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin, self.kinds)
 
     def release(self) -> None:
         """Let go of the matrix and what is made of it; another solution makes them anew."""

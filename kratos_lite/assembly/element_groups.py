@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -234,6 +234,10 @@ class Kind:
     def is_proven(self) -> bool:
         """As of a group."""
         return self.rule is self.element.rule and is_of_library(self.element)
+
+
+Kinds: TypeAlias = "Sequence[ElementGroup | Kind]"
+"""Element groups, or what all ranks have of them."""
 
 
 def kinds_over_ranks(

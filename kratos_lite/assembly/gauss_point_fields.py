@@ -102,6 +102,8 @@ def in_order(groups: Sequence[ElementGroup], parts: Sequence[Array]) -> Any:
     Where groups have different numbers of Gauss points, a list of m arrays (g, ...).
     """
     m = sum(map(len, groups))
+    if not parts:
+        return np.zeros((0, 0))
     if len(parts) == 1 and (groups[0].rows == np.arange(m)).all():
         return parts[0]
     if len({part.shape[1:] for part in parts}) > 1:

@@ -34,7 +34,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
     for group in groups:
         number = np.full(sum(map(len, located.mesh.blocks)), -1)
         number[group.rows] = np.arange(len(group))
-        at = np.flatnonzero(number[rows] >= 0)
+        at = np.flatnonzero((rows >= 0) & (number[rows] >= 0))
         if not len(at):
             continue
         mine = number[rows[at]]

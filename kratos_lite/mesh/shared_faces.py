@@ -39,7 +39,7 @@ class SharedFaces:
     @cached_property
     def element_keys(self) -> NDArray[np.uint64]:
         """(m,) a number of each element that follows from its nodes."""
-        return _joined([_keys(self.numbers[block.nodes]) for block in self.mesh.blocks], np.uint64)
+        return _joined([cell_keys(self.numbers[block.nodes]) for block in self.mesh.blocks], np.uint64)
 
     @cached_property
     def element_keepers(self) -> Ints:
@@ -82,7 +82,7 @@ class SharedFaces:
             numbers = self.numbers[block.nodes]
             for face in faces_of(block):
                 picked = numbers[:, list(corners(face))]
-                found.append(picked.min(axis=1) if what == "lowest" else _keys(picked))
+                found.append(picked.min(axis=1) if what == "lowest" else cell_keys(picked))
         return _joined(found, dtype)
 
 
@@ -99,7 +99,7 @@ def places_of(wanted: NDArray[np.uint64], keys: NDArray[np.uint64]) -> Ints:
     return found
 
 
-def _keys(numbers: Ints) -> NDArray[np.uint64]:
+def cell_keys(numbers: Ints) -> NDArray[np.uint64]:
     """Return a number of each set of node numbers (m, k)."""
     total = np.zeros(len(numbers), dtype=np.uint64)
     for column in numbers.T:

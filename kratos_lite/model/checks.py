@@ -6,11 +6,10 @@ Each check either raises one clear error or returns warnings for the report.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeAlias
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, Kind, element_class
+from kratos_lite.assembly.element_groups import Kinds, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
@@ -23,8 +22,6 @@ from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
 from kratos_lite.typing import Array, Ints, Mask
 
-Kinds: TypeAlias = "Sequence[ElementGroup | Kind]"
-"""Element groups, or what all ranks have of them."""
 SLOWEST, QUICKEST = 1.0, 2.5e4
 """Speeds of waves in m/s: jelly is above the one, diamond and graphene below the other."""
 SOFTEST, STIFFEST = 1.0, 1.2e14

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import ELEMENTS
@@ -15,7 +15,6 @@ from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
-from kratos_lite.model.checks import Kinds
 from kratos_lite.model.spurious_modes import has_chains
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered

@@ -13,12 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_of_library
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.mesh import Faces, Mesh
-from kratos_lite.model.checks import Kinds
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.model.supports import Supports
 from kratos_lite.model.walls import STIFF, Walls, shear_over_young, walls_of

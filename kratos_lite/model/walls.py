@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.mesh import NO_ROWS, Mesh, with_rows
 from kratos_lite.mesh.shared_faces import SharedFaces, places_of
-from kratos_lite.model.checks import Kinds
 from kratos_lite.model.connected_bodies import bodies_of_elements, extents
 from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
 from kratos_lite.records import names_of, record

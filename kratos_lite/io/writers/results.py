@@ -59,23 +59,22 @@ def write_result(path: str | Path, result: Result, mode: str | None = None) -> N
 def summary(result: Result) -> dict[str, Any]:
     """Return the numbers of the table, for programs."""
     report, mesh = result.report, result.mesh
-    length = np.linalg.norm(result.u, axis=1)
-    top = int(length.argmax())
-    energy, mises, row = result.totals()
+    length, node, _ = result.largest_displacement()
+    mises, element, _ = result.largest_von_mises()
     error = result.error()
     asked = {}
     if report.error is not None:
         history = [vars(step) for step in report.history]
         asked = {"requested_error": {"relative": report.error, "of": report.error_of, "history": history}}
     return {
-        "nodes": mesh.n_nodes,
-        "elements": element_counts(mesh, result.groups, report.formulation),
+        "nodes": mesh.totals.counts["nodes"],
+        "elements": element_counts(mesh, result.kinds, report.formulation),
         **({"formulation": report.formulation} if report.formulation else {}),
         "unknowns": report.unknowns,
         "total_load": report.total_load.tolist(),
         "total_reaction": report.total_reaction.tolist(),
-        "largest_displacement": {"value": float(length[top]), "node": int(mesh.node_ids[top])},
-        "strain_energy": energy,
+        "largest_displacement": {"value": length, "node": node},
+        "strain_energy": result.energy(),
         "estimated_error": {
             "relative": error.relative,
             "absolute": error.absolute,
@@ -83,7 +82,7 @@ def summary(result: Result) -> dict[str, Any]:
             "warnings": error.warnings,
         },
         **asked,
-        "largest_von_mises_stress": {"value": mises, "element": int(mesh.element_ids[row])},
+        "largest_von_mises_stress": {"value": mises, "element": element},
         "solver": report.solver,
         "reason": report.reason,
         "iterations": report.iterations,
