@@ -45,6 +45,8 @@ class ElementFields:
     ) -> None:
         self.mesh = mesh
         self.groups = list(groups)
+        if kinds is None and mesh.subdomain is not None:
+            raise InputError("fields of a mesh that ranks share need kinds=model.kinds(groups)")
         self.kinds = self.groups if kinds is None else kinds
         self.u = u
         u.setflags(write=False)  # strains and stresses are made of it later

@@ -41,9 +41,11 @@ def shared(ranks, result, parts):
     """The displacements and reactions of a result on what each rank holds of its mesh; ghosts are wrong."""
     mesh = scattered(result.mesh, ranks, parts)
     rows = result.mesh.node_rows(mesh.node_ids)
-    groups = kl.Model(mesh, LAW).element_groups()
+    model = kl.Model(mesh, LAW)
+    groups = model.element_groups()
     reactions = np.where(mesh.own_nodes[:, None], result.reactions[rows], 1e30)
-    return Result(mesh, groups, result.u[rows], reactions, result.loads[rows], result.report)
+    given = result.u[rows], reactions, result.loads[rows], result.report
+    return Result(mesh, groups, *given, kinds=model.kinds(groups))
 
 
 @contextmanager
@@ -165,7 +167,7 @@ def test_an_error_on_one_rank_leaves_what_was_there(ranks):
     good = shared(ranks, serial, np.arange(serial.mesh.n_elements) % ranks.size)
     u = good.u.copy()
     u[good.mesh.own_nodes & (ranks.rank == ranks.size - 1)] = np.nan
-    bad = Result(good.mesh, good.groups, u, good.reactions, good.loads, good.report)
+    bad = Result(good.mesh, good.groups, u, good.reactions, good.loads, good.report, kinds=good.kinds)
     with folder_of(ranks) as folder:
         path = folder / "beam.pvtu"
         kl.write(path, good)
