@@ -44,8 +44,8 @@ def shared(ranks, result, parts):
     model = kl.Model(mesh, LAW)
     groups = model.element_groups()
     reactions = np.where(mesh.own_nodes[:, None], result.reactions[rows], 1e30)
-    given = result.u[rows], reactions, result.loads[rows], result.report
-    return Result(mesh, groups, *given, kinds=model.kinds(groups))
+    kinds = model.kinds(groups)
+    return Result(mesh, groups, result.u[rows], reactions, result.loads[rows], result.report, kinds=kinds)
 
 
 @contextmanager
@@ -81,8 +81,23 @@ def by_node(pieces, name):
     return found, off
 
 
-def test_pieces_are_the_whole(ranks, cut, mode):
-    serial = whole_result()
+def by_element(pieces, name):
+    """Return the value of each element by its id."""
+    return {
+        element: value
+        for piece in pieces
+        for ids, values in zip(piece.cell_data["ELEMENT_ID"], piece.cell_data[name], strict=True)
+        for element, value in zip(ids.tolist(), values, strict=True)
+    }
+
+
+def assert_same(found, expected):
+    assert np.abs(np.array(found) - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+def test_pieces_are_the_whole(ranks, cut, mode, element):
+    """All fields of all nodes and elements."""
+    serial = whole_result(element)
     result = shared(ranks, serial, cut(serial.mesh, ranks.size))
     with folder_of(ranks) as folder:
         path = folder / "beam.pvtu"
@@ -91,22 +106,19 @@ def test_pieces_are_the_whole(ranks, cut, mode):
         assert sorted(one.name for one in folder.iterdir()) == sorted(["beam.pvtu", *sources])
     points, cells = fields(serial)
     assert sum(len(block.data) for piece in pieces for block in piece.cells) == serial.mesh.n_elements
-    for name in ("DISPLACEMENT", "REACTION"):
+    for name, values in points.items():
         found, off = by_node(pieces, name)
-        values = np.array([found[node] for node in serial.mesh.node_ids.tolist()])
         assert off == 0.0
-        assert np.array_equal(values, points[name])
+        assert_same([found[node] for node in serial.mesh.node_ids.tolist()], values)
     owners, off = by_node(pieces, "PARTITION_INDEX") if ranks.size > 1 else ({}, 0.0)
     assert off == 0.0
     assert set(owners.values()) <= set(range(ranks.size))
-    stresses = {}
+    for name, values in cells.items():
+        found = by_element(pieces, name)
+        assert_same([found[one] for one in serial.mesh.element_ids.tolist()], values)
     for piece in pieces:
-        (ids,), (found,) = piece.cell_data["ELEMENT_ID"], piece.cell_data["CAUCHY_STRESS_VECTOR"]
-        stresses |= dict(zip(ids.tolist(), found, strict=True))
-        for corner, place in zip(piece.points, piece.point_data["NODE_ID"], strict=True):
-            assert np.array_equal(corner, serial.mesh.points[place - 1])
-    values = np.array([stresses[one] for one in serial.mesh.element_ids.tolist()])
-    assert np.abs(values - cells["CAUCHY_STRESS_VECTOR"]).max() <= 1e-12 * np.abs(values).max()
+        for corner, node in zip(piece.points, piece.point_data["NODE_ID"], strict=True):
+            assert np.array_equal(corner, serial.mesh.points[node - 1])
     assert described["PPointData"]["DISPLACEMENT"] == ("Float64", "3")
     assert described["PPointData"]["NODE_ID"] == ("Int64", "1")
     assert described["PCellData"]["CAUCHY_STRESS_VECTOR"] == ("Float64", "6")
@@ -114,10 +126,11 @@ def test_pieces_are_the_whole(ranks, cut, mode):
 
 
 test_pieces_are_the_whole.cases = [
-    (random, "binary"),
-    (random, "compressed"),
-    (random, "ascii"),
-    (first_rank_only, "binary"),
+    (random, "binary", "KinematicLinear3D8N"),
+    (random, "compressed", "KinematicLinear3D8N"),
+    (random, "ascii", "KinematicLinear3D8N"),
+    (first_rank_only, "binary", "KinematicLinear3D8N"),
+    (random, "binary", "KinematicLinear3D20N"),
 ]
 
 

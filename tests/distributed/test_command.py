@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 
+import numpy as np
 import pytest
 from kratos_part_files import write_part_files
 from over_ranks import PYTHON, ROOT, mpirun, needs_mpi
@@ -240,6 +241,61 @@ def rows_of(run):
     """Return the summary by its labels."""
     assert run.returncode == 0, run.stdout + run.stderr
     return {line[:22].strip(): line[22:].strip() for line in run.stdout.splitlines()}
+
+
+EQUAL = ("nodes", "elements", "unknowns", "total load", "strain energy", "estimated error")
+"""Rows of the summary that are the same on any number of ranks, in the digits shown."""
+
+
+def test_the_summary_is_that_of_one_process_and_printed_once(beam):
+    serial = rows_of(command(1, "solve", beam))
+    for ranks in (2, 3):
+        run = command(ranks, "solve", beam, "--engine", "petsc")
+        shared = rows_of(run)
+        assert said(run) == []
+        assert run.stdout.count("largest displacement") == 1
+        for name in EQUAL:
+            assert shared[name] == serial[name]
+        for name in ("largest displacement", "largest von Mises"):  # at one of several nodes alike
+            assert shared[name].split()[0] == serial[name].split()[0]
+        assert list(shared) == [name for name in serial if name != "iterations" or name in shared]
+
+
+def test_pieces_and_summary_of_ranks(beam):
+    words = ["solve", beam, "--engine", "petsc", "-o", "a.vtu", "--json", "a.json"]
+    run = command(3, *words, cwd=beam.parent)
+    assert "written               a.pvtu\nwritten               a.json\n" in run.stdout
+    assert files_of(beam.parent) == ["a.json", "a.pvtu", "a_0.vtu", "a_1.vtu", "a_2.vtu", "beam.mdpa"]
+    shared = json.loads((beam.parent / "a.json").read_text())
+    command(1, "solve", beam, "--json", "b.json", cwd=beam.parent)
+    serial = json.loads((beam.parent / "b.json").read_text())
+    assert set(serial) - set(shared) == {"displacement", "reaction"}
+    extremes = {"smallest_displacements": np.min, "largest_displacements": np.max}
+    assert set(shared) - set(serial) == {"ranks", "left_out", "reaction_of_parts", *extremes}
+    assert shared["ranks"] == 3
+    for name, extreme in extremes.items():
+        u = np.array(list(serial["displacement"].values()))
+        assert shared[name] == pytest.approx(extreme(u, axis=0), abs=1e-9 * np.abs(u).max())
+    for name in ("nodes", "elements", "unknowns"):
+        assert shared[name] == serial[name]
+    assert shared["largest_displacement"]["value"] == pytest.approx(serial["largest_displacement"]["value"])
+    assert shared["strain_energy"] == pytest.approx(serial["strain_energy"])
+    assert shared["estimated_error"]["relative"] == pytest.approx(serial["estimated_error"]["relative"])
+    of_stress = "largest_von_mises_stress"
+    assert shared[of_stress]["value"] == pytest.approx(serial[of_stress]["value"])
+
+
+def test_more_ranks_than_elements(tmp_path):
+    model = kl.Model(kl.box((2, 1, 1), (2, 1, 1)), LAW)
+    model.fix("x-")
+    model.add(kl.Traction("x+", (1e6, 0, 0)))
+    kl.write(tmp_path / "two.mdpa", model)
+    words = ["solve", "two.mdpa", "--engine", "petsc", "-o", "two.pvtu", "--json", "two.json"]
+    serial = rows_of(command(1, "solve", "two.mdpa", cwd=tmp_path))
+    shared = rows_of(command(4, *words, cwd=tmp_path))
+    for name in EQUAL[:-1]:  # the error is rounding
+        assert shared[name] == serial[name]
+    assert 1 <= len(list(tmp_path.glob("two_*.vtu"))) <= 2
 
 
 def test_one_rank_writes_as_one_process_does(beam):
