@@ -22,8 +22,8 @@ from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
-METIS_ELEMENTS = 50_000_000
-"""Elements up to which one rank cuts the graph: it takes 3 µs and 0.6 kB for each."""
+METIS_ELEMENTS = 10_000_000
+"""Elements up to which one rank cuts the graph: it takes 3 µs and 0.6 kB for each, 6 GB of all these."""
 FEW = 10
 """Elements a part below which METIS leaves some parts empty."""
 
