@@ -9,7 +9,7 @@ from scenes import SHARED
 
 from kratos_lite.cli import main
 
-collect_ignore = ["interop/kratos_driver.py"]
+collect_ignore = ["interop/kratos_driver.py", "interop/kratos_parts_driver.py"]
 """Scripts that tests run in other processes."""
 
 

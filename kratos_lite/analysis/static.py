@@ -244,9 +244,10 @@ class StaticAnalysis:
             solved = moving if self.system is None else moving | self._solved
             parts = solved[self.part] & self._used
             every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
-            self.release()
             how = self.solver, self.tolerance, self.progress, self.engine, self.petsc
-            self.system = system_of(model, groups, *how)
+            system = system_of(model, groups, *how)  # which may be refused; the one before stays then
+            self.release()
+            self.system = system
             self._prescribed = None
             own = model.mesh.own_elements
             still = (sum(int(own[group.rows].sum()) for group in some) for some in (every, groups))

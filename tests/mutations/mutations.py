@@ -45,9 +45,7 @@ MUTATIONS = [
         "tests/elements/test_formulations.py",
     ),
     Mutation("model/locking.py", "* ratio**2", "* ratio", "tests/model/test_locking.py"),
-    Mutation(
-        "model/locking.py", "tapered = walls.taper * ratio", "tapered = ratio", "tests/model/test_locking.py"
-    ),
+    Mutation("model/locking.py", "walls.taper * ratio", "ratio", "tests/model/test_locking.py"),
     Mutation(
         "model/spurious_modes.py",
         "joined.sum(axis=1) >= 2",
@@ -186,8 +184,8 @@ MUTATIONS = [
     ),
     Mutation(
         "model/checks.py",
-        "force = float(np.abs(total.sum(axis=0)).max() / size)",
-        "force = 0 * float(np.abs(total.sum(axis=0)).max() / size)",
+        "force = float(np.abs(ranks.sum(total.sum(axis=0))).max() / size)",
+        "force = 0 * float(np.abs(ranks.sum(total.sum(axis=0))).max() / size)",
         SIGNS,
     ),
     # ---- transients
