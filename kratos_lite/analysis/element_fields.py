@@ -98,7 +98,7 @@ class ElementFields:
 
     @cached_property
     def _recovery(self) -> Recovery:
-        if self.mesh.subdomain is not None:
+        if self.mesh.ranks.size > 1:
             from kratos_lite.distributed.recovery import SharedRecovery  # as for the recovery
 
             return SharedRecovery(self.mesh, self.groups, self.kinds)

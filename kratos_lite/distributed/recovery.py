@@ -45,7 +45,7 @@ class SharedRecovery(Recovery):
 
     def by_region(self, u: Array, *, stress: bool = True) -> Iterator[tuple[Region, Array]]:
         """Yield each region of the grown subdomain with the values at its nodes (k, 6)."""
-        if len(u) != len(self.points):
+        if self._displacements is None or u is not self._displacements[1]:
             raise ModelError(
                 "recovered stresses of one material, or at points, need the whole mesh on one process; take "
                 "those at nodes, or of elements"

@@ -21,7 +21,8 @@ def check_coincident(mesh: Mesh, used: Mask, constraints: Sequence[MultiPointCon
     rows = np.flatnonzero(used & mesh.own_nodes)
     ranks, X, ids = mesh.ranks, mesh.points[rows], mesh.node_ids[rows]
     count = ranks.sum(len(rows))
-    low, high = ranks.min(X.min(axis=0, initial=np.inf)), ranks.max(X.max(axis=0, initial=-np.inf))
+    low = ranks.min(np.array([x.min(initial=np.inf) for x in X.T]))  # by columns, which is faster
+    high = ranks.max(np.array([x.max(initial=-np.inf) for x in X.T]))
     if count < 2:
         return []
     tolerance = 1e-8 * float((high - low).max()) / count ** (1 / 3)
@@ -46,14 +47,14 @@ def _pairs(X: Array, ids: Ints, mine: Mask, tolerance: float) -> list[tuple[int,
     """Return places between and ids of nodes at the same place, the first of them of those that are mine."""
     along = X @ NORMAL
     order = np.argsort(along, kind="stable")
-    X, along, ids, mine = X[order], along[order], ids[order], mine[order]
+    X, along = X[order], along[order]
     pairs: list[tuple[int, int, int]] = []
     for step in range(1, min(len(X), MOST)):
         close = np.flatnonzero(along[step:] - along[:-step] <= 2 * tolerance)
         if not len(close):
             break
-        near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1) & mine[close]]
-        pairs += [(step, int(ids[i]), int(ids[i + step])) for i in near]
+        near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1) & mine[order[close]]]
+        pairs += [(step, int(ids[order[i]]), int(ids[order[i + step]])) for i in near]
     return pairs
 
 

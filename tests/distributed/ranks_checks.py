@@ -5,7 +5,7 @@ import pytest
 
 import kratos_lite as kl
 from kratos_lite.analysis.static import StaticAnalysis
-from kratos_lite.distributed.subdomains import scattered
+from kratos_lite.distributed.scatter import scattered
 from kratos_lite.errors import KratosLiteError, MeshError, ModelError
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
@@ -230,6 +230,51 @@ def half_held(mesh):
     return model
 
 
+def tied(count):
+    """Build two boxes of which the first is held, and some nodes of the second follow those of the first."""
+
+    def build(mesh):
+        model = part_held(mesh)
+        for one, other in TIES[:count]:
+            rows = mesh.node_rows([one, other])
+            if (rows >= 0).all():
+                for axis in "xyz":
+                    model.constrain((int(rows[1]), axis), {(int(rows[0]), axis): 1.0})
+        return model
+
+    return build
+
+
+TIES = [(28, 37), (36, 45), (30, 39), (34, 43), (29, 38)]
+"""Ids of nodes at the same place in two boxes."""
+
+
+def orders():
+    """Bricks of 20 nodes between those of 8, which have the same corners alone."""
+    mesh = cube((4, 2, 2), "KinematicLinear3D20N")
+    nodes = mesh.blocks[0].nodes
+    linear = np.zeros(len(nodes), dtype=bool)
+    linear[::3] = True
+    cells = {"KinematicLinear3D20N": nodes[~linear], "KinematicLinear3D8N": nodes[linear][:, :8]}
+    return kl.Mesh(mesh.points, cells)
+
+
+def halved():
+    """Bricks beside tetrahedra without pyramids between, on nodes of a grid."""
+    one = cube((4, 2, 2), "KinematicLinear3D8N")
+    left = one.points[one.blocks[0].nodes].mean(axis=1)[:, 0] < 2
+    other = cube((4, 2, 2), "KinematicLinear3D4N")
+    right = other.points[other.blocks[0].nodes].mean(axis=1)[:, 0] > 2
+    bricks, tetrahedra = one.blocks[0].nodes[left], other.blocks[0].nodes[right]
+    return kl.Mesh(one.points, {"KinematicLinear3D8N": bricks, "KinematicLinear3D4N": tetrahedra})
+
+
+def own_rule(mesh):
+    model = held(mesh)
+    model.use_rule(1)
+    return model
+
+
 MODELS = {
     "sound": (held, cube),
     "free": (free, cube),
@@ -265,6 +310,12 @@ MODELS = {
     "reduced_chain": (held, lambda: kl.box((4.0, 1.0, 1.0), (4, 1, 1), "Reduced3D20N")),
     "reduced_block": (held, lambda: kl.box((4.0, 2.0, 2.0), (4, 2, 2), "Reduced3D20N")),
     "doubled": (held, lambda: doubled(cube())),
+    "tied_by_3": (tied(3), two_boxes),
+    "tied_by_2": (tied(2), two_boxes),
+    "tied_by_1": (tied(1), two_boxes),
+    "orders": (held, orders),
+    "halved": (held, halved),
+    "own_rule": (own_rule, cube),
     "far_off": (held, lambda: cube().replace(points=cube().points + 1e9)),
 }
 
@@ -282,7 +333,8 @@ def said(build, mesh):
 def test_text(ranks, name, cut):
     build, make = MODELS[name]
     whole = make()
-    mesh = scattered(whole, ranks, cut(whole, ranks.size))
+    together = [whole.node_rows(list(pair)) for pair in TIES] if name.startswith("tied") else []
+    mesh = scattered(whole, ranks, cut(whole, ranks.size), together=together)
     assert said(build, mesh) == said(build, whole)
 
 

@@ -7,7 +7,7 @@ import pytest
 from ranks_checks import CUTS, cube, held, random_parts
 
 import kratos_lite as kl
-from kratos_lite.distributed.subdomains import scattered
+from kratos_lite.distributed.scatter import scattered
 from kratos_lite.errors import ModelError
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7800.0)
