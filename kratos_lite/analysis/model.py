@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.analysis.engines import check_own
+from kratos_lite.analysis.engines import check_own, check_whole
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
@@ -292,6 +292,7 @@ class Model(Structure):
         """
         from kratos_lite.analysis.plot import plot  # a quick start without it
 
+        check_whole(self.mesh, "a picture")
         return plot(self, path, **options)
 
     # ---- the equations themselves --------------------------------------------------------------

@@ -152,10 +152,13 @@ def test_changes_are_followed(ranks):
 def test_what_needs_the_whole_mesh_is_refused(ranks):
     whole = cube()
     mesh = scattered(whole, ranks, random_parts(whole, ranks.size))
-    result = bent(mesh).solve()
+    model = bent(mesh)
+    result = model.solve()
     if ranks.size == 1:
         return
     for ask in (
+        model.plot,
+        lambda: kl.RigidBody(mesh=mesh, material=STEEL),
         result.plot,
         lambda: result.error(method="equilibrated"),
         lambda: result.error(of=kl.MeanDisplacement("x+", "z")),
