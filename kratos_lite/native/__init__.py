@@ -45,11 +45,14 @@ def kernels(name: str) -> Any:
         return None
     _chosen("KRATOS_LITE_ISA", "base", "avx2", "avx512")
     try:
+        if name != "threads":
+            kernels("threads")  # the pool of all of them
         module = import_module(f"kratos_lite.native._{name}")
     except ImportError as error:
         _warn_once(str(error))
         return None
-    module.set_threads(threads())
+    if name == "threads":
+        module.set_threads(threads())
     return module
 
 

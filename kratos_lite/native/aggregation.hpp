@@ -14,22 +14,9 @@
 
 namespace kl {
 
-using Ints = std::vector<int32_t>;
 using Bytes = std::vector<uint8_t>;
 using Doubles = std::vector<double>;
 constexpr int MODES = 6;  // near-nullspace vectors, and unknowns of a coarse node
-
-// The members of some groups in ascending order, row by row; -1 is no group.
-inline void members_of(const Ints& group, int64_t groups, Ints& starts, Ints& members) {
-    starts.assign(groups + 1, 0);
-    for (int32_t c : group)
-        if (c >= 0) ++starts[c + 1];
-    std::partial_sum(starts.begin(), starts.end(), starts.begin());
-    members.resize(starts[groups]);
-    Ints next(starts.begin(), starts.end() - 1);
-    for (size_t i = 0; i < group.size(); ++i)
-        if (group[i] >= 0) members[next[group[i]]++] = static_cast<int32_t>(i);
-}
 
 // Squared Frobenius norms of blocks.
 inline double squared_norm(const double* block, int size) {
@@ -51,11 +38,13 @@ inline Bytes strong_links(const Graph& g, const double* A, int size, double thet
     if (theta == 0) return {};
     const Doubles own = diagonal_norms(g, A, size);
     Bytes strong(g.indptr[g.rows]);
-    for (int64_t i = 0; i < g.rows; ++i)
-        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
-            const double norm = std::sqrt(squared_norm(A + int64_t{k} * size, size));
-            strong[k] = g.indices[k] == i || norm >= theta * std::sqrt(own[i] * own[g.indices[k]]);
-        }
+    parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
+        for (int64_t i = first; i < last; ++i)
+            for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
+                const double norm = std::sqrt(squared_norm(A + int64_t{k} * size, size));
+                strong[k] = g.indices[k] == i || norm >= theta * std::sqrt(own[i] * own[g.indices[k]]);
+            }
+    });
     return strong;
 }
 
@@ -68,6 +57,7 @@ inline int32_t aggregate(const Graph& g, const Bytes& excluded, const Bytes& str
     const auto linked = [&](int32_t k) { return !excluded[g.indices[k]] && (strong.empty() || strong[k]); };
     const auto is_free = [&](int64_t i) { return !excluded[i] && of[i] < 0; };
     for (int64_t i = 0; i < g.rows; ++i) {  // nodes whose neighbors are all free make an aggregate
+        if (i % MANY == 0) look();
         bool untouched = is_free(i);
         for (int32_t k = g.indptr[i]; untouched && k < g.indptr[i + 1]; ++k)
             untouched = !linked(k) || of[g.indices[k]] < 0;
@@ -145,14 +135,7 @@ Doubles tentative_prolongator(const Ints& of, int32_t count, Doubles& B, int set
 // A prolongator of b x 6 blocks, in single precision: its rounding changes energies by its square only.
 struct Prolongator {
     Ints indptr, indices;
-    std::vector<float> data;
-
-    // Rows with numbers of blocks in indptr[1:].
-    void allocate(int size) {
-        std::partial_sum(indptr.begin(), indptr.end(), indptr.begin());
-        indices.resize(indptr.back());
-        data.resize(static_cast<size_t>(indptr.back()) * size + 8);  // vectors read beyond the end
-    }
+    std::vector<float> data;  // and eight numbers more, as vectors read beyond the end
 };
 
 // What the smoothing of a prolongator needs: the matrix, the aggregates and the tentative prolongator.
@@ -164,6 +147,15 @@ struct Smoothing {
     const Doubles& T;
     int sets;  // coarse nodes of each aggregate
     double omega;
+
+    int64_t coarse_nodes() const { return g.rows * sets; }  // at most
+
+    // Add the coarse nodes of the aggregates that node i is linked to: the columns of its row of P.
+    template <class Add>
+    void add_columns(int64_t i, const Add& add) const {
+        for (int32_t k = g.indptr[i]; of[i] >= 0 && k < g.indptr[i + 1]; ++k)
+            for (int32_t e = 0, a = of[g.indices[k]]; a >= 0 && e < sets; ++e) add(a * sets + e);
+    }
 
     // P = T - omega smoothed of one block in row i and a column, a coarse node.
     template <int b>
@@ -206,32 +198,11 @@ template <int b>
 Prolongator smoothed_prolongator(const Smoothing& s, const double* Dinv) {
     const Graph& g = s.g;
     Prolongator P;
-    P.indptr.assign(g.rows + 1, 0);
-    const auto columns_of = [&](int64_t i, Ints& found) {
-        found.clear();
-        if (s.of[i] < 0) return;
-        const auto add = [&](int32_t aggregate) {
-            for (int e = 0; e < s.sets && aggregate >= 0; ++e) found.push_back(aggregate * s.sets + e);
-        };
-        add(s.of[i]);
-        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) add(s.of[g.indices[k]]);
-        std::sort(found.begin(), found.end());
-        found.erase(std::unique(found.begin(), found.end()), found.end());
-    };
+    UnionRows(g.rows, s.coarse_nodes(), [&](int64_t i, const auto& add) {
+        s.add_columns(i, add);
+    }).copy_to(P.indptr, P.indices);
+    P.data.resize(P.indices.size() * b * MODES + 8);  // vectors read beyond the end
     parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        Ints found;
-        for (int64_t i = first; i < last; ++i) {
-            columns_of(i, found);
-            P.indptr[i + 1] = static_cast<int32_t>(found.size());
-        }
-    });
-    P.allocate(b * MODES);
-    parallel_ranges(g.rows, ROW_GRAIN, [&](int64_t first, int64_t last) {
-        Ints found;
-        for (int64_t i = first; i < last; ++i) {
-            columns_of(i, found);
-            std::copy(found.begin(), found.end(), P.indices.begin() + P.indptr[i]);
-        }
         dispatch<double>([&](auto) KL_INLINE_LAMBDA { smooth_rows<b>(s, Dinv, P, first, last); });
     });
     return P;

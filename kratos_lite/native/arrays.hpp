@@ -72,7 +72,7 @@ public:
         if (!PyObject_TypeCheck(given, NumPy::get().ndarray)) return false;
         const Fields* fields = reinterpret_cast<const Fields*>(given);
         PyObject* mine = NumPy::dtype<T>;
-        return fields->flags & CONTIGUOUS &&
+        return (fields->flags & RIGHT) == RIGHT &&
                (fields->dtype == mine || PyObject_RichCompareBool(fields->dtype, mine, Py_EQ) == 1);
     }
 
@@ -106,7 +106,7 @@ private:
         PyObject *base, *dtype;
         int flags;
     };
-    enum Flag { CONTIGUOUS = 0x1, WRITEABLE = 0x400 };
+    enum Flag { CONTIGUOUS = 0x1, ALIGNED = 0x100, RIGHT = CONTIGUOUS | ALIGNED, WRITEABLE = 0x400 };
     Fields* fields() const { return reinterpret_cast<Fields*>(array.get()); }
 
     static Object made(const int64_t* shape, size_t axes) {
@@ -122,7 +122,7 @@ private:
 template <class T>
 struct Given<Array<T>> {
     static Array<T> of(PyObject* given) {
-        if (!Array<T>::is(given)) throw Mismatch{std::string("a C-contiguous array of ") + DTYPE<T>};
+        if (!Array<T>::is(given)) throw Mismatch{std::string("a C-contiguous, aligned array of ") + DTYPE<T>};
         return Array<T>(Object::borrowed(given));
     }
 };
@@ -167,7 +167,13 @@ inline void handle_signals() {
     if (PyErr_Occurred() || PyErr_CheckSignals()) throw PythonError{};
 }
 
-inline void set_threads(int n) { wanted_threads() = n < 1 ? 1 : n; }
+constexpr const char* POOL = "kratos_lite.native._threads.pool";
+
+// The pool of the module _threads.
+inline Threads* pool() {
+    const Object module = Object::of(PyImport_ImportModule("kratos_lite.native._threads"));
+    return static_cast<Threads*>(PyCapsule_GetPointer(module.attribute("pool").get(), POOL));
+}
 
 // A module with what every one of them offers, and with what `fill` adds; null with Python's error set.
 inline PyObject* made_module(PyModuleDef& definition, void (*fill)(const Object&)) {
@@ -175,7 +181,7 @@ inline PyObject* made_module(PyModuleDef& definition, void (*fill)(const Object&
         NumPy::import();
         Object m = Object::of(PyModule_Create(&definition));
         interruption() = &handle_signals;
-        define<&set_threads>(m, "set_threads", "threads that kernels use", {"n"});
+        if (!threads()) threads() = pool();
         define<&isa_name>(m, "isa", "the instruction set that kernels use", {});
         fill(m);
         return m.release();

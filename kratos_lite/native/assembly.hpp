@@ -8,6 +8,9 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <new>
 #include <stdexcept>
 #include <vector>
 
@@ -69,8 +72,8 @@ class AssemblyMap {
 public:
     AssemblyMap(const Graph& graph, const Connectivity& mesh, const Subdomains& subdomains, int64_t subdomain,
                 int64_t most)
-        : graph(graph), mesh(mesh), subdomains(subdomains), subdomain(subdomain), first(graph.rows, -1),
-          column(graph.rows), next(most * mesh.k), position(most * mesh.k * mesh.k) {}
+        : graph(graph), mesh(mesh), subdomains(subdomains), subdomain(subdomain), first(zeros(graph.rows)),
+          column(zeros(graph.rows)), next(most * mesh.k), position(most * mesh.k * mesh.k) {}
 
     // position[(e k + a) k + b] for `count` elements; -1 in rows of others and in elements beyond the last.
     const int32_t* find(const int64_t* elements, int64_t count) {
@@ -88,34 +91,43 @@ private:
             std::fill_n(position.begin() + static_cast<int64_t>(at) * mesh.k, mesh.k, -1);
             return;
         }
-        if (first[node] < 0) touched.push_back(node);
-        next[at] = first[node];
-        first[node] = at;
+        if (!first[node]) touched.push_back(node);
+        next[at] = first[node] - 1;
+        first[node] = at + 1;
     }
 
     void fill(int32_t node, const int64_t* elements) {
         const int32_t begin = graph.indptr[node], end = graph.indptr[node + 1];
         if (!in_range(graph.indices + begin, end - begin, graph.rows))
             throw std::invalid_argument("the sparsity pattern has a column that is not there");
-        for (int32_t p = begin; p < end; ++p) column[graph.indices[p]] = p;
+        for (int32_t p = begin; p < end; ++p) column[graph.indices[p]] = p + 1;
         bool missing = false;
-        for (int32_t at = first[node]; at >= 0; at = next[at]) {
+        for (int32_t at = first[node] - 1; at >= 0; at = next[at]) {
             const int32_t* nodes = mesh.nodes + elements[at / mesh.k] * mesh.k;
             int32_t* out = position.data() + static_cast<int64_t>(at) * mesh.k;
             for (int b = 0; b < mesh.k; ++b) {
-                out[b] = column[nodes[b]];
+                out[b] = column[nodes[b]] - 1;
                 missing |= out[b] < begin || out[b] >= end;
             }
         }
-        first[node] = -1;
+        first[node] = 0;
         if (missing) throw std::invalid_argument("the sparsity pattern misses nodes that share an element");
+    }
+
+    // For all nodes, of which a subdomain touches few: the system clears a page when it is used.
+    using Numbers = std::unique_ptr<int32_t[], decltype(&std::free)>;
+    static Numbers zeros(int64_t n) {
+        Numbers made(static_cast<int32_t*>(std::calloc(n, sizeof(int32_t))), &std::free);
+        if (!made && n) throw std::bad_alloc();
+        return made;
     }
 
     Graph graph;
     Connectivity mesh;
     const Subdomains& subdomains;
     int64_t subdomain;
-    std::vector<int32_t> first, column, next, touched, position;
+    Numbers first, column;  // of each node, from 1 on
+    std::vector<int32_t> next, touched, position;
 };
 
 constexpr int64_t BLOCK_PAIRS = 4096;  // node pairs whose positions are looked up together
@@ -142,7 +154,7 @@ void for_chunks(const Connectivity& mesh, const Graph& graph, int V, int64_t wor
         const auto& chunks = subdomains.chunks(subdomain);
         const int64_t total = static_cast<int64_t>(chunks.size());
         for (int64_t from = 0; from < total; from += block) {
-            watch().look();
+            look();
             const int64_t count = std::min(block, total - from);
             for (int64_t i = 0; i < count * V; ++i)
                 elements[i] = static_cast<int64_t>(chunks[from + i / V]) * V + i % V;

@@ -29,13 +29,10 @@ int32_t aggregate_clusters(const Graph& g, const double* A, const Clusters& clus
             if (counts(i, k)) others.push_back(clusters.of[g.indices[k]]);
         ends.push_back(static_cast<int32_t>(others.size()));
     }
-    union_pattern(
-        clusters.count(), clusters.count(),
-        [&](int64_t c, const auto& add) {
-            for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p)
-                add(others.data() + ends[clusters.members[p]], others.data() + ends[clusters.members[p] + 1]);
-        },
-        indptr, indices);
+    UnionRows(clusters.count(), clusters.count(), [&](int64_t c, const auto& add) {
+        for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p)
+            std::for_each(&others[ends[clusters.members[p]]], &others[ends[clusters.members[p] + 1]], add);
+    }).copy_to(indptr, indices);
     Bytes held(clusters.count(), 1);
     for (int64_t i = 0; i < g.rows; ++i) held[clusters.of[i]] &= excluded[i];
     Ints joined;
@@ -63,37 +60,23 @@ KL_INLINE void cluster_product(const Smoothing& s, const int32_t* members, int64
     }
 }
 
-// Coarse nodes of the aggregates that the nodes of each cluster are linked to: the columns of their rows of P.
-inline void cluster_columns(const Smoothing& s, const Clusters& clusters, Ints& starts, Ints& columns) {
-    const Graph& g = s.g;
-    union_pattern(
-        clusters.count(), g.rows * s.sets,
-        [&](int64_t c, const auto& add) {
-            for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) {
-                const int32_t i = clusters.members[p];
-                for (int32_t k = g.indptr[i]; s.of[i] >= 0 && k < g.indptr[i + 1]; ++k)
-                    for (int32_t e = 0, a = s.of[g.indices[k]]; a >= 0 && e < s.sets; ++e) {
-                        const int32_t column = a * s.sets + e;
-                        add(&column, &column + 1);
-                    }
-            }
-        },
-        starts, columns);
-}
-
 // P = T - omega D^-1 A T with the clusters' D; each node has the columns of its whole cluster.
 template <int b>
 Prolongator smoothed_prolongator(const Smoothing& s, const Clusters& clusters) {
     constexpr int size = b * MODES;
     Ints starts, columns;
-    cluster_columns(s, clusters, starts, columns);
+    UnionRows(clusters.count(), s.coarse_nodes(), [&](int64_t c, const auto& add) {
+        for (int32_t p = clusters.starts[c]; p < clusters.starts[c + 1]; ++p) s.add_columns(clusters.members[p], add);
+    }).copy_to(starts, columns);
     Prolongator P;
     P.indptr.assign(s.g.rows + 1, 0);
     for (int64_t i = 0; i < s.g.rows; ++i) {
         const int32_t c = clusters.of[i];
         P.indptr[i + 1] = s.of[i] < 0 ? 0 : starts[c + 1] - starts[c];
     }
-    P.allocate(size);
+    std::partial_sum(P.indptr.begin(), P.indptr.end(), P.indptr.begin());
+    P.indices.resize(P.indptr.back());
+    P.data.resize(P.indices.size() * size + 8);
     clusters.over(256, [&](int64_t first, int64_t last) {
         Doubles X;
         for (int64_t c = first; c < last; ++c) {

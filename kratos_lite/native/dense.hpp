@@ -85,39 +85,4 @@ inline void invert(const double* matrix, double* inverse) {
         for (int j = 0; j < n; ++j) inverse[i * n + j] = dead[i] || dead[j] ? 0 : a[i][n + j];
 }
 
-// L L^T of a full symmetric matrix; a direction without stiffness is left at zero.
-class Cholesky {
-public:
-    Cholesky() = default;
-    Cholesky(std::vector<double> matrix, int64_t n) : L(std::move(matrix)), n(n) {
-        double scale = 0;
-        for (int64_t i = 0; i < n; ++i) scale = std::fmax(scale, L[i * n + i]);
-        for (int64_t i = 0; i < n; ++i) {
-            for (int64_t j = 0; j <= i; ++j) {
-                double sum = L[i * n + j];
-                for (int64_t k = 0; k < j; ++k) sum -= L[i * n + k] * L[j * n + k];
-                if (j < i)
-                    L[i * n + j] = L[j * n + j] > 0 ? sum / L[j * n + j] : 0;
-                else
-                    L[i * n + i] = sum > 1e-13 * scale ? std::sqrt(sum) : 0;
-            }
-        }
-    }
-
-    void solve(double* x) const {
-        for (int64_t i = 0; i < n; ++i) {
-            for (int64_t k = 0; k < i; ++k) x[i] -= L[i * n + k] * x[k];
-            x[i] = L[i * n + i] > 0 ? x[i] / L[i * n + i] : 0;
-        }
-        for (int64_t i = n; i-- > 0;) {
-            x[i] = L[i * n + i] > 0 ? x[i] / L[i * n + i] : 0;
-            for (int64_t k = 0; k < i; ++k) x[k] -= L[i * n + k] * x[i];
-        }
-    }
-
-private:
-    std::vector<double> L;
-    int64_t n = 0;
-};
-
 }  // namespace kl

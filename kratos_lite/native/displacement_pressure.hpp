@@ -78,7 +78,9 @@ struct PressureOperator : Graph {
         const double end = share * rr;
         for (int k = 0; k < most && rr > end; ++k) {
             R == 4 ? multiply<4>() : multiply<1>();
-            const float alpha = static_cast<float>(rr / dot(p.data(), Sp.data(), n));
+            const double curvature = dot(p.data(), Sp.data(), n);
+            if (!(curvature > 0)) break;
+            const float alpha = static_cast<float>(rr / curvature);
             for_each(n, [&](int64_t i) {
                 x[i] += alpha * p[i];
                 r[i] -= alpha * Sp[i];
@@ -122,19 +124,10 @@ private:
 
 // w -= h v; returns the product of what is left with `next`, or with itself.
 inline double subtract(double* w, double h, const double* v, const double* next, int64_t n) {
-    constexpr int64_t PART = 8192;
-    Doubles parts((n + PART - 1) / PART);
-    parallel_ranges(n, PART, [&](int64_t first, int64_t last) {
-        double sum = 0;
-        for (int64_t i = first; i < last; ++i) {
-            w[i] -= h * v[i];
-            sum += w[i] * (next ? next[i] : w[i]);
-        }
-        parts[first / PART] = sum;
-    });
-    double sum = 0;
-    for (double part : parts) sum += part;
-    return sum;
+    return sums<1>(n, [&](int64_t i, auto& sum) {
+        w[i] -= h * v[i];
+        sum[0] += w[i] * (next ? next[i] : w[i]);
+    })[0];
 }
 
 // Directions Z and their products with the matrix, of which the residual is made as small as can be.

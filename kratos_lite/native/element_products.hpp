@@ -227,7 +227,7 @@ KL_INLINE void geometry_at(const ProductGroup& s, int64_t e, const vec<float, V>
     for (int c = 0; c < 10; ++c) G[c] = *reinterpret_cast<const vec<float, V>*>(kept + c * V);
 }
 
-// Element vectors (m, k, 4) of elements [first, last).
+// Element vectors (last - first, k, 4).
 template <class T, int V>
 KL_INLINE void element_forces(const ProductGroup& s, const T* x, T* out, int64_t first, int64_t last, vec<T, V>* space) {
     typedef vec<T, V> Vec;
@@ -250,7 +250,7 @@ KL_INLINE void element_forces(const ProductGroup& s, const T* x, T* out, int64_t
             for (int c = 0; c < 9; ++c) F[c * g + q] = S[c];
         }
         forces<T, V>(s, F, u);
-        store_nodal<T, V>(u, k, std::min<int64_t>(V, last - e), out + e * 4 * k);
+        store_nodal<T, V>(u, k, std::min<int64_t>(V, last - e), out + (e - first) * 4 * k);
     }
 }
 

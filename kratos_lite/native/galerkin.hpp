@@ -12,8 +12,10 @@ struct Transposed {
     Transposed(int64_t n, const Ints& row_pointer, const Ints& columns) : rows(columns.size()) {
         members_of(columns, n, indptr, entries);
         Ints row(columns.size());
-        for (size_t i = 0; i + 1 < row_pointer.size(); ++i)
+        for (size_t i = 0; i + 1 < row_pointer.size(); ++i) {
+            if (i % MANY == 0) look();
             std::fill(row.begin() + row_pointer[i], row.begin() + row_pointer[i + 1], static_cast<int32_t>(i));
+        }
         for (size_t k = 0; k < entries.size(); ++k) rows[k] = row[entries[k]];
     }
 };
@@ -24,15 +26,21 @@ struct CoarseMatrix {
     Doubles data;
 };
 
-// Coarse rows [first, last) of C = P^T A P.  Fine rows come in ascending order; A P, whose pattern is given,
-// exists for one row.
+// Coarse rows [first, last) of C = P^T A P.  Fine rows, those of `columns`, come in ascending order; A P, whose
+// pattern is given, exists for one row.
 template <int b>
-KL_INLINE void galerkin_rows(const Graph& g, const double* A, const Prolongator& P, const CoarseMatrix& AP,
-                             CoarseMatrix& C, int64_t first, int64_t last) {
+KL_INLINE void galerkin_rows(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
+                             const CoarseMatrix& AP, CoarseMatrix& C, int64_t first, int64_t last) {
     constexpr int size = b * MODES;
     Doubles product;
-    for (int64_t i = 0; i < g.rows; ++i) {
-        if (i % 64 == 0) watch().look();
+    int32_t begin = INT32_MAX, end = 0;
+    for (int64_t I = first; I < last; ++I)
+        if (columns.indptr[I] < columns.indptr[I + 1]) {
+            begin = std::min(begin, columns.rows[columns.indptr[I]]);
+            end = std::max(end, columns.rows[columns.indptr[I + 1] - 1] + 1);
+        }
+    for (int32_t i = begin; i < end; ++i) {
+        if (i % 64 == 0) look();
         const int32_t p0 = P.indptr[i], p1 = P.indptr[i + 1];
         if (p0 == p1 || P.indices[p1 - 1] < first || P.indices[p0] >= last) continue;
         const int32_t start = AP.indptr[i], count = AP.indptr[i + 1] - start;
@@ -60,62 +68,25 @@ KL_INLINE void galerkin_rows(const Graph& g, const double* A, const Prolongator&
     }
 }
 
-// Rows of the pattern of a product, each the sorted union of some lists of columns.
-template <class Lists>
-void union_pattern(int64_t rows, int64_t columns, const Lists& lists, Ints& indptr, Ints& indices) {
-    indptr.assign(rows + 1, 0);
-    constexpr int64_t grain = 4 * ROW_GRAIN;
-    std::vector<Ints> found((rows + grain - 1) / grain);
-    parallel_ranges(rows, grain, [&](int64_t first, int64_t last) {
-        Ints seen(columns, -1);
-        Ints& mine = found[first / grain];
-        for (int64_t i = first; i < last; ++i) {
-            const size_t start = mine.size();
-            lists(i, [&](const int32_t* from, const int32_t* to) {
-                for (; from != to; ++from)
-                    if (seen[*from] != i) {
-                        seen[*from] = static_cast<int32_t>(i);
-                        mine.push_back(*from);
-                    }
-            });
-            std::sort(mine.begin() + start, mine.end());
-            indptr[i + 1] = static_cast<int32_t>(mine.size() - start);
-        }
-    });
-    std::partial_sum(indptr.begin(), indptr.end(), indptr.begin());
-    indices.reserve(indptr[rows]);
-    for (const Ints& mine : found) indices.insert(indices.end(), mine.begin(), mine.end());
-}
-
 // The sum over the rows of g; P may have more.
 template <int b>
 CoarseMatrix galerkin_sum(const Graph& g, const double* A, const Prolongator& P, const Transposed& columns,
                           int32_t count) {
     CoarseMatrix AP, C;
-    union_pattern(
-        g.rows, count,
-        [&](int64_t i, const auto& add) {
-            if (P.indptr[i] == P.indptr[i + 1]) return;
-            for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k) {
-                const int32_t j = g.indices[k];
-                add(P.indices.data() + P.indptr[j], P.indices.data() + P.indptr[j + 1]);
-            }
-        },
-        AP.indptr, AP.indices);
-    union_pattern(
-        count, count,
-        [&](int64_t I, const auto& add) {
-            for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k) {
-                const int32_t i = columns.rows[k];
-                add(AP.indices.data() + AP.indptr[i], AP.indices.data() + AP.indptr[i + 1]);
-            }
-        },
-        C.indptr, C.indices);
+    UnionRows(g.rows, count, [&](int64_t i, const auto& add) {
+        if (P.indptr[i] == P.indptr[i + 1]) return;
+        for (int32_t k = g.indptr[i]; k < g.indptr[i + 1]; ++k)
+            for (int32_t q = P.indptr[g.indices[k]]; q < P.indptr[g.indices[k] + 1]; ++q) add(P.indices[q]);
+    }).copy_to(AP.indptr, AP.indices);
+    UnionRows(count, count, [&](int64_t I, const auto& add) {
+        for (int32_t k = columns.indptr[I]; k < columns.indptr[I + 1]; ++k)
+            for (int32_t q = AP.indptr[columns.rows[k]]; q < AP.indptr[columns.rows[k] + 1]; ++q) add(AP.indices[q]);
+    }).copy_to(C.indptr, C.indices);
     C.data.assign(C.indices.size() * MODES * MODES, 0.0);
     const int64_t slabs = wanted_threads() > 1 ? 2 * wanted_threads() : 1;
     parallel(slabs, [&](int64_t s) {
         const int64_t first = count * s / slabs, last = count * (s + 1) / slabs;
-        dispatch<double>([&](auto) KL_INLINE_LAMBDA { galerkin_rows<b>(g, A, P, AP, C, first, last); });
+        dispatch<double>([&](auto) KL_INLINE_LAMBDA { galerkin_rows<b>(g, A, P, columns, AP, C, first, last); });
     });
     return C;
 }

@@ -130,7 +130,7 @@ public:
     void cycle(const double* r, double* z) {
         Level& top = levels.front();
         double norm = 0;
-        for (int64_t i = 0; i < top.size(); ++i) norm = std::fmax(norm, std::fabs(r[i]));
+        for (int64_t i = 0; i < top.size(); ++i) norm = std::max(norm, std::fabs(r[i]));
         if (norm == 0) {
             std::fill(z, z + top.size(), 0.0);
             return;
@@ -207,7 +207,7 @@ private:
             return;
         }
         Doubles x(level.c.begin(), level.c.begin() + level.size());
-        coarsest.solve(x.data());
+        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { substitute_rows<V>(coarsest, 0, level.size(), x.data()); });
         for (int64_t i = 0; i < level.size(); ++i) level.x[i] = static_cast<float>(x[i]);
     }
 
@@ -215,16 +215,23 @@ private:
         const Level& level = levels.back();
         const int64_t N = level.size(), b = level.b;
         if (N > FULL_LIMIT) return;
-        Doubles full(N * N, 0.0);
+        coarsest.at.assign(N + 1, 0);
+        for (int64_t i = 0; i < N; ++i) coarsest.at[i + 1] = coarsest.at[i] + i;
+        coarsest.rows.assign(coarsest.at[N], 0.0);
+        coarsest.pivots.assign(N, 0.0);
         for (int64_t i = 0; i < level.n; ++i)
             for (int32_t k = level.graph.indptr[i]; k < level.graph.indptr[i + 1]; ++k)
                 for (int64_t r = 0; r < b; ++r)
                     for (int64_t c = 0; c < b; ++c) {
                         const int64_t row = i * b + r, column = level.graph.indices[k] * b + c;
-                        if (row == column || !(fixed[row] || fixed[column]))
-                            full[row * N + column] = data[(k * b + r) * b + c];
+                        const double value = data[(k * b + r) * b + c];
+                        if (row == column)
+                            coarsest.pivots[row] = value;
+                        else if (column < row && !(fixed[row] || fixed[column]))
+                            coarsest.row(row)[column] = value;
                     }
-        coarsest = Cholesky(std::move(full), N);
+        const double scale = *std::max_element(coarsest.pivots.begin(), coarsest.pivots.end());
+        dispatch<double>([&](auto V) KL_INLINE_LAMBDA { factorize_rows<V>(coarsest, 0, N, 1e-13 * scale); });
     }
 
     // The mean coordinates of each aggregate, where there is one coarse node for each.
@@ -288,7 +295,7 @@ private:
     int sets = 1;          // coarse nodes of each aggregate
     bool patched = false;  // whether overlapping parts smooth
     Ints aggregates;       // of the nodes of the last level
-    Cholesky coarsest;
+    Skyline<double> coarsest;  // a direction without stiffness is left at zero
     Doubles inverse;  // D^-1 of the last level, while setting up
     Doubles X;        // nodes of the last level
 };

@@ -145,7 +145,7 @@ public:
 
     // next = x + d with d = alpha d + beta D^-1 (c - A x); or next = c - A x without smoothing.
     void step(const float* from, float* to, float alpha, float beta, bool smooth) {
-        if (elements) return step_elements(from, to, alpha, beta, smooth);
+        if (elements) return step_elements(from, c.data(), d.data(), to, alpha, beta, smooth);
         const bool single = clusters.empty() && patches.empty();
         const float* inverse = smooth && single ? Dinv.data() : nullptr;
         parallel_ranges(n, grain(), [&](int64_t first, int64_t last) {
@@ -169,6 +169,11 @@ public:
     void first_step(float beta) {
         if (!patches.empty()) return patches.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
         if (!clusters.empty()) return clusters.step(b, c.data(), nullptr, d.data(), x.data(), 0, beta);
+        first_step(c.data(), d.data(), x.data(), beta);
+    }
+
+    // The same with the diagonal blocks, in vectors of the caller.
+    void first_step(const float* c, float* d, float* x, float beta) const {
         parallel_ranges(n, 8 * grain(), [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i)
                 for (int r = 0; r < b; ++r) {
@@ -176,6 +181,26 @@ public:
                     for (int j = 0; j < b; ++j) z += Dinv[(i * b + j) * b + r] * c[i * b + j];
                     d[i * b + r] = x[i * b + r] = beta * z;
                 }
+        });
+    }
+
+    // A step in vectors of the caller, of n nodes: the product may have more.
+    void step_elements(const float* from, const float* c, float* d, float* to, float alpha, float beta,
+                       bool smooth) const {
+        elements->multiply(from, [&](int64_t i, const float* sum) {
+            if (i >= n) return;
+            float r[3];
+            for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
+            if (!smooth) {
+                std::copy(r, r + 3, to + 3 * i);
+                return;
+            }
+            const float* D = &Dinv[9 * i];
+            for (int j = 0; j < 3; ++j) {
+                float& change = d[3 * i + j];
+                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
+                to[3 * i + j] = from[3 * i + j] + change;
+            }
         });
     }
 
@@ -199,23 +224,6 @@ public:
     void residual(Floats& out) { step(x.data(), out.data(), 0, 0, false); }
 
 private:
-    void step_elements(const float* from, float* to, float alpha, float beta, bool smooth) {
-        elements->multiply(from, [&](int64_t i, const float* sum) {
-            float r[3];
-            for (int j = 0; j < 3; ++j) r[j] = held[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
-            if (!smooth) {
-                std::copy(r, r + 3, to + 3 * i);
-                return;
-            }
-            const float* D = &Dinv[9 * i];
-            for (int j = 0; j < 3; ++j) {
-                float& change = d[3 * i + j];
-                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
-                to[3 * i + j] = from[3 * i + j] + change;
-            }
-        });
-    }
-
     template <int B>
     void step(const float* inverse, const float* from, float* to, float alpha, float beta, int64_t first,
               int64_t last) {

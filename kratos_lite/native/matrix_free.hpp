@@ -36,25 +36,20 @@ public:
     // Sum up which element vectors meet in each node; find the geometry.
     void prepare() {
         if (pairs > INT32_MAX) throw std::overflow_error("more than 2^31 nodes of elements");
-        start.assign(n + 1, 0);
-        for (const ProductGroup& s : groups)
-            for (int64_t p = 0; p < s.w.last * s.w.k; ++p) ++start[s.w.nodes[p] + 1];
-        for (int64_t i = 0; i < n; ++i) start[i + 1] += start[i];
-        met.resize(pairs);
-        std::vector<int32_t> next(start.begin(), start.end() - 1);
-        for (const ProductGroup& s : groups)
-            for (int64_t p = 0; p < s.w.last * s.w.k; ++p)
-                met[next[s.w.nodes[p]]++] = static_cast<int32_t>(s.first + p);
+        std::vector<int32_t> nodes;
+        for (const ProductGroup& s : groups) nodes.insert(nodes.end(), s.w.nodes, s.w.nodes + s.w.last * s.w.k);
+        members_of(nodes, n, start, met);
         for (ProductGroup& s : groups) find_places(s);
     }
 
     // done(i, y) with y = (K x)_i for each node i, by all threads.
     template <class T, class F>
     void multiply(const T* x, const F& done) const {
+        const auto turn = turns.take();
         std::vector<T>& room = std::get<std::vector<T>>(rooms);
         room.resize(4 * pairs);
         for (const ProductGroup& s : groups)
-            over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * s.first, first, last); });
+            over(s, [&](int64_t first, int64_t last) { run(s, x, room.data() + 4 * (s.first + first * s.w.k), first, last); });
         parallel_ranges(n, NODES, [&](int64_t first, int64_t last) {
             for (int64_t i = first; i < last; ++i) {
                 vec<T, 4> sum = {};
@@ -73,7 +68,43 @@ public:
 
     // The diagonal blocks, row-major; they are kept from `norm` on until they are taken.
     std::vector<double> diagonal() const {
-        if (!kept.empty()) return std::exchange(kept, {});
+        const auto turn = turns.take();
+        return kept.empty() ? diagonal_blocks() : std::exchange(kept, {});
+    }
+
+    // The largest sum of |K| over a row among the nodes of an element at the stiffest node.
+    double norm() const {
+        const auto turn = turns.take();
+        if (kept.empty()) kept = diagonal_blocks();
+        const std::vector<double>& D = kept;
+        int64_t stiffest = 0;
+        double most = 0, largest = 0;
+        for (int64_t i = 0; i < n; ++i) {
+            const double trace = D[9 * i] + D[9 * i + 4] + D[9 * i + 8];
+            if (trace > most) {
+                most = trace;
+                stiffest = i;
+            }
+        }
+        if (most == 0) return 0;
+        const auto [group, element] = owner(met[start[stiffest]]);
+        std::vector<double> x(3 * n + 1, 0.0), row(3 * n, 0.0);
+        for (int a = 0; a < group->w.k; ++a)
+            for (int c = 0; c < 3; ++c)
+                largest = std::fmax(largest, row_sum(group->w.nodes[element * group->w.k + a], c, x, row));
+        return largest;
+    }
+
+    int64_t bytes() const {
+        int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + std::get<0>(rooms).size() + 2 * std::get<1>(rooms).size());
+        for (const ProductGroup& s : groups) all += 4 * static_cast<int64_t>(s.geometry.size());
+        return all;
+    }
+
+    int64_t n;
+
+private:
+    std::vector<double> diagonal_blocks() const {
         std::vector<double> each(6 * pairs), D(9 * n, 0.0);
         for (const ProductGroup& s : groups)
             over(s, [&](int64_t first, int64_t last) {
@@ -92,36 +123,6 @@ public:
         return D;
     }
 
-    // The largest sum of |K| over a row among the nodes of an element at the stiffest node.
-    double norm() const {
-        if (kept.empty()) kept = diagonal();
-        const std::vector<double>& D = kept;
-        int64_t stiffest = 0;
-        double most = 0, largest = 0;
-        for (int64_t i = 0; i < n; ++i) {
-            const double trace = D[9 * i] + D[9 * i + 4] + D[9 * i + 8];
-            if (trace > most) {
-                most = trace;
-                stiffest = i;
-            }
-        }
-        if (start[stiffest] == start[stiffest + 1]) return 0;
-        const auto [group, element] = owner(met[start[stiffest]]);
-        std::vector<double> x(3 * n + 1, 0.0), row(3 * n, 0.0), force;
-        for (int a = 0; a < group->w.k; ++a)
-            for (int c = 0; c < 3; ++c) largest = std::fmax(largest, row_sum(group->w.nodes[element * group->w.k + a], c, x, row, force));
-        return largest;
-    }
-
-    int64_t bytes() const {
-        int64_t all = 4 * static_cast<int64_t>(start.size() + met.size() + std::get<0>(rooms).size() + 2 * std::get<1>(rooms).size());
-        for (const ProductGroup& s : groups) all += 4 * static_cast<int64_t>(s.geometry.size());
-        return all;
-    }
-
-    int64_t n;
-
-private:
     // The group and the element of an element vector.
     std::pair<const ProductGroup*, int64_t> owner(int64_t place) const {
         const ProductGroup* s = &groups.back();
@@ -130,17 +131,17 @@ private:
     }
 
     // The sum of |K| over one row, which is that over the column; x and row are zero, and stay so.
-    double row_sum(int32_t node, int c, std::vector<double>& x, std::vector<double>& row,
-                   std::vector<double>& force) const {
+    double row_sum(int32_t node, int c, std::vector<double>& x, std::vector<double>& row) const {
+        std::vector<double> force;
         double sum = 0;
         x[3 * node + c] = 1;
         const auto for_rows = [&](const auto& f) {
             for (int32_t p = start[node]; p < start[node + 1]; ++p) {
                 const auto [s, e] = owner(met[p]);
                 const int k = s->w.k;
-                force.resize(4 * (e + 1) * k);
+                force.resize(4 * k);
                 run<double>(*s, x.data(), force.data(), e, e + 1);
-                for (int i = 0; i < 3 * k; ++i) f(3 * int64_t{s->w.nodes[e * k + i / 3]} + i % 3, force[4 * (e * k + i / 3) + i % 3]);
+                for (int i = 0; i < 3 * k; ++i) f(3 * int64_t{s->w.nodes[e * k + i / 3]} + i % 3, force[4 * (i / 3) + i % 3]);
             }
         };
         for_rows([&](int64_t i, double value) { row[i] += value; });
@@ -190,6 +191,7 @@ private:
         });
     }
 
+    mutable Turns turns;  // the element vectors serve one product at a time
     mutable std::tuple<std::vector<float>, std::vector<double>> rooms;  // element vectors
     int64_t pairs = 0;
     mutable std::vector<double> kept;

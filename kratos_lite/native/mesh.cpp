@@ -9,7 +9,6 @@ namespace {
 using namespace kl;
 
 constexpr int64_t GRAIN = 4096;  // cells of one task
-constexpr int64_t MANY = 1 << 16;  // after as many, it is time to look for signals
 
 // The numbers of a set are mixed and added up, so that their order does not matter (SplitMix64,
 // Steele, Lea and Flood 2014): two sets of a mesh that differ have the same key with a chance of 2^-64.
@@ -49,7 +48,7 @@ std::vector<int32_t> next_equal(const std::vector<uint64_t>& key) {
     while (buckets < n) buckets *= 2;
     std::vector<int32_t> last(buckets, -1), before(n), next(n, -1);
     for (size_t i = 0; i < n; ++i) {
-        if (i % MANY == 0) watch().look();
+        if (i % MANY == 0) look();
         int32_t& head = last[key[i] & (buckets - 1)];
         int32_t other = head;
         while (other >= 0 && key[other] != key[i]) other = before[other];
@@ -110,7 +109,7 @@ Array<int64_t> components(int64_t n, Array<int64_t> pairs) {
     GilReleased release;
     for (int64_t i = 0; i < n; ++i) parent[i] = i;
     for (int64_t i = 0; i < pairs.shape(0); ++i) {
-        if (i % MANY == 0) watch().look();
+        if (i % MANY == 0) look();
         const int64_t a = root(parent, ends[2 * i]), b = root(parent, ends[2 * i + 1]);
         parent[a < b ? b : a] = a < b ? a : b;
     }

@@ -8,20 +8,31 @@ namespace {
 
 using namespace kl;
 
-// A square matrix of blocks whose arrays were checked, and are kept.
-struct Matrix {
+// A sparse matrix of blocks, whose arrays were checked, and are kept.
+template <class T>
+struct Blocks {
     Array<int32_t> indptr, indices;
-    Array<double> data;
+    Array<T> data;
 
-    Matrix() = default;
-    Matrix(Array<int32_t> starts, Array<int32_t> columns, Array<double> blocks)
+    Blocks() = default;
+    Blocks(Array<int32_t> starts, Array<int32_t> columns, Array<T> blocks, int64_t rows, int64_t width)
         : indptr(std::move(starts)), indices(std::move(columns)), data(std::move(blocks)) {
-        require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
+        require(data.ndim() == 3 && data.shape(0) == indices.size(), "data must be (nnz, R, C)");
+        require(indptr.size() == rows + 1, "the matrix must have a row for each row of blocks");
         check_rows(indptr, indices.size());
-        require(are_rows(indices, rows()), "indices must be columns of the matrix");
+        require(are_rows(indices, width), "indices must be columns of the matrix");
     }
     int64_t rows() const { return indptr.size() - 1; }
     Graph graph() const { return {rows(), indptr.data(), indices.data()}; }
+};
+
+// A square matrix of 3x3 blocks.
+struct Matrix : Blocks<double> {
+    Matrix() = default;
+    Matrix(const Array<int32_t>& starts, Array<int32_t> columns, Array<double> blocks)
+        : Blocks(starts, std::move(columns), std::move(blocks), starts.size() - 1, starts.size() - 1) {
+        require(data.size() == 9 * indices.size(), "data must be (nnz, 3, 3)");
+    }
     BlockMatrix blocks() const { return {graph(), data.data(), static_cast<uint32_t>(rows())}; }
 };
 
@@ -78,29 +89,31 @@ public:
         from.push_back(0);
         double* to = y.mutable_data();
         GilReleased release;
-        std::lock_guard<std::recursive_mutex> lock(busy);
         multiply(from.data(), to);
         return y;
     }
 
     double largest_row_sum() const {
         GilReleased release;
-        std::lock_guard<std::recursive_mutex> lock(busy);
         return norm();
     }
-
-    // The element vectors serve one product at a time; a callback between iterations may ask for another.
-    mutable std::recursive_mutex busy;
 
 private:
     std::vector<ElementTables> groups;
 };
 
-Bytes bytes_of(const Array<uint8_t>& a) { return {a.data(), a.data() + a.size()}; }
-
 Doubles coordinates(Numbers points, size_t unknowns) {
     require(static_cast<size_t>(points.size()) == unknowns, "points must be (n, 3)");
     return {points.data(), points.data() + points.size()};
+}
+
+// Tell a callback a residual; it may say stop.
+bool goes_on(const Object& progress, double residual) {
+    GilHeld held;
+    const Object said = progress(residual);
+    const int stop = PyObject_RichCompareBool(said.get(), Py_False, Py_EQ);
+    if (stop < 0) throw PythonError{};
+    return !stop;
 }
 
 // Modes (3n, 6) or (3n, 12) with zeros at fixed components.
@@ -117,7 +130,8 @@ Doubles free_modes(Numbers modes, const Bytes& fixed) {
 class Multigrid {
 public:
     Multigrid(Matrix matrix, Array<uint8_t> fixed, Numbers points, Settings settings)
-        : A(std::move(matrix)), fixed(bytes_of(fixed)), hierarchy(settings) {
+        : A(std::move(matrix)), fixed(bytes_in(fixed)), hierarchy(settings) {
+        require(A.rows() > 0, "there must be a node");
         require(fixed.size() == 3 * A.rows(), "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
         GilReleased release;
@@ -125,65 +139,56 @@ public:
     }
 
     Multigrid(std::shared_ptr<Product> product, Array<uint8_t> fixed, Numbers points, Settings settings)
-        : elements(std::move(product)), fixed(bytes_of(fixed)), hierarchy(settings) {
+        : elements(std::move(product)), fixed(bytes_in(fixed)), hierarchy(settings) {
+        require(elements->n > 0, "there must be a node");
         require(fixed.size() == 3 * elements->n, "fixed must have one entry for each unknown");
         Doubles X = coordinates(points, this->fixed.size());
         GilReleased release;
-        std::lock_guard<std::recursive_mutex> lock(elements->busy);
         hierarchy.add_elements(*elements, this->fixed, std::move(X));
     }
 
     // Smoothed aggregation below the finest level, of its matrix; where it works without one, of that given.
     void aggregate(Array<double> modes, std::optional<std::shared_ptr<Matrix>> matrix) {
-        require(hierarchy.levels.size() == 1, "aggregated already");
         require(matrix.has_value() == (elements != nullptr), "a matrix is needed where elements take its place");
         const Matrix& finest = matrix ? **matrix : A;
         require(3 * finest.rows() == static_cast<int64_t>(fixed.size()), "the matrix must have a row for each unknown");
         Doubles B = free_modes(modes, fixed);
-        GilReleased release;
-        hierarchy.coarsen(finest.graph(), finest.data.data(), fixed, std::move(B));
+        coarsen([&] { hierarchy.coarsen(finest.graph(), finest.data.data(), fixed, std::move(B)); });
     }
 
     // A linear level below the finest one, and smoothed aggregation below that.
     void aggregate_linear(std::shared_ptr<Matrix> linear, Array<uint8_t> linear_fixed, Array<int32_t> indptr,
                           Array<int32_t> indices, Array<double> weights, Numbers points,
                           Array<double> modes) {
-        require(hierarchy.levels.size() == 1, "aggregated already");
-        below = *linear;
-        require(linear_fixed.size() == 3 * below.rows(), "one entry for each linear unknown");
+        const Matrix& finest = *linear;
+        require(linear_fixed.size() == 3 * finest.rows(), "one entry for each linear unknown");
         require(3 * (indptr.size() - 1) == static_cast<int64_t>(fixed.size()), "weights must have one row for each node");
         require(weights.size() == indices.size(), "one weight for each index is needed");
-        check_rows(indptr, indices.size());
-        require(are_rows(indices, below.rows()), "indices must be nodes of the linear level");
-        Bytes coarse_fixed = bytes_of(linear_fixed);
+        require(are_rows(indices, finest.rows()), "indices must be nodes of the linear level");
+        Bytes coarse_fixed = bytes_in(linear_fixed);
         Doubles B = free_modes(modes, coarse_fixed), X = coordinates(points, coarse_fixed.size());
         Transfer transfer;
-        transfer.P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
-        transfer.P.indices.assign(indices.data(), indices.data() + indices.size());
-        transfer.P.data.assign(weights.data(), weights.data() + weights.size());
-        GilReleased release;
-        hierarchy.add_linear(below.graph(), below.data.data(), coarse_fixed, std::move(transfer), fixed,
-                             std::move(X));
-        hierarchy.coarsen(below.graph(), below.data.data(), coarse_fixed, std::move(B));
+        transfer.P = prolongator_of(indptr, indices, weights, false);
+        coarsen([&] {
+            below = std::move(linear);
+            hierarchy.add_linear(finest.graph(), finest.data.data(), coarse_fixed, std::move(transfer), fixed,
+                                 std::move(X));
+            hierarchy.coarsen(finest.graph(), finest.data.data(), coarse_fixed, std::move(B));
+        });
     }
 
     // A level of m nodes of a thin flat body below the finest one: blocks (k, 3, 6) of P, modes (6m, 12).
     void aggregate_plate(Array<int32_t> indptr, Array<int32_t> indices, Array<float> blocks, Array<double> modes) {
-        require(hierarchy.levels.size() == 1, "aggregated already");
         require(indptr.size() == A.indptr.size(), "blocks must have one row for each node");
         require(blocks.size() == 18 * indices.size(), "blocks must be (k, 3, 6)");
-        check_rows(indptr, indices.size());
         const int64_t nodes = modes.size() / (MODES * 2 * MODES);
         require(modes.size() == nodes * MODES * 2 * MODES, "modes must be (6m, 12)");
         require(are_rows(indices, nodes), "indices must be nodes of the plate");
-        Prolongator P;
-        P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
-        P.indices.assign(indices.data(), indices.data() + indices.size());
-        P.data.assign(blocks.data(), blocks.data() + blocks.size());
-        P.data.resize(P.data.size() + 8);
+        Prolongator P = prolongator_of(indptr, indices, blocks);
         Doubles B(modes.data(), modes.data() + modes.size());
-        GilReleased release;
-        hierarchy.coarsen_plate(A.data.data(), std::move(P), static_cast<int32_t>(nodes), std::move(B));
+        coarsen([&] {
+            hierarchy.coarsen_plate(A.data.data(), std::move(P), static_cast<int32_t>(nodes), std::move(B));
+        });
     }
 
     Array<double> cycle(Array<double> r) {
@@ -192,8 +197,7 @@ public:
         const double* from = r.data();
         double* to = z.mutable_data();
         GilReleased release;
-        std::lock_guard<std::mutex> lock(busy);
-        const auto lock_elements = occupied();
+        const auto turn = at_work();
         hierarchy.cycle(from, to);
         return z;
     }
@@ -204,16 +208,11 @@ public:
         const double* from = b.data();
         double* to = x.mutable_data();
         const bool tell = !progress.is_none();
-        const auto each = [&](double residual) {
-            if (!tell) return true;
-            GilHeld held;
-            return progress(residual).get() != Py_False;  // it may say stop
-        };
+        const auto each = [&](double residual) { return !tell || goes_on(progress, residual); };
         Outcome outcome;
         {
             GilReleased release;
-            std::lock_guard<std::mutex> lock(busy);
-            const auto lock_elements = occupied();
+            const auto turn = at_work();
             const auto times_A = [&](const double* p, double* Ap) {
                 elements ? elements->multiply(p, Ap) : multiply(A.blocks(), p, Ap);
             };
@@ -243,32 +242,32 @@ public:
     double complexity() const { return hierarchy.complexity(); }
     auto bytes() const { return hierarchy.bytes(); }
 
-    Matrix A, below;
+    // The levels' vectors serve one solution at a time.
+    Turns::Turn at_work() {
+        Turns::Turn turn = turns.take();
+        require(ready, "a multigrid must be aggregated first");
+        return turn;
+    }
+
+    Matrix A;
+    std::shared_ptr<Matrix> below;
     std::shared_ptr<Product> elements;  // in place of A
     Bytes fixed;
     Hierarchy hierarchy;
-    // The element vectors, where there are some, serve one product at a time.
-    std::unique_lock<std::recursive_mutex> occupied() const {
-        return elements ? std::unique_lock(elements->busy) : std::unique_lock<std::recursive_mutex>();
+
+private:
+    // Make the coarser levels, once.
+    template <class F>
+    void coarsen(const F& make) {
+        GilReleased release;
+        const auto turn = turns.take();
+        require(hierarchy.levels.size() == 1 && !ready, "aggregated already");
+        make();
+        ready = true;
     }
 
-    std::mutex busy;  // the levels' vectors serve one solution at a time
-};
-
-// A sparse matrix of blocks, whose arrays were checked, and are kept.
-template <class T>
-struct Blocks {
-    Array<int32_t> indptr, indices;
-    Array<T> data;
-
-    Blocks(Array<int32_t> starts, Array<int32_t> columns, Array<T> blocks, int64_t rows, int64_t width)
-        : indptr(std::move(starts)), indices(std::move(columns)), data(std::move(blocks)) {
-        require(data.ndim() == 3 && data.shape(0) == indices.size(), "data must be (nnz, R, C)");
-        require(indptr.size() == rows + 1, "the matrix must have a row for each row of blocks");
-        check_rows(indptr, indices.size());
-        require(are_rows(indices, width), "indices must be columns of the matrix");
-    }
-    Graph graph() const { return {indptr.size() - 1, indptr.data(), indices.data()}; }
+    Turns turns;
+    bool ready = false;
 };
 
 // Displacements by a multigrid, and pressures.
@@ -291,14 +290,11 @@ public:
         Array<double> x(b.size());
         const double* from = b.data();
         double* to = x.mutable_data();
-        const auto each = [&](double residual) {
-            GilHeld held;
-            return progress(residual).get() != Py_False;  // it may say stop
-        };
+        const auto each = [&](double residual) { return goes_on(progress, residual); };
         Outcome outcome;
         {
             GilReleased release;
-            std::lock_guard<std::mutex> lock(M.busy);
+            const auto turn = M.at_work();
             outcome = solver.solve(from, to, tolerance, norm, {most, directions, reduced}, each);
         }
         return std::make_tuple(x, outcome.iterations, outcome.converged);

@@ -27,7 +27,7 @@ public:
         const int64_t copies = static_cast<int64_t>(nodes.size());
         Ints indptr(copies + 1, 0), indices, links, label(copies), place(g.rows, -1);
         for (int32_t a = 0; a < count; ++a) {
-            if (a % 64 == 0) watch().look();
+            if (a % 64 == 0) look();
             for (int32_t s = rows[a]; s < rows[a + 1]; ++s) place[nodes[s]] = s;
             for (int32_t s = rows[a]; s < rows[a + 1]; ++s) {
                 label[s] = rows[a];
@@ -88,13 +88,10 @@ private:
     static void with_neighbors(const Graph& g, const Ints& of, int32_t count, Ints& rows, Ints& nodes) {
         Ints starts, members;
         members_of(of, count, starts, members);
-        union_pattern(
-            count, g.rows,
-            [&](int64_t a, const auto& add) {
-                for (int32_t p = starts[a]; p < starts[a + 1]; ++p)
-                    add(g.indices + g.indptr[members[p]], g.indices + g.indptr[members[p] + 1]);
-            },
-            rows, nodes);
+        UnionRows(count, g.rows, [&](int64_t a, const auto& add) {
+            for (int32_t p = starts[a]; p < starts[a + 1]; ++p)
+                std::for_each(g.indices + g.indptr[members[p]], g.indices + g.indptr[members[p] + 1], add);
+        }).copy_to(rows, nodes);
     }
 
     Clusters parts;       // of copies of nodes

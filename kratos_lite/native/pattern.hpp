@@ -3,12 +3,16 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "threads.hpp"
 
 namespace kl {
+
+using Ints = std::vector<int32_t>;
 
 // The pattern of a matrix over nodes: sorted columns of each row (CSR).
 struct Graph {
@@ -59,9 +63,23 @@ public:
     }
 
     std::vector<int64_t> start;
-    std::vector<int32_t> around;
+    Ints around;
     std::vector<Element> elements;
 };
+
+// The members of some groups in ascending order, row by row; -1 is no group.
+inline void members_of(const Ints& group, int64_t groups, Ints& starts, Ints& members) {
+    starts.assign(groups + 1, 0);
+    for (int32_t c : group)
+        if (c >= 0) ++starts[c + 1];
+    std::partial_sum(starts.begin(), starts.end(), starts.begin());
+    members.resize(starts[groups]);
+    Ints next(starts.begin(), starts.end() - 1);
+    for (size_t i = 0; i < group.size(); ++i) {
+        if (i % MANY == 0) look();
+        if (group[i] >= 0) members[next[group[i]]++] = static_cast<int32_t>(i);
+    }
+}
 
 // A set of small numbers that gives them back sorted: one bit each, and one bit for each 64 of them.
 class SortedSet {
@@ -70,47 +88,43 @@ public:
 
     void add(int32_t i) {
         bits[i >> 6] |= uint64_t{1} << (i & 63);
-        used[i >> 12] |= uint64_t{1} << (i >> 6 & 63);
-        low = std::min(low, i);
-        high = std::max(high, i);
+        uint64_t& words = used[i >> 12];
+        if (!words) touched.push_back(i >> 12);
+        words |= uint64_t{1} << (i >> 6 & 63);
     }
 
     // Append all numbers in ascending order and forget them.
-    void move_to(std::vector<int32_t>& sorted) {
-        for (int32_t u = low >> 12; u <= high >> 12; ++u) {
-            for (uint64_t words = used[u]; words; words &= words - 1) {
+    void move_to(Ints& sorted) {
+        std::sort(touched.begin(), touched.end());
+        for (const int32_t u : touched)
+            for (uint64_t words = std::exchange(used[u], 0); words; words &= words - 1) {
                 const int32_t w = u << 6 | __builtin_ctzll(words);
-                for (uint64_t word = bits[w]; word; word &= word - 1)
+                for (uint64_t word = std::exchange(bits[w], 0); word; word &= word - 1)
                     sorted.push_back(w << 6 | __builtin_ctzll(word));
-                bits[w] = 0;
             }
-            used[u] = 0;
-        }
-        low = INT32_MAX;
-        high = -1;
+        touched.clear();
     }
 
 private:
     std::vector<uint64_t> bits, used;
-    int32_t low = INT32_MAX, high = -1;
+    Ints touched;
 };
 
-// Rows of a pattern: made in pieces by several threads, then copied to where they belong.
-class Pattern {
+// Sorted rows of different numbers, of which lists(i, add) adds those of row i, some of them again: made in pieces
+// by several threads, then copied to where they belong.
+class UnionRows {
 public:
-    Pattern(int64_t n, const std::vector<Connectivity>& groups)
-        : rows(n), grain(std::max<int64_t>(1024, n / 256)), pieces((n + grain - 1) / grain), length(n) {
-        const Incidence mesh(n, groups);
-        parallel_ranges(n, grain, [&](int64_t first, int64_t last) {
-            SortedSet set(n);
+    template <class Lists>
+    UnionRows(int64_t rows, int64_t columns, const Lists& lists)
+        : rows(rows), grain(std::max<int64_t>(1024, rows / 256 + 1)), pieces((rows + grain - 1) / grain), length(rows) {
+        parallel_ranges(rows, grain, [&](int64_t first, int64_t last) {
+            SortedSet set(columns);
             auto& piece = pieces[first / grain];
             for (int64_t i = first; i < last; ++i) {
+                if (i % 64 == 0) look();
                 const size_t before = piece.size();
-                for (int64_t p = mesh.start[i]; p < mesh.start[i + 1]; ++p) {
-                    const Element& element = mesh.elements[mesh.around[p]];
-                    for (int b = 0; b < element.k; ++b) set.add(element.nodes[b]);
-                }
-                if (mesh.start[i] < mesh.start[i + 1]) set.move_to(piece);
+                lists(i, [&](int32_t number) { set.add(number); });
+                set.move_to(piece);
                 length[i] = static_cast<int32_t>(piece.size() - before);
             }
         });
@@ -122,7 +136,7 @@ public:
         return total;
     }
 
-    void copy(int32_t* indptr, int32_t* indices) const {
+    void copy_to(int32_t* indptr, int32_t* indices) const {
         indptr[0] = 0;
         for (int64_t i = 0; i < rows; ++i) indptr[i + 1] = indptr[i] + length[i];
         parallel(static_cast<int64_t>(pieces.size()), [&](int64_t i) {
@@ -130,10 +144,27 @@ public:
         });
     }
 
+    void copy_to(Ints& indptr, Ints& indices) const {
+        indptr.resize(rows + 1);
+        indices.resize(size());
+        copy_to(indptr.data(), indices.data());
+    }
+
 private:
     int64_t rows, grain;
-    std::vector<std::vector<int32_t>> pieces;
-    std::vector<int32_t> length;
+    std::vector<Ints> pieces;
+    Ints length;
 };
+
+// Which nodes share an element with each of n nodes.
+inline UnionRows neighbors(int64_t n, const std::vector<Connectivity>& groups) {
+    const Incidence mesh(n, groups);
+    return {n, n, [&](int64_t i, const auto& add) {
+                for (int64_t p = mesh.start[i]; p < mesh.start[i + 1]; ++p) {
+                    const Element& element = mesh.elements[mesh.around[p]];
+                    std::for_each(element.nodes, element.nodes + element.k, add);
+                }
+            }};
+}
 
 }  // namespace kl

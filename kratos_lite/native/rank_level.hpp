@@ -32,7 +32,7 @@ public:
 
     // to = x + d with d = alpha d + beta D^-1 (c - A x); or, without beta, to = c - A x.
     void step(const float* x, const float* c, float* d, float* to, float alpha, float beta) const {
-        if (level.elements) return step_elements(x, c, d, to, alpha, beta);
+        if (level.elements) return level.step_elements(x, c, d, to, alpha, beta, beta != 0);
         const float* D = beta != 0 ? level.Dinv.data() : nullptr;
         parallel_ranges(n(), level.grain(), [&](int64_t first, int64_t last) {
             dispatch<float>([&](auto) KL_INLINE_LAMBDA {
@@ -45,15 +45,7 @@ public:
     }
 
     // x = d = beta D^-1 c
-    void first_step(const float* c, float* d, float* x, float beta) const {
-        const int b = level.b;
-        for (int64_t i = 0; i < n(); ++i)
-            for (int r = 0; r < b; ++r) {
-                float z = 0;
-                for (int j = 0; j < b; ++j) z += level.Dinv[(i * b + j) * b + r] * c[i * b + j];
-                d[i * b + r] = x[i * b + r] = beta * z;
-            }
-    }
+    void first_step(const float* c, float* d, float* x, float beta) const { level.first_step(c, d, x, beta); }
 
     // The aggregate of each own node among them, -1 for fixed ones; links to copies do not join.
     int32_t aggregates(double theta, Ints& of) const {
@@ -104,24 +96,6 @@ public:
 private:
     void forget_vectors() {
         for (Floats* v : {&level.x, &level.y, &level.d, &level.c}) *v = {};
-    }
-
-    void step_elements(const float* x, const float* c, float* d, float* to, float alpha, float beta) const {
-        level.elements->multiply(x, [&](int64_t i, const float* sum) {
-            if (i >= n()) return;
-            float r[3];
-            for (int j = 0; j < 3; ++j) r[j] = fixed[3 * i + j] ? 0.0f : c[3 * i + j] - sum[j];
-            if (beta == 0) {
-                std::copy(r, r + 3, to + 3 * i);
-                return;
-            }
-            const float* D = &level.Dinv[9 * i];
-            for (int j = 0; j < 3; ++j) {
-                float& change = d[3 * i + j];
-                change = alpha * change + beta * (D[j] * r[0] + D[3 + j] * r[1] + D[6 + j] * r[2]);
-                to[3 * i + j] = x[3 * i + j] + change;
-            }
-        });
     }
 
     Bytes fixed;

@@ -8,8 +8,13 @@
 
 namespace kl {
 
-inline Prolongator prolongator_of(Indices indptr, Indices indices, const Array<float>& data) {
+template <class T>
+Prolongator prolongator_of(Indices indptr, Indices indices, const Array<T>& data, bool ascending = true) {
     check_rows(indptr, indices.size());
+    const int32_t *start = indptr.data(), *column = indices.data();
+    for (int64_t i = 0; ascending && i + 1 < indptr.size(); ++i)  // as Galerkin's product goes through them
+        for (int32_t k = start[i] + 1; k < start[i + 1]; ++k)
+            require(column[k - 1] < column[k], "the columns of each row of P must rise");
     Prolongator P;
     P.indptr.assign(indptr.data(), indptr.data() + indptr.size());
     P.indices.assign(indices.data(), indices.data() + indices.size());
@@ -134,10 +139,11 @@ public:
                    const Array<uint8_t>& fine_fixed, const Array<uint8_t>& coarse_fixed)
         : b(b), own(indptr.size() - 1), fine(fine), coarse(coarse) {
         require(are_rows(indices, coarse), "indices must be coarse nodes");
-        transfer.weights = data.size() == indices.size();
-        require(transfer.weights || data.size() == b * MODES * indices.size(), "data must be weights or (nnz, b, 6)");
+        transfer.weights = data.ndim() == 1;
+        require(data.size() == (transfer.weights ? 1 : b * MODES) * indices.size(),
+                "data must be weights (nnz) or blocks (nnz, b, 6)");
         require((b == 3 || b == 6) && own <= fine, "blocks must be of 3 or 6 rows");
-        transfer.P = prolongator_of(indptr, indices, data);
+        transfer.P = prolongator_of(indptr, indices, data, !transfer.weights);
         transfer.fine_fixed = bytes_in(fine_fixed);
         transfer.coarse_fixed = bytes_in(coarse_fixed);
         require(!transfer.weights || (static_cast<int64_t>(transfer.fine_fixed.size()) >= 3 * own &&

@@ -180,7 +180,12 @@ auto dealt(Integers owner, Integers entries, int64_t n) {
 
 auto distinct(Integers owner, Integers entries, int64_t n) {
     auto [start, all] = dealt(owner, entries, n);
-    const Distinct found(start.data(), all.mutable_data(), n);
+    Distinct found;
+    int64_t* each = all.mutable_data();
+    {
+        GilReleased release;
+        found.find(start.data(), each, n);
+    }
     return std::make_tuple(copied(found.owner), copied(found.entries), copied(found.count));
 }
 
@@ -198,8 +203,11 @@ auto grown(Integers owner, Integers cells, Integers corners, Integers from, Inte
     require_rises(from, around.size());
     require_members(around, m, "cells around corners must be there");
     for (int64_t i = 0; i < corners.size(); ++i) require(corners.data()[i] < nodes, "corners must be nodes");
-    const Grown found(start.data(), mine.data(), n, corners.data(), m, corners.shape(1), from.data(), around.data(),
-                      nodes);
+    Grown found;
+    {
+        GilReleased release;
+        found.grow(start.data(), mine.data(), n, corners.data(), m, corners.shape(1), from.data(), around.data(), nodes);
+    }
     return std::make_tuple(copied(found.owner), copied(found.entries));
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "threads.hpp"
+
 namespace kl {
 
 // Entries dealt into n rows by their owners, in their order.
@@ -21,8 +23,9 @@ inline void deal(const int64_t* owner, const int64_t* entries, int64_t count, in
 struct Distinct {
     std::vector<int64_t> owner, entries, count;
 
-    Distinct(const int64_t* start, int64_t* dealt, int64_t n) {
+    void find(const int64_t* start, int64_t* dealt, int64_t n) {
         for (int64_t row = 0; row < n; ++row) {
+            if (row % MANY == 0) look();
             std::sort(dealt + start[row], dealt + start[row + 1]);
             for (int64_t i = start[row]; i < start[row + 1]; ++i) {
                 if (i == start[row] || dealt[i] != dealt[i - 1]) {
@@ -41,10 +44,11 @@ struct Grown {
     std::vector<int64_t> owner, entries;
 
     // `cells` of each of n rows from `start`; corners (m, c), -1 for none; cells `around` each corner from `from`.
-    Grown(const int64_t* start, const int64_t* cells, int64_t n, const int64_t* corners, int64_t m, int64_t c,
-          const int64_t* from, const int64_t* around, int64_t nodes) {
+    void grow(const int64_t* start, const int64_t* cells, int64_t n, const int64_t* corners, int64_t m, int64_t c,
+              const int64_t* from, const int64_t* around, int64_t nodes) {
         std::vector<int64_t> node_met(nodes, -1), cell_met(m, -1);
         for (int64_t row = 0; row < n; ++row) {
+            if (row % 64 == 0) look();
             const size_t first = entries.size();
             for (const int64_t* cell = cells + start[row]; cell < cells + start[row + 1]; ++cell)
                 for (int64_t k = 0; k < c; ++k) {

@@ -10,6 +10,7 @@
 
 #include "dense.hpp"
 #include "isa.hpp"
+#include "threads.hpp"
 
 namespace kl {
 
@@ -38,10 +39,11 @@ KL_INLINE T dot_product(const T* a, const T* b, int64_t n) {
     return sum;
 }
 
-// Factorize rows [first, last), which no others are coupled to.
+// Factorize rows [first, last), which no others are coupled to; a pivot of no more than `least` is zero.
 template <int V>
-KL_INLINE void factorize_rows(Skyline<double>& A, int64_t first, int64_t last) {
+KL_INLINE void factorize_rows(Skyline<double>& A, int64_t first, int64_t last, double least = 0) {
     for (int64_t i = first; i < last; ++i) {
+        if (i % 64 == 0) look();
         const int64_t start = i - A.length(i);
         double* row = A.row(i) - start;
         for (int64_t j = start; j < i; ++j) {
@@ -50,24 +52,24 @@ KL_INLINE void factorize_rows(Skyline<double>& A, int64_t first, int64_t last) {
             row[j] = (row[j] - dot_product<double, V>(row + from, column + from, j - from)) * A.pivots[j];
         }
         const double left = A.pivots[i] - dot_product<double, V>(row + start, row + start, i - start);
-        A.pivots[i] = left > 1e-14 * A.pivots[i] ? 1 / std::sqrt(left) : 0;
+        A.pivots[i] = left > std::max(least, 1e-14 * A.pivots[i]) ? 1 / std::sqrt(left) : 0;
     }
 }
 
 // x = (L L^T)^-1 x on rows [first, last); x[0] belongs to the first.
-template <int V>
-KL_INLINE void substitute_rows(const Skyline<float>& L, int64_t first, int64_t last, float* x) {
-    typedef vec<float, V> Vec;
+template <int V, class T>
+KL_INLINE void substitute_rows(const Skyline<T>& L, int64_t first, int64_t last, T* x) {
+    typedef vec<T, V> Vec;
     for (int64_t i = first; i < last; ++i) {
         const int64_t n = L.length(i);
-        float& own = x[i - first];
-        own = (own - dot_product<float, V>(L.row(i), &own - n, n)) * L.pivots[i];
+        T& own = x[i - first];
+        own = (own - dot_product<T, V>(L.row(i), &own - n, n)) * L.pivots[i];
     }
     for (int64_t i = last; i-- > first;) {
         const int64_t n = L.length(i);
-        const float* row = L.row(i);
-        const float own = x[i - first] *= L.pivots[i];
-        float* others = x + (i - first) - n;
+        const T* row = L.row(i);
+        const T own = x[i - first] *= L.pivots[i];
+        T* others = x + (i - first) - n;
         int64_t k = 0;
         for (; k + V <= n; k += V) *reinterpret_cast<Vec*>(others + k) -= *reinterpret_cast<const Vec*>(row + k) * own;
         for (; k < n; ++k) others[k] -= row[k] * own;

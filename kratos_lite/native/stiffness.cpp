@@ -18,11 +18,11 @@ Connectivity connectivity(Indices nodes) {
 auto mesh_pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& arrays) {
     std::vector<Connectivity> groups;
     for (const auto& nodes : arrays) groups.push_back(connectivity(nodes));
-    std::unique_ptr<Pattern> rows;
+    std::unique_ptr<UnionRows> rows;
     int64_t size;
     {
         GilReleased release;
-        rows = std::make_unique<Pattern>(n_nodes, groups);
+        rows = std::make_unique<UnionRows>(neighbors(n_nodes, groups));
         size = rows->size();
     }
     if (size > INT32_MAX) throw std::overflow_error("the matrix has more than 2^31 blocks");
@@ -30,7 +30,7 @@ auto mesh_pattern(int64_t n_nodes, const std::vector<Array<int32_t>>& arrays) {
     int32_t *starts = indptr.mutable_data(), *columns = indices.mutable_data();
     {
         GilReleased release;
-        rows->copy(starts, columns);
+        rows->copy_to(starts, columns);
         rows.reset();
     }
     return std::make_tuple(indptr, indices);

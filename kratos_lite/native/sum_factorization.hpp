@@ -16,7 +16,7 @@ namespace kl {
 template <class T>
 struct TensorTables {
     int n = 0;                 // points along each axis; 0 for other rules
-    T values[9], slopes[9];    // (n, n) from places to points, and from points to derivatives there
+    T values[9] = {}, slopes[9] = {};  // (n, n) from places to points, and from points to derivatives there
     std::vector<int> place;    // (k) of each node
     std::vector<int> extra;    // places without a node
     std::vector<T> weights;    // (extra, k) of the nodes there

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernel_threads import same_on_all_threads
 
 from kratos_lite.assembly import element_groups, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
@@ -96,13 +97,7 @@ def test_enhanced_modes_take_other_rules(skew, distortion, monkeypatch):
 @pytest.mark.parametrize("name", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
 def test_results_do_not_depend_on_the_number_of_threads(name):
     points, group = group_of(ELEMENTS[name], CRYSTAL, count=700)
-    results, modules = [], (kernels("gauss"), kernels("stiffness"))
-    for count in (1, 2):
-        for module in modules:
-            module.set_threads(count)
-        results.append(everything(points, group))
-    for label, value in results[0].items():
-        np.testing.assert_array_equal(results[1][label], value, err_msg=label)
+    same_on_all_threads(lambda: everything(points, group), (1, 2))
 
 
 @pytest.mark.parametrize(

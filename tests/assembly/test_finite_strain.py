@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from kernel_threads import same_on_all_threads
 from scipy.linalg import eigh
 
 import kratos_lite as kl
@@ -312,14 +313,7 @@ def test_compiled_is_numpy(name, monkeypatch):
 @pytest.mark.parametrize("name", [NAMES[0], NAMES[3], NAMES[7]])
 def test_threads_change_no_bit(name):
     given = moved(name, cells=(11, 7, 4), prestress=30.0)
-    module, results = kernels("lagrange"), []
-    for count in (1, 2, 3, 5):
-        module.set_threads(count)
-        results.append(everything(*given))
-    module.set_threads(2)
-    for other in results[1:]:
-        for key, value in other.items():
-            np.testing.assert_array_equal(value, results[0][key], err_msg=key)
+    same_on_all_threads(lambda: everything(*given))
 
 
 @compiled

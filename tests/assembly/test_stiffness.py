@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from kernel_threads import same, same_on_all_threads
 from own_elements import tetrahedron_of_seven_nodes
 
 import kratos_lite as kl
@@ -39,13 +40,6 @@ def path(request, monkeypatch):
     elif MODULE is None:
         pytest.skip("the compiled kernels were not built")
     return request.param
-
-
-@pytest.fixture
-def threads():
-    """Set the number of threads, for one test."""
-    yield MODULE.set_threads
-    MODULE.set_threads(2)
 
 
 def scene(name, cells=(3, 2, 2), distortion=0.0, material=STEEL):
@@ -84,17 +78,15 @@ def test_compiled_pattern_is_that_of_scipy(name):
 
 
 @compiled
-def test_compiled_pattern_of_scattered_nodes_in_several_groups(threads):
+def test_compiled_pattern_of_scattered_nodes_in_several_groups():
     rng = np.random.default_rng(5)
     n = 20_000
     nodes = [np.array([rng.choice(n, k, replace=False) for _ in range(300)], np.int32) for k in (4, 7, 20)]
     nodes.append(np.empty((0, 8), np.int32))
     want = sparsity_pattern._pattern(n, nodes)
     assert (np.diff(want[0]) == 0).any()
-    for count in (1, 2, 3, 5):
-        threads(count)
-        for got, row in zip(MODULE.pattern(n, nodes), want, strict=True):
-            np.testing.assert_array_equal(got, row)
+    same(MODULE.pattern(n, nodes), tuple(want))
+    same_on_all_threads(lambda: MODULE.pattern(n, nodes))
 
 
 @compiled
@@ -206,17 +198,12 @@ def test_progress_ends_at_one(path):
 @pytest.mark.parametrize(
     ("name", "cells"), [("KinematicLinear3D8N", (23, 5, 3)), ("KinematicLinear3D10N", (7, 3, 3))]
 )
-def test_stiffness_does_not_depend_on_the_number_of_threads(threads, name, cells, order):
+def test_stiffness_does_not_depend_on_the_number_of_threads(name, cells, order):
     points, (group,) = scene(name, cells, 0.01)
     if order == "scattered":
         group.nodes = group.nodes[np.random.default_rng(6).permutation(len(group))]
     pattern = pattern_of(points, [group])
-    results = []
-    for count in (1, 2, 3, 5):
-        threads(count)
-        results.append(assemble_stiffness(points, [group], pattern).data)
-    for other in results[1:]:
-        np.testing.assert_array_equal(other, results[0])
+    same_on_all_threads(lambda: assemble_stiffness(points, [group], pattern).data)
 
 
 @compiled

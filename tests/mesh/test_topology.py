@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernel_threads import same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite.mesh import Block, Faces, components, equal_sets, topology
@@ -97,15 +98,13 @@ def test_both_ways_find_the_same_faces(element, monkeypatch):
 
 @compiled
 def test_results_do_not_depend_on_the_number_of_threads():
-    module, blocks = kernels("mesh"), kl.box(cells=(22, 22, 22)).blocks
-    found = []
-    for count in (1, 2, 3, 5):
-        module.set_threads(count)
+    blocks = kl.box(cells=(22, 22, 22)).blocks
+
+    def compute():
         faces = Faces(blocks)
-        found.append(np.stack([faces.one, faces.other]))
-    module.set_threads(2)
-    for other in found[1:]:
-        np.testing.assert_array_equal(other, found[0])
+        return faces.one, faces.other
+
+    same_on_all_threads(compute)
 
 
 @compiled

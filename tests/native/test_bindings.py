@@ -21,12 +21,13 @@ def diagonal(n=4):
 @pytest.mark.parametrize(
     ("at", "wrong", "said"),
     [
-        (0, np.arange(5), "indptr must be a C-contiguous array of int32, not numpy.ndarray"),
-        (1, [0, 1, 2, 3], "indices must be a C-contiguous array of int32, not list"),
-        (2, np.zeros((3, 3, 8)).T[::2], "data must be a C-contiguous array of float64"),
-        (3, np.ones(12, np.float32), "x must be a C-contiguous array of float64"),
-        (3, np.ones(12, ">f8"), "x must be a C-contiguous array of float64"),
-        (3, None, "x must be a C-contiguous array of float64, not NoneType"),
+        (0, np.arange(5), "indptr must be a C-contiguous, aligned array of int32, not numpy.ndarray"),
+        (1, [0, 1, 2, 3], "indices must be a C-contiguous, aligned array of int32, not list"),
+        (2, np.zeros((3, 3, 8)).T[::2], "data must be a C-contiguous, aligned array of float64"),
+        (3, np.ones(12, np.float32), "x must be a C-contiguous, aligned array of float64"),
+        (3, np.zeros(97, np.uint8)[1:].view(float), "x must be a C-contiguous, aligned array of float64"),
+        (3, np.ones(12, ">f8"), "x must be a C-contiguous, aligned array of float64"),
+        (3, None, "x must be a C-contiguous, aligned array of float64, not NoneType"),
     ],
 )
 def test_an_array_of_another_type_is_refused_by_name(at, wrong, said):
@@ -73,18 +74,20 @@ def test_objects_of_kernels_are_told_apart():
         solver.aggregate(np.zeros((12, 6)), data)
     with pytest.raises(TypeError, match="cannot create"):
         type(matrix)()
+    solver.aggregate(np.ones((12, 6)))
     del matrix  # the arrays live as long as the solver
     gc.collect()
     assert np.isfinite(solver.cycle(x)).all()
 
 
 def test_references_are_given_back():
-    module, (indptr, indices, data, x) = kernels("multigrid"), diagonal()
+    module, (indptr, indices, data, x), modes = kernels("multigrid"), diagonal(), np.ones((12, 6))
 
     def once():
         solver = module.Multigrid(
             module.Matrix(indptr, indices, data), np.zeros(12, np.uint8), np.eye(4, 3), 2, 12.0, 0.0
         )
+        solver.aggregate(modes)
         solver.cycle(x)
         kernels("sparse").multiply(indptr, indices, data, x)
         with pytest.raises(TypeError):

@@ -7,12 +7,9 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from native_models import multigrid
 
-import kratos_lite as kl
-from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.assembly.stiffness import assemble_stiffness
 from kratos_lite.native import kernels
-from kratos_lite.solvers.constraint_map import rigid_modes
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="the signals are those of Unix"),
@@ -46,14 +43,8 @@ def signaled(handle):
 
 def long_solution(n):
     """Return a kernel's solution, without progress, that ends where its residual falls no more."""
-    model = kl.Model(kl.box(cells=(n, n, n)), kl.Isotropic3D(E=1.0, nu=0.3))
-    points, groups = model.mesh.points, model.element_groups()
-    K = assemble_stiffness(points, groups, Pattern(len(points), [group.nodes for group in groups]))
-    module, fixed = kernels("multigrid"), np.repeat(points[:, 2] == 0, 3).astype(np.uint8)
-    solver = module.Multigrid(module.Matrix(K.indptr, K.indices, K.data), fixed, points, 2, 12.0, 0.0, 0)
-    solver.aggregate(rigid_modes(points))
-    b = np.where(fixed, 0.0, 1.0)
-    return lambda: solver.solve(b, 0.0, 0.0, 1_000_000, None)
+    solver, model = multigrid((n, n, n))
+    return lambda: solver.solve(model.b, 0.0, 0.0, 1_000_000, None)
 
 
 def test_signals_are_handled_while_a_kernel_runs_and_change_nothing():

@@ -14,7 +14,7 @@ import numpy as np
 import kratos_lite as kl
 from kratos_lite.native import described, kernels
 
-KERNELS = "gauss inertia lagrange mesh motion multigrid recovery sparse stiffness text".split()
+KERNELS = "gauss inertia lagrange mesh motion multigrid recovery sparse stiffness text threads".split()
 
 
 def gravity_cube(folder: Path, element: str, solver: str) -> None:

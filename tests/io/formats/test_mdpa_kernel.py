@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from kernel_threads import set_threads
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.mdpa import scan
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.mdpa.rows import Layout, _compiled, _exact
 from kratos_lite.io.formats.mdpa.scan import Source
-from kratos_lite.native import kernels, threads
+from kratos_lite.native import kernels
 
 TEXT = kernels("text")
 pytestmark = pytest.mark.skipif(TEXT is None, reason="the kernels are not built")
@@ -84,11 +85,11 @@ def test_pieces_and_threads():
     expected = _exact(Source("a", data), span, layout)
     try:
         for count in (1, 2, 3, 5):
-            TEXT.set_threads(count)
+            set_threads(count)
             same(_compiled(Source("a", data), span, layout), expected)
             assert _compiled(Source("a", data + b" x"), (11, len(data) + 2), layout) is None
     finally:
-        TEXT.set_threads(threads())
+        set_threads()
 
 
 def test_words_are_found_as_python_finds_them(monkeypatch):
