@@ -1,6 +1,7 @@
-"""Run the tests of the kernels with address and undefined-behavior sanitizers.
+"""Run the tests of the kernels with sanitizers of GCC; kernels are built into a temporary folder.
 
-``python -m tests.native.sanitize [pytest arguments]`` needs GCC; kernels are built into a temporary folder.
+``python -m tests.native.sanitize memory [pytest arguments]``: addresses and undefined behavior;
+``python -m tests.native.sanitize threads [pytest arguments]``: races between threads.
 """
 
 import os
@@ -13,7 +14,20 @@ from pathlib import Path
 from tests.native.build import build
 
 ROOT = Path(__file__).parents[2]
-FLAGS = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+FLAGS = ("-O1", "-g", "-fno-omit-frame-pointer")
+KINDS = {
+    "memory": (
+        ("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+        ("libasan.so", "libubsan.so"),
+        {"ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1", "UBSAN_OPTIONS": "print_stacktrace=1"},
+    ),
+    "threads": (
+        ("-fsanitize=thread",),
+        ("libtsan.so",),
+        {"TSAN_OPTIONS": "halt_on_error=1", "KRATOS_LITE_THREADS": "4", "OPENBLAS_NUM_THREADS": "1"},
+    ),
+}
+"""Flags of the compiler, libraries to load first, and variables of the environment."""
 TESTS = [
     "tests/native",
     "tests/ale/test_kernel.py",
@@ -28,23 +42,28 @@ TESTS = [
 """What runs if nothing else is asked for."""
 
 
-def main(arguments: list[str]) -> int:
+def main(kind: str = "memory", *arguments: str) -> int:
     """Build, run, and return the exit code of pytest."""
+    flags, libraries, options = KINDS[kind]
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
-        for name in ("kratos_lite", "tests"):
+        for name in ("kratos_lite", "tests", "examples", "docs", "benchmarks"):
             shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("*.so", "__pycache__"))
         shutil.copy(ROOT / "pyproject.toml", copy)
         native = copy / "kratos_lite" / "native"
-        build(sorted(native.glob("*.cpp")), native, *FLAGS)
-        environment = {
-            **os.environ,
-            "PYTHONPATH": folder,
-            "LD_PRELOAD": " ".join(map(library, ("libasan.so", "libubsan.so"))),
-            "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",
-            "UBSAN_OPTIONS": "print_stacktrace=1",
-        }
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *(arguments or TESTS)]
+        build(sorted(native.glob("*.cpp")), native, *FLAGS, *flags)
+        preload = " ".join(map(library, libraries))
+        environment = {**os.environ, **options, "PYTHONPATH": folder, "LD_PRELOAD": preload}
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "--capture=sys",
+            "-p",
+            "no:cacheprovider",
+            *(arguments or TESTS),
+        ]
         return subprocess.run(command, cwd=folder, env=environment, check=False).returncode
 
 
@@ -55,4 +74,4 @@ def library(name: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(*sys.argv[1:]))
