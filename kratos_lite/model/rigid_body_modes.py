@@ -7,11 +7,14 @@ and joints are the equations that these must meet.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from kratos_lite.errors import MAX_PROBLEMS, ModelError
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import NO_ROWS, Mesh, components, distinct
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
+from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.supports import Supports
 from kratos_lite.records import record
 from kratos_lite.solvers import direct
@@ -26,31 +29,31 @@ SOFT = 1e-13
 """Share of the largest squared singular value that is added to those of many bodies."""
 PASSES, PROBES = 12, 12
 """Passes that leave of a motion nothing but what is free, and motions at random that make them."""
+REST = 1e-6
+"""What these passes leave at most of a motion of size 1 that is not free."""
 
 
-def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) -> Ints:
-    """Raise ModelError that names the rigid modes which the supports leave free, part by part.
-
-    Return the number of the part of each node (n,), -1 for nodes without elements: parts are bodies
-    that neither nodes nor constraints tie to others.
-    """
+def free_motions(
+    mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup], found: Bodies | None = None
+) -> FreeMotions:
+    """Return the rigid motions that the supports leave free, part by part."""
     found = found or bodies(mesh)
     frames = found.frames(mesh)
     equations = _equations(mesh, found, supports)
     if mesh.subdomain is not None:
         equations = _of_all_ranks(mesh, frames, equations)
     group_of = _groups(len(frames[0]), equations)
-    problems: list[tuple[int, str]] = []
-    hanging = np.concatenate(found.joined(mesh)[:2]) if found.count > 1 else NO_ROWS
+    found_modes: list[tuple[Ints, list[Array]]] = []
     for group, mine in zip(*_by_group(group_of, equations), strict=True):
-        modes = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
-        problems += _name_modes(group, modes, hanging)
-        if len(problems) >= MAX_PROBLEMS:
-            break
-    if problems:
-        shown = "; ".join(_sentences(mesh, found, problems[:MAX_PROBLEMS]))
-        raise ModelError(f"the supports leave rigid-body modes free: {shown}. Fix more nodes or components")
-    return np.where(found.part >= 0, group_of[found.part], -1)
+        free = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
+        found_modes.append((group, free))
+    counts = np.array([free[0].shape[1] for _, free in found_modes], dtype=np.int64)
+    modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
+    for group, free in found_modes:
+        modes[group, :, : free[0].shape[1]] = free
+    if modes.size:  # the same basis on all ranks
+        modes = mesh.ranks.gather(modes)[0]
+    return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
 
 
 @record(frozen=True)
@@ -201,52 +204,5 @@ def _free_modes_of_many(
     motions = np.random.default_rng(0).standard_normal((n, PROBES))
     for _ in range(PASSES):
         motions = small * np.column_stack([factors.solve(motion) for motion in motions.T])
-    return list(motions.reshape(-1, 6, PROBES))
-
-
-def _name_modes(group: Ints, modes: list[Array], hanging: Ints) -> list[tuple[int, str]]:
-    """Return body and free motions of each that can still move, for as many as are shown."""
-    named: list[tuple[int, str]] = []
-    for p, free in zip(group.tolist(), modes, strict=True):
-        if len(named) < MAX_PROBLEMS and (words := _motions(free)):
-            hangs = len(group) > 1 and (hanging == p).any()
-            named.append((p, words + (" (it hangs on a node or an edge only)" if hangs else "")))
-    return named
-
-
-def _sentences(mesh: Mesh, found: Bodies, problems: list[tuple[int, str]]) -> list[str]:
-    """Return a sentence for each body that can still move."""
-    count, first = found.described(mesh)
-    return [
-        f"the {'body' if found.count == 1 else f'part of node {first[p]}'} ({count[p]} nodes) "
-        f"can still move: {words}"
-        for p, words in problems
-    ]
-
-
-def _motions(free: Array) -> str:
-    """Name the span of free modes (6, k): translations and rotations, by axis where they are along one."""
-    if not free.size or np.abs(free).max() < 1e-9:
-        return ""
-    U, values, _ = np.linalg.svd(free, full_matrices=False)
-    span = U[:, values > 1e-6]
-    rotation = np.linalg.svd(span[3:])
-    turning = rotation[1] > 1e-6 if span.shape[1] else np.zeros(0, dtype=bool)
-    n_turn = int(turning.sum())
-    still = span @ rotation[2].T[:, n_turn:]
-    words = []
-    if still.shape[1]:
-        words.append("translation " + _axes(still[:3]))
-    if n_turn:
-        words.append("rotation about " + _axes(rotation[0][:, :n_turn]))
-    return "; ".join(words)
-
-
-def _axes(directions: Array) -> str:
-    """Name a span of directions (3, k): by letters if it is spanned by axes, else by vectors."""
-    Q, _ = np.linalg.qr(directions)
-    inside = (Q**2).sum(axis=1) > 1 - 1e-6
-    if inside.sum() == Q.shape[1]:
-        return ", ".join(letter for letter, yes in zip("xyz", inside, strict=True) if yes)
-    named = [np.round(q / np.abs(q).max(), 9) + 0.0 for q in Q.T]
-    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q) + ")" for q in named)
+    span, size, _ = np.linalg.svd(motions, full_matrices=False)
+    return list(span[:, size > REST].reshape(len(group), 6, -1))
