@@ -162,7 +162,7 @@ def test_bodies_apart_balance_each_for_itself():
 
 @pytest.mark.parametrize("solver", ["dense", "direct", "amg"])
 def test_bodies_that_constraints_tie_balance_as_one(solver):
-    model, _ = bars()
+    model, n = bars()
     left, right = (model.mesh.nodes(where) for where in ends(4, 3))
     for slave, master in zip(left.tolist(), right.tolist(), strict=True):
         for axis in "xyz":
@@ -170,6 +170,12 @@ def test_bodies_that_constraints_tie_balance_as_one(solver):
     pull(model, 1e6, ends(0, 7))
     result = model.solve(solver)
     near(result.stress("element"), np.tile([1e6, 0, 0, 0, 0, 0], (24, 1)))
+    as_one = model.mesh.points.copy()
+    as_one[n:] -= (1, 0, 2)
+    near(result.u, stretched(as_one))
+    model.add_prestress(np.random.default_rng(0).standard_normal((24, 6)) * 1e6)
+    glued = kl.Model(model.mesh.replace(points=as_one), STEEL)
+    assert np.abs(shared(glued, model.solve(solver).u)).max() < 1e-9
     assert "rotation about x, y, z; the part of node 37 (36 nodes) can still" in result.report.notes[0]
     model.add(kl.PointLoad([40], (0, 1e-3, 0)))
     with pytest.raises(kl.ModelError, match=r"together they are \(0 0.001 0\) N"):
