@@ -22,7 +22,7 @@ from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 FREE = 1e-7
-"""Singular value, as a share of the largest, up to which a rigid mode is free."""
+"""Singular value, as a share of the largest and of 1, the size of an equation, up to which a mode is free."""
 SAMPLE = 48
 """_Constraints for each body that are looked at first: a few of very many show that nothing is free."""
 SOFT = 1e-13
@@ -147,7 +147,7 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
         if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
             return [np.zeros((6, 0))] * len(group)
     values, directions = _spectrum(mesh, frames, group, equations, row)
-    free = directions[values <= FREE * max(float(values.max(initial=0)), np.finfo(float).tiny)].T
+    free = directions[values <= FREE * values.max(initial=1.0)].T
     return [free[6 * i : 6 * i + 6] for i in range(len(group))]
 
 
@@ -157,8 +157,6 @@ def _spectrum(
     """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
-    if equations.on_modes is None:  # of all ranks, they are scaled already
-        C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
     return values, directions
@@ -170,14 +168,21 @@ def _columns(group: Ints, equations: _Constraints) -> Ints:
 
 
 def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> Array:
-    """Return what the six modes of its body are in each entry of equations, (k, 6)."""
+    """Return what the six modes of its body are in each entry (k, 6), 1 at most in each equation.
+
+    Entries are scaled before they are summed up: what hanging nodes leave of a rotation, rounding, stays small.
+    """
     if equations.on_modes is not None:
         return equations.on_modes
     node, axis = np.divmod(equations.dof, 3)
     R = rigid_modes(mesh.points[node], frames[0][equations.body]).reshape(-1, 3, 6)
     R = R[np.arange(len(R)), axis]
     R[:, 3:] /= frames[1][equations.body, None]
-    return np.asarray(R * equations.weight[:, None])
+    R *= equations.weight[:, None]
+    row = np.searchsorted(distinct(equations.row), equations.row)
+    largest = np.zeros(int(row.max(initial=-1)) + 1)
+    np.maximum.at(largest, row, np.abs(R).max(axis=1))
+    return np.asarray(R / np.maximum(largest, np.finfo(float).tiny)[row, None])
 
 
 def _free_modes_of_many(
@@ -187,19 +192,15 @@ def _free_modes_of_many(
 
     Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
     """
-    from scipy.sparse import csr_array, diags_array, eye_array
+    from scipy.sparse import csr_array, eye_array
 
     row = np.searchsorted(distinct(equations.row), equations.row)
     count, n = int(row.max()) + 1, 6 * len(group)
     value = _on_modes(mesh, frames, equations)
-    largest = np.zeros(count)
-    np.maximum.at(largest, row, np.abs(value).max(axis=1) if equations.on_modes is None else 1.0)
     places = np.repeat(row, 6), _columns(group, equations).ravel()
-    C = diags_array(1 / np.maximum(largest, np.finfo(float).tiny)) @ csr_array(
-        (value.ravel(), places), shape=(count, n)
-    )
+    C = csr_array((value.ravel(), places), shape=(count, n))
     gram = csr_array(C.T @ C)
-    small = SOFT * float(abs(gram).sum(axis=0).max())
+    small = SOFT * max(float(abs(gram).sum(axis=0).max()), 1.0)
     factors = direct.factorize(csr_array(gram + small * eye_array(n)))
     motions = np.random.default_rng(0).standard_normal((n, PROBES))
     for _ in range(PASSES):
