@@ -170,7 +170,7 @@ def _columns(group: Ints, equations: _Constraints) -> Ints:
 def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> Array:
     """Return what the six modes of its body are in each entry (k, 6), 1 at most in each equation.
 
-    Entries are scaled before they are summed up: what hanging nodes leave of a rotation, rounding, stays small.
+    Entries are scaled before they are summed up, so that rounding, which hanging nodes leave, stays small.
     """
     if equations.on_modes is not None:
         return equations.on_modes
