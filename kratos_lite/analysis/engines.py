@@ -10,7 +10,7 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
-from kratos_lite.typing import Array, Progress
+from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import choice
 
 if TYPE_CHECKING:
@@ -85,19 +85,23 @@ def check_whole(mesh: Mesh, what: str) -> None:
 def system_of(
     model: Structure,
     groups: Sequence[ElementGroup],
+    held: Mask,
     solver: str,
     tolerance: float,
     progress: Progress | None,
     engine: str,
     petsc: str | None,
 ) -> System:
-    """Return the constrained system of some elements of a model, for an engine."""
+    """Return the constrained system of some elements of a model, for an engine.
+
+    Components `held` (n, 3) of what supports leave free are 0, too.
+    """
     supports = model.supports
     if engine == "own":
         return ConstrainedSystem(
             model.mesh.points,
             groups,
-            supports.constraint_map,
+            lambda nodes: supports.constraint_map(nodes).holding(held[nodes]),
             solver=solver,
             tolerance=tolerance,
             patterns=model.patterns,
@@ -106,9 +110,9 @@ def system_of(
         )
     from kratos_lite.distributed.petsc_system import PetscSystem, Prescribed
 
-    held = Prescribed(supports.fixed, supports.values, supports.turned(agree=True), supports.name)
+    given = Prescribed(supports.fixed | held, supports.values, supports.turned(agree=True), supports.name)
     return PetscSystem(
-        model.mesh, groups, held, solver=solver, tolerance=tolerance, options=petsc, progress=progress
+        model.mesh, groups, given, solver=solver, tolerance=tolerance, options=petsc, progress=progress
     )
 
 

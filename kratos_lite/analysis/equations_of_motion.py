@@ -14,7 +14,7 @@ from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
-from kratos_lite.model.rigid_body_modes import check_supports
+from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
@@ -73,7 +73,9 @@ class EquationsOfMotion:
         self.model, self._steady = model, steady
         self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)
-        self.groups, _, self.warnings = model.checked(free=free)
+        self.groups, self.warnings = model.checked()
+        if not free:
+            self.free_motions.check((), moving=False)
         for group in self.groups:
             if not (massless or group.material.density > 0):
                 raise ModelError(
@@ -184,10 +186,12 @@ class EquationsOfMotion:
     def stiffening(self) -> Array:
         """Stiffness by the stress of the centrifugal load for the rate 1, data (nnz,) in kg/s²."""
         assert self.terms is not None
-        reduced = self.system.reduced
-        equations = LinearSolver(self.K, reduced, self.system.points, "direct", "")
-        at_zero = np.zeros_like(reduced.c)
-        u0 = equations.solve(self.terms.centrifugal.ravel(), 1e-12, self.system.progress, at_zero).x
+        system, load = self.system, self.system.scatter(self.terms.centrifugal.ravel())
+        cure = "let it turn about a principal axis through its center of mass"
+        self.free_motions.check([load], moving=True, cure=cure)
+        held = system.reduced.holding(self.free_motions.held[system.nodes])
+        equations = LinearSolver(self.K, held, system.points, "direct", "")
+        u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
     @cached_property
@@ -263,13 +267,9 @@ class EquationsOfMotion:
         return self.terms.motion.center_rates(time, self.step, self._steady)
 
     @cached_property
-    def free_motions(self) -> str:
-        """What the supports leave free of rigid motions; empty where they hold all."""
-        try:
-            check_supports(self.model.mesh, self.model.supports)
-        except ModelError as error:
-            return str(error).removeprefix("the supports leave rigid-body modes free: ")
-        return ""
+    def free_motions(self) -> FreeMotions:
+        """What the supports leave free of rigid motions."""
+        return self.model.free_motions(self.groups)
 
     def is_symmetric(self, time: float, c: float) -> bool:
         """Return whether a matrix with the share c of damping is symmetric at a time."""

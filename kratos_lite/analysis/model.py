@@ -195,6 +195,28 @@ class Model(Structure):
             finally:
                 analysis.release()
 
+    def check(self) -> list[str]:
+        """Check the model with its loads as a solution does, without solving.
+
+        Returns
+        -------
+        Warnings of the model, one sentence each.
+
+        Raises
+        ------
+        MeshError, ModelError, InputError
+            With every element or part that is wrong.
+        """
+        if self.motion is not None:
+            from kratos_lite.analysis.equations_of_motion import EquationsOfMotion  # as above
+
+            equations = EquationsOfMotion(self, free=False, steady=True)
+            equations.load(0.0)
+            return equations.warnings
+        analysis = StaticAnalysis(self)
+        analysis.check()
+        return analysis.warnings
+
     def transient(self, **options: Any) -> TransientAnalysis:
         """Return the transient analysis of the model.
 

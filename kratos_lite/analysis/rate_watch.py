@@ -33,7 +33,7 @@ class RateWatch:
         self._done = e.terms is None or not free or (e.terms.motion.steady and not e.rates(0.0)[0])
         if e.terms is None or self._done:
             return
-        if free <= DIRECT_MAX and not e.free_motions:
+        if free <= DIRECT_MAX and not e.free_motions.any:
             self.critical = self.of_mesh = float(critical_rates(e, 1)[0])
         else:
             self.critical = critical_rate_estimate(e.terms)

@@ -68,7 +68,7 @@ class StaticAnalysis:
     Raises
     ------
     MeshError, ModelError, InputError
-        The structure is broken, its supports leave rigid-body modes free, or it has a motion.
+        The structure is broken, or it has a motion.
     """
 
     def __init__(
@@ -118,7 +118,8 @@ class StaticAnalysis:
         Raises
         ------
         MeshError, ModelError, InputError
-            A load does not fit, or a change of the model has broken it.
+            A load does not fit, does not balance where supports leave rigid-body modes free, or a change of
+            the model has broken it.
         SolveError
             If the accuracy asked for cannot be reached.
         """
@@ -145,7 +146,8 @@ class StaticAnalysis:
         """
         with self.ranks.together():
             self._follow()
-            return self._warnings(self._load(self.model.loads))
+            case = self._load(self.model.loads)
+            return self._warnings(case) + self.free.notes(case.moving)
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
@@ -165,8 +167,10 @@ class StaticAnalysis:
         self._version: tuple[int, int] | None = None
         with self._phase("check"):
             version = model.version
-            self.groups, self.part, self.warnings = model.checked()
+            self.groups, self.warnings = model.checked()
             self.kinds = model.kinds(self.groups)
+            self.free = model.free_motions(self.groups)
+            self.part = self.free.part
             self._used = self.part >= 0
             self._n_used, self._n_unused = self._count(self._used), self._count(~self._used)
             self._read_supports()
@@ -223,11 +227,12 @@ class StaticAnalysis:
             acts = forces != 0
             checks.check_carried(mesh, forces, self._used)
             moving = self._parts_with(_any_axis(acts & ~fixed) | self._moved)
+            self.free.check((load.forces(mesh, self.groups) for load in loads), moving)
         return LoadSet(loads, external, forces, moving, phase)
 
     def _parts_with(self, nodes: Mask) -> Mask:
         """Return the parts with one of some own nodes, a mask (n,)."""
-        parts = np.zeros(self.ranks.max(int(self.part.max(initial=-1))) + 1, dtype=bool)
+        parts = np.zeros(len(self.free.counts), dtype=bool)
         parts[self.part[nodes & self._used & self.model.mesh.own_nodes]] = True
         found: Mask = self.ranks.any(parts)
         return found
@@ -244,7 +249,7 @@ class StaticAnalysis:
             solved = moving if self.system is None else moving | self._solved
             parts = solved[self.part] & self._used
             every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
-            how = self.solver, self.tolerance, self.progress, self.engine, self.petsc
+            how = self.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
             system = system_of(model, groups, *how)  # which may be refused; the one before stays then
             self.release()
             self.system = system
@@ -272,7 +277,7 @@ class StaticAnalysis:
             with phase("solve"):
                 u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
                 warnings += system.warnings
-                u = self._complete(u, system, case.moving)
+                u = self.free.without(self._complete(u, system, case.moving))
                 noise *= self.ranks.max(float(np.abs(u).max(initial=0.0)))
         with phase("verify"):
             if case.moving.any():
@@ -321,7 +326,7 @@ class StaticAnalysis:
             A motion is given, and nothing is prescribed there.
         """
         self._follow()
-        supports = self.model.supports
+        supports, load = self.model.supports, self.free.balanced(load)
         moved = np.where(supports.fixed, motion, 0.0)
         motions = self.ranks.any(np.array([motion.any(), moved.any()]))
         if motions[0] and not motions[1]:
@@ -350,7 +355,7 @@ class StaticAnalysis:
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
-            notes=self.model.remarks(),
+            notes=[*self.model.remarks(), *self.free.notes(case.moving)],
             skipped=self._skipped(case.moving),
             formulation=self.model.chosen(self.kinds),
         )

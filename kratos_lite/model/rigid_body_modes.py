@@ -7,11 +7,14 @@ and joints are the equations that these must meet.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from kratos_lite.errors import MAX_PROBLEMS, ModelError
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import NO_ROWS, Mesh, components, distinct
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
+from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.supports import Supports
 from kratos_lite.records import record
 from kratos_lite.solvers import direct
@@ -19,38 +22,38 @@ from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
 
 FREE = 1e-7
-"""Singular value, as a share of the largest, up to which a rigid mode is free."""
+"""Singular value, as a share of the largest and of 1, the size of an equation, up to which a mode is free."""
 SAMPLE = 48
 """_Constraints for each body that are looked at first: a few of very many show that nothing is free."""
 SOFT = 1e-13
 """Share of the largest squared singular value that is added to those of many bodies."""
 PASSES, PROBES = 12, 12
 """Passes that leave of a motion nothing but what is free, and motions at random that make them."""
+REST = 1e-6
+"""What these passes leave at most of a motion of size 1 that is not free."""
 
 
-def check_supports(mesh: Mesh, supports: Supports, found: Bodies | None = None) -> Ints:
-    """Raise ModelError that names the rigid modes which the supports leave free, part by part.
-
-    Return the number of the part of each node (n,), -1 for nodes without elements: parts are bodies
-    that neither nodes nor constraints tie to others.
-    """
+def free_motions(
+    mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup], found: Bodies | None = None
+) -> FreeMotions:
+    """Return the rigid motions that the supports leave free, part by part."""
     found = found or bodies(mesh)
     frames = found.frames(mesh)
     equations = _equations(mesh, found, supports)
     if mesh.subdomain is not None:
         equations = _of_all_ranks(mesh, frames, equations)
     group_of = _groups(len(frames[0]), equations)
-    problems: list[tuple[int, str]] = []
-    hanging = np.concatenate(found.joined(mesh)[:2]) if found.count > 1 else NO_ROWS
+    found_modes: list[tuple[Ints, list[Array]]] = []
     for group, mine in zip(*_by_group(group_of, equations), strict=True):
-        modes = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
-        problems += _name_modes(group, modes, hanging)
-        if len(problems) >= MAX_PROBLEMS:
-            break
-    if problems:
-        shown = "; ".join(_sentences(mesh, found, problems[:MAX_PROBLEMS]))
-        raise ModelError(f"the supports leave rigid-body modes free: {shown}. Fix more nodes or components")
-    return np.where(found.part >= 0, group_of[found.part], -1)
+        free = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
+        found_modes.append((group, free))
+    counts = np.array([free[0].shape[1] for _, free in found_modes], dtype=np.int64)
+    modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
+    for group, free in found_modes:
+        modes[group, :, : free[0].shape[1]] = free
+    if modes.size:  # the same basis on all ranks
+        modes = mesh.ranks.gather(modes)[0]
+    return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
 
 
 @record(frozen=True)
@@ -144,7 +147,7 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
         if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
             return [np.zeros((6, 0))] * len(group)
     values, directions = _spectrum(mesh, frames, group, equations, row)
-    free = directions[values <= FREE * max(float(values.max(initial=0)), np.finfo(float).tiny)].T
+    free = directions[values <= FREE * values.max(initial=1.0)].T
     return [free[6 * i : 6 * i + 6] for i in range(len(group))]
 
 
@@ -154,8 +157,6 @@ def _spectrum(
     """Return singular values and right singular vectors of equations, by number `row`, on rigid modes."""
     C = np.zeros((int(row.max(initial=-1)) + 1, 6 * len(group)))
     np.add.at(C, (row[:, None], _columns(group, equations)), _on_modes(mesh, frames, equations))
-    if equations.on_modes is None:  # of all ranks, they are scaled already
-        C /= np.maximum(np.abs(C).max(axis=1, keepdims=True, initial=0), np.finfo(float).tiny)
     triangle = np.linalg.qr(np.vstack([C, np.zeros((C.shape[1], C.shape[1]))]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
     return values, directions
@@ -167,14 +168,21 @@ def _columns(group: Ints, equations: _Constraints) -> Ints:
 
 
 def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> Array:
-    """Return what the six modes of its body are in each entry of equations, (k, 6)."""
+    """Return what the six modes of its body are in each entry (k, 6), 1 at most in each equation.
+
+    Entries are scaled before they are summed up, so that rounding, which hanging nodes leave, stays small.
+    """
     if equations.on_modes is not None:
         return equations.on_modes
     node, axis = np.divmod(equations.dof, 3)
     R = rigid_modes(mesh.points[node], frames[0][equations.body]).reshape(-1, 3, 6)
     R = R[np.arange(len(R)), axis]
     R[:, 3:] /= frames[1][equations.body, None]
-    return np.asarray(R * equations.weight[:, None])
+    R *= equations.weight[:, None]
+    row = np.searchsorted(distinct(equations.row), equations.row)
+    largest = np.zeros(int(row.max(initial=-1)) + 1)
+    np.maximum.at(largest, row, np.abs(R).max(axis=1))
+    return np.asarray(R / np.maximum(largest, np.finfo(float).tiny)[row, None])
 
 
 def _free_modes_of_many(
@@ -184,69 +192,18 @@ def _free_modes_of_many(
 
     Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
     """
-    from scipy.sparse import csr_array, diags_array, eye_array
+    from scipy.sparse import csr_array, eye_array
 
     row = np.searchsorted(distinct(equations.row), equations.row)
     count, n = int(row.max()) + 1, 6 * len(group)
     value = _on_modes(mesh, frames, equations)
-    largest = np.zeros(count)
-    np.maximum.at(largest, row, np.abs(value).max(axis=1) if equations.on_modes is None else 1.0)
     places = np.repeat(row, 6), _columns(group, equations).ravel()
-    C = diags_array(1 / np.maximum(largest, np.finfo(float).tiny)) @ csr_array(
-        (value.ravel(), places), shape=(count, n)
-    )
+    C = csr_array((value.ravel(), places), shape=(count, n))
     gram = csr_array(C.T @ C)
-    small = SOFT * float(abs(gram).sum(axis=0).max())
+    small = SOFT * max(float(abs(gram).sum(axis=0).max()), 1.0)
     factors = direct.factorize(csr_array(gram + small * eye_array(n)))
     motions = np.random.default_rng(0).standard_normal((n, PROBES))
     for _ in range(PASSES):
         motions = small * np.column_stack([factors.solve(motion) for motion in motions.T])
-    return list(motions.reshape(-1, 6, PROBES))
-
-
-def _name_modes(group: Ints, modes: list[Array], hanging: Ints) -> list[tuple[int, str]]:
-    """Return body and free motions of each that can still move, for as many as are shown."""
-    named: list[tuple[int, str]] = []
-    for p, free in zip(group.tolist(), modes, strict=True):
-        if len(named) < MAX_PROBLEMS and (words := _motions(free)):
-            hangs = len(group) > 1 and (hanging == p).any()
-            named.append((p, words + (" (it hangs on a node or an edge only)" if hangs else "")))
-    return named
-
-
-def _sentences(mesh: Mesh, found: Bodies, problems: list[tuple[int, str]]) -> list[str]:
-    """Return a sentence for each body that can still move."""
-    count, first = found.described(mesh)
-    return [
-        f"the {'body' if found.count == 1 else f'part of node {first[p]}'} ({count[p]} nodes) "
-        f"can still move: {words}"
-        for p, words in problems
-    ]
-
-
-def _motions(free: Array) -> str:
-    """Name the span of free modes (6, k): translations and rotations, by axis where they are along one."""
-    if not free.size or np.abs(free).max() < 1e-9:
-        return ""
-    U, values, _ = np.linalg.svd(free, full_matrices=False)
-    span = U[:, values > 1e-6]
-    rotation = np.linalg.svd(span[3:])
-    turning = rotation[1] > 1e-6 if span.shape[1] else np.zeros(0, dtype=bool)
-    n_turn = int(turning.sum())
-    still = span @ rotation[2].T[:, n_turn:]
-    words = []
-    if still.shape[1]:
-        words.append("translation " + _axes(still[:3]))
-    if n_turn:
-        words.append("rotation about " + _axes(rotation[0][:, :n_turn]))
-    return "; ".join(words)
-
-
-def _axes(directions: Array) -> str:
-    """Name a span of directions (3, k): by letters if it is spanned by axes, else by vectors."""
-    Q, _ = np.linalg.qr(directions)
-    inside = (Q**2).sum(axis=1) > 1 - 1e-6
-    if inside.sum() == Q.shape[1]:
-        return ", ".join(letter for letter, yes in zip("xyz", inside, strict=True) if yes)
-    named = [np.round(q / np.abs(q).max(), 9) + 0.0 for q in Q.T]
-    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q) + ")" for q in named)
+    span, size, _ = np.linalg.svd(motions, full_matrices=False)
+    return list(span[:, size > REST].reshape(len(group), 6, -1))

@@ -83,12 +83,11 @@ def compressed(row: Ints, body: Ints, values: Array) -> list[tuple[tuple[int, ..
 
 
 def _triangle(members: tuple[int, ...], chosen: Ints, at: Ints, body: Ints, values: Array) -> Array:
-    """Return R of C = Q R, with C the chosen equations, each scaled to 1, on the modes of their bodies."""
+    """Return R of C = Q R, with C the chosen equations on the modes of their bodies."""
     place = np.full(int(at.max()) + 1, -1)
     place[chosen] = np.arange(len(chosen))
     mine = np.flatnonzero(place[at] >= 0)
     C = np.zeros((len(chosen), 6 * len(members)))
     columns = 6 * np.searchsorted(members, body[mine])[:, None] + np.arange(6)
     np.add.at(C, (place[at[mine]][:, None], columns), values[mine])
-    C /= np.maximum(np.abs(C).max(axis=1, keepdims=True), np.finfo(float).tiny)
     return np.asarray(np.linalg.qr(C, mode="r"))

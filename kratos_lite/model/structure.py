@@ -13,13 +13,14 @@ from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.model import checks, connected_bodies
-from kratos_lite.model import rigid_body_modes as rigid_body_mode_check
+from kratos_lite.model import checks
 from kratos_lite.model.coincident_nodes import check_coincident
 from kratos_lite.model.equal import key_of
+from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.joints import check_joints
 from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
+from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.supported_solid import SupportedSolid
 from kratos_lite.records import Tabular
 from kratos_lite.time_series import Factor
@@ -216,34 +217,12 @@ class Structure(SupportedSolid, Tabular):
 
     # ---- checks -------------------------------------------------------------------------------
 
-    def check(self) -> list[str]:
-        """Check the model as a static solution does, without solving.
+    def checked(self) -> tuple[list[ElementGroup], list[str]]:
+        """Return what a solution starts from, of a model that passes all checks but that of `free_motions`.
 
         Returns
         -------
-        Warnings, one sentence each.
-
-        Raises
-        ------
-        MeshError, ModelError, InputError
-            With every element or part that is wrong.
-        """
-        with self.mesh.ranks.together():
-            return self.checked()[2]
-
-    def checked(self, *, free: bool = False) -> tuple[list[ElementGroup], NDArray[np.int64], list[str]]:
-        """Return what a static solution starts from, of a model that passes all checks.
-
-        Parts are numbered from 0; they share neither nodes nor constraints.  Nodes without elements have -1.
-
-        Parameters
-        ----------
-        free : let rigid-body modes be free, as inertia holds what supports do not; then there is one part.
-
-        Returns
-        -------
-        Element groups, the part of each node (n,), and warnings.  Over ranks, the groups are those of one,
-        the warnings those of all.
+        Element groups and warnings.  Over ranks, the groups are those of one, the warnings those of all.
 
         Raises
         ------
@@ -270,12 +249,21 @@ class Structure(SupportedSolid, Tabular):
 
             check_spurious_modes(mesh, groups, self.supports, faces)
         warnings += _without_elements(mesh, used)
-        part: NDArray[np.int64] = np.where(used, 0, -1)
-        if not free:
-            bodies = connected_bodies.bodies(mesh, faces)
-            part = rigid_body_mode_check.check_supports(mesh, self.supports, bodies)
         self.supports.check_used(used)
-        return groups, part, warnings
+        return groups, warnings
+
+    def free_motions(self, groups: list[ElementGroup]) -> FreeMotions:
+        """Return the rigid motions that supports leave free, part by part.
+
+        Parameters
+        ----------
+        groups : the elements, as `checked` returns them.
+
+        Returns
+        -------
+        FreeMotions
+        """
+        return free_motions(self.mesh, self.supports, groups)
 
     def remarks(self) -> list[str]:
         """Return what readers of files noted, and constants of materials that no engineering material has.

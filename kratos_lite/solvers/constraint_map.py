@@ -57,6 +57,11 @@ class ConstraintMap:
     c: Array
     T: csr_array[Any, Any] | None = None
 
+    def holding(self, held: Mask) -> ConstraintMap:
+        """Return the map with some of the free ones (N,) held, too, where they are at q = 0."""
+        keep = ~held.ravel()[self.free]
+        return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
+
     def transform(self, q: NDArray[Any]) -> NDArray[Any]:
         """Return T q, (N, ...), of the free degrees of freedom (q, ...): without what is prescribed."""
         if self.T is not None:

@@ -419,6 +419,18 @@ MUTATIONS = [
     ),
     # ---- supports, mass
     Mutation(
+        "model/free_motions.py",
+        "return values - (taken @ shares",
+        "return values + (taken @ shares",
+        "tests/analysis/test_free_bodies.py",
+    ),
+    Mutation(
+        "model/free_motions.py",
+        "R[..., 3:] /= size[body, None, None]",
+        "R[..., 3:] *= size[body, None, None]",
+        "tests/analysis/test_free_bodies.py",
+    ),
+    Mutation(
         "solvers/constraint_map.py", "constant += weight * offset", "constant -= weight * offset", SUPPORTS
     ),
     Mutation(

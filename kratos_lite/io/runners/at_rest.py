@@ -11,14 +11,10 @@ from kratos_lite.typing import Progress
 def check(case: Case) -> list[str]:
     """Return the warnings of the model, checked as its solution does."""
     model = case.model
-    if model.motion is None:
-        analysis = StaticAnalysis(model, case.solver, case.tolerance, engine=case.engine, petsc=case.petsc)
-        return analysis.check()
-    from kratos_lite.analysis.equations_of_motion import EquationsOfMotion  # statics start quicker without it
-
-    equations = EquationsOfMotion(model, free=False, steady=True)
-    equations.load(0.0)
-    return equations.warnings
+    if model.motion is not None:
+        return model.check()
+    analysis = StaticAnalysis(model, case.solver, case.tolerance, engine=case.engine, petsc=case.petsc)
+    return analysis.check()
 
 
 def run(case: Case, progress: Progress | None = None) -> Outcome:

@@ -115,7 +115,8 @@ class _Summary:
             rows.insert(4, ("damping", "{:g} 1/s × M + {:g} s × K".format(*e.rayleigh)))
         rows += self.transient.result(self.last).report.motion_rows()
         still = [] if self.largest else ["no load, no support that moves and no velocity: nothing moves"]
-        still += [f"rigid motions are held by inertia alone: {e.free_motions}"] if e.free_motions else []
+        if free := e.free_motions.described():
+            still.append(f"rigid motions are held by inertia alone: {free}")
         report = self.transient.result(self.farthest).report
         rows += [("warning", text) for text in (*report.warnings, *still)]
         return rows + [("note", text) for text in report.notes]

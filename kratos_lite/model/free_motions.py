@@ -1,0 +1,258 @@
+"""Free motions: the rigid ones that supports leave to parts of a model, and solutions without them.
+
+K alone resists no rigid motion R of a part that is free: K u = f has a solution where the load f does no work
+on any, R^T f = 0, and then one for each rigid motion that is added.  So many components of the displacement
+as there are free motions are held, at which nothing reacts as the load balances; then the free motions are
+taken out of u, which is the one with ∫ R^T u dV = 0.
+
+Source: Farhat & Géradin, Int. J. Numer. Meth. Eng. 41 (1998) 675-696.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.errors import MAX_PROBLEMS, ModelError
+from kratos_lite.mesh import NO_ROWS, Mesh
+from kratos_lite.model.connected_bodies import Bodies
+from kratos_lite.model.supports import Supports
+from kratos_lite.records import record
+from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.typing import Array, Ints, Mask
+
+ROUND_OFF, OF_PLACES = 1e4, 10.0
+"""Roundings that the work of a balanced load on a motion R may be, beside the sum of |f| times the largest
+|R|: some for the sums over Gauss points, elements and nodes, and some for each spacing of nodes that the part
+lies away from the origin, where rounded coordinates change areas and volumes."""
+TOGETHER = 1e-5
+"""Difference of the rotations of bodies up to which they turn as one, where modes have the size 1."""
+
+
+@record(frozen=True, eq=False)
+class FreeMotions:
+    """Rigid motions that supports and constraints leave free, by parts of a model.
+
+    Attributes
+    ----------
+    mesh, supports, groups : of the model.
+    bodies, frames : its bodies, their centers (b, 3) and sizes (b,).
+    group_of : (b,) int, the part of each body: bodies that neither nodes nor constraints tie to others.
+    counts : (p,) int, how many free motions each part has.
+    modes : (b, 6, k), what they are of the six modes of each body, 0 beyond their number.
+    """
+
+    mesh: Mesh
+    supports: Supports
+    groups: Sequence[ElementGroup]
+    bodies: Bodies
+    frames: tuple[Array, Array]
+    group_of: Ints
+    counts: Ints
+    modes: Array
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is free to move."""
+        return bool(self.counts.any())
+
+    @cached_property
+    def part(self) -> Ints:
+        """The part of each node (n,), -1 for nodes without elements."""
+        return np.where(self.bodies.part >= 0, self.group_of[self.bodies.part], -1)
+
+    @cached_property
+    def _pair(self) -> tuple[Array, Array]:
+        """The motions R of nodes with their parts and ∫ N R dV, both (n, 3, k).
+
+        They are orthonormal over the volume of each part.
+        """
+        from kratos_lite.model.loads.body import BodyForce  # rarely needed
+
+        body, (center, size) = self.bodies.part, self.frames
+        R = rigid_modes(self.mesh.points, center[body]).reshape(-1, 3, 6)
+        R[body < 0] = 0.0
+        R[..., 3:] /= size[body, None, None]
+        R = R @ self.modes[body]
+        numbers = np.arange(R.shape[2])
+        forces = [BodyForce(R[..., i]).forces(self.mesh, self.groups) for i in numbers]
+        over_volume = np.stack(forces, axis=2)
+        gram = self._by_part(np.swapaxes(R, 1, 2) @ over_volume)
+        gram[:, numbers, numbers] += numbers >= self.counts[:, None]
+        normal = np.swapaxes(np.linalg.inv(np.linalg.cholesky(gram)), 1, 2)[self.part]
+        return R @ normal, over_volume @ normal
+
+    def _by_part(self, values: Array, largest: bool = False) -> Array:
+        """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part, of all ranks."""
+        found = np.zeros((len(self.counts), *values.shape[1:]))
+        mine, ranks = (self.part >= 0) & self.mesh.own_nodes, self.mesh.ranks
+        (np.maximum if largest else np.add).at(found, self.part[mine], values[mine])
+        return np.asarray(ranks.max(found) if largest else ranks.sum(found))
+
+    # ---- solutions without them ----------------------------------------------------------------------
+
+    def balanced(self, forces: Array) -> Array:
+        """Return forces (n, 3) less what does work on free motions, spread as these over the volume."""
+        return self._less(forces, *self._pair) if self.any else forces
+
+    def without(self, u: Array) -> Array:
+        """Return displacements (n, 3) without free motions: ∫ R^T u dV = 0 over each part."""
+        return self._less(u, *self._pair[::-1]) if self.any else u
+
+    def _less(self, values: Array, tested: Array, taken: Array) -> Array:
+        shares = self._by_part(_products(tested, values))[self.part]
+        return values - (taken @ shares[..., None])[..., 0]
+
+    @cached_property
+    def held(self) -> Mask:
+        """Components (n, 3) at own nodes, one for each free motion, that hold these firmly.
+
+        Gram-Schmidt on the rows of R: each is that along which what is left of the motions goes farthest.
+        """
+        chosen, ranks, part = np.zeros_like(self.supports.fixed), self.mesh.ranks, self.part
+        if not self.any:
+            return chosen
+        left = self._pair[0] * (~self.supports.fixed & self.mesh.own_nodes[:, None])[..., None]
+        left.reshape(-1, left.shape[2])[list(self.supports.slaves())] = 0.0
+        for step in range(left.shape[2]):
+            size = (left**2).sum(axis=2)
+            best = self._by_part(size.max(axis=1), largest=True)
+            here = np.flatnonzero((size.max(axis=1) == best[part]) & (self.counts[part] > step) & (part >= 0))
+            first = here[np.unique(part[here], return_index=True)[1]]
+            keeper = np.full(len(best), ranks.size)
+            keeper[part[first]] = ranks.rank
+            node = first[ranks.min(keeper)[part[first]] == ranks.rank]
+            axis = size[node].argmax(axis=1)
+            chosen[node, axis] = True
+            row = np.zeros((len(best), left.shape[2]))
+            row[part[node]] = left[node, axis]
+            along = (ranks.sum(row) / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[part, None]
+            left -= (left * along).sum(axis=2, keepdims=True) * along
+        return chosen
+
+    # ---- what is refused -----------------------------------------------------------------------------
+
+    def check(
+        self, loads: Iterable[Array], moving: Mask | bool, cure: str = "add loads that balance them"
+    ) -> None:
+        """Raise ModelError where a part can still move, unless loads act on it that balance.
+
+        Parameters
+        ----------
+        loads : nodal forces (n, 3) in N of each load.
+        moving : which parts (p,) anything strains; others have no business to be free.
+        cure : besides supports.
+        """
+        if not self.any:
+            return
+        total, size, R = np.zeros_like(self.mesh.points), np.zeros(self.mesh.n_nodes), self._pair[0]
+        for forces in loads:
+            total += forces
+            size += np.linalg.norm(forces, axis=1)
+        noise = self._rounding * self._by_part(size)
+        limit = noise[:, None] * self._by_part(np.linalg.norm(R, axis=1), largest=True)
+        off = (np.abs(self._by_part(_products(R, total))) > limit).any(axis=1)
+        wrong = (self.counts > 0) & (off | self._is_hinged | ~np.asarray(moving))
+        if not wrong.any():
+            return
+        text = f"the supports leave rigid-body modes free: {self.described(wrong)}"
+        if not off.any():
+            raise ModelError(f"{text}. Fix more nodes or components")
+        p = int(off.argmax())
+        center, arm = (values[self.group_of == p][0] for values in self.frames)
+        moment = self._by_part(np.cross(self.mesh.points - center, total))[p]
+        force, turn = _text(self._by_part(total)[p], noise[p]), _text(moment, noise[p] * arm)
+        raise ModelError(
+            f"{text}, and its loads do not balance: together they are {force} N and {turn} N m about "
+            f"{_text(center)}. Fix more nodes or components, or {cure}"
+        )
+
+    @cached_property
+    def _rounding(self) -> Array:
+        """What rounding may be, as a share of all loads on a part, (p,)."""
+        far = self._by_part(np.abs(self.mesh.points), largest=True).max(axis=1)
+        size = np.zeros(len(far))
+        np.maximum.at(size, self.group_of, self.frames[1])
+        spacings = far / size * np.cbrt(self._by_part(np.ones(len(self.part))))
+        return np.asarray(np.finfo(float).eps * (ROUND_OFF + OF_PLACES * spacings))
+
+    @cached_property
+    def _hangs(self) -> Mask:
+        """Which bodies (b,) hang on nodes or edges of others."""
+        found = self.bodies
+        at = np.concatenate(found.joined(self.mesh)[:2]) if found.count > 1 else NO_ROWS
+        return np.isin(np.arange(found.count), at)
+
+    @cached_property
+    def _is_hinged(self) -> Mask:
+        """In which parts (p,) bodies turn about nodes or edges of others: more likely a hole in the mesh."""
+        first = np.unique(self.group_of, return_index=True)[1][self.group_of]
+        turn = self.modes[:, 3:] / self.frames[1][:, None, None]
+        apart = np.abs(turn - turn[first]).max(axis=(1, 2), initial=0.0) * self.frames[1]
+        hinged = np.zeros(len(self.counts), dtype=bool)
+        hinged[self.group_of[self._hangs & (apart > TOGETHER)]] = True
+        return hinged
+
+    def described(self, parts: Mask | None = None) -> str:
+        """Return which bodies, of some parts (p,) or all, can still move, and how; as many as are shown."""
+        chosen = self.counts > 0 if parts is None else parts & (self.counts > 0)
+        count, first = self.bodies.described(self.mesh)
+        return "; ".join(
+            f"the {'body' if self.bodies.count == 1 else f'part of node {first[p]}'} ({count[p]} nodes) "
+            f"can still move: {words}"
+            for p, words in islice(self._named(np.flatnonzero(chosen[self.group_of])), MAX_PROBLEMS)
+        )
+
+    def _named(self, chosen: Ints) -> Iterator[tuple[int, str]]:
+        """Return body and free motions of each that can still move."""
+        several = np.bincount(self.group_of)[self.group_of] > 1
+        for p in chosen.tolist():
+            if words := _motions(self.modes[p]):
+                yield p, words + " (it hangs on a node or an edge only)" * bool(several[p] & self._hangs[p])
+
+    def notes(self, moving: Mask) -> list[str]:
+        """Return a note of the parts (p,) among those strained that are free."""
+        text = self.described(moving) if self.any else ""
+        return [f"{text}; its loads balance, and the displacement is without these motions"] if text else []
+
+
+def _products(R: Array, values: Array) -> Array:
+    """Return R^T f (n, k) at each node."""
+    return np.asarray((values[:, None] @ R)[:, 0])
+
+
+def _text(values: Array, noise: float = 0.0) -> str:
+    """Return a vector in words, without what is rounding."""
+    return "(" + " ".join(f"{v:.6g}" if abs(v) > noise else "0" for v in values.tolist()) + ")"
+
+
+def _motions(free: Array) -> str:
+    """Name the span of free modes (6, k): translations and rotations, by axis where they are along one."""
+    if not free.size or np.abs(free).max() < 1e-9:
+        return ""
+    U, values, _ = np.linalg.svd(free, full_matrices=False)
+    span = U[:, values > 1e-6]
+    rotation = np.linalg.svd(span[3:])
+    turning = rotation[1] > 1e-6 if span.shape[1] else np.zeros(0, dtype=bool)
+    n_turn = int(turning.sum())
+    still = span @ rotation[2].T[:, n_turn:]
+    words = []
+    if still.shape[1]:
+        words.append("translation " + _axes(still[:3]))
+    if n_turn:
+        words.append("rotation about " + _axes(rotation[0][:, :n_turn]))
+    return "; ".join(words)
+
+
+def _axes(directions: Array) -> str:
+    """Name a span of directions (3, k): by letters if it is spanned by axes, else by vectors."""
+    Q, _ = np.linalg.qr(directions)
+    inside = (Q**2).sum(axis=1) > 1 - 1e-6
+    if inside.sum() == Q.shape[1]:
+        return ", ".join(letter for letter, yes in zip("xyz", inside, strict=True) if yes)
+    named = [np.round(q / np.abs(q).max(), 9) + 0.0 for q in Q.T]
+    return ", ".join("(" + " ".join(f"{c:.3g}" for c in q) + ")" for q in named)
