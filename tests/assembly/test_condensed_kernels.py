@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from computing import compiled
 
 from kratos_lite.assembly import element_groups, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
@@ -28,7 +29,7 @@ NAMES = [name for name in sorted(ELEMENTS) if ELEMENTS[name].formulation in ("en
 STEEL, RUBBER = Isotropic3D(210e9, 0.3), Isotropic3D(1e6, 0.4999)
 A = np.random.default_rng(8).standard_normal((6, 6))
 CRYSTAL = of_elasticity((A @ A.T + 6 * np.eye(6)) * 1e9)
-pytestmark = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
+pytestmark = compiled
 
 
 def group_of(element, material=STEEL, sizes=(1.0, 1.0, 1.0), distortion=0.03, rule=None, count=11):

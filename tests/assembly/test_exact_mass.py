@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from computing import compiled
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
@@ -154,7 +155,7 @@ def computed(at):
     }
 
 
-@pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
+@compiled
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_mesh_of_cells_of_all_geometries_is_the_same_compiled_and_in_numpy(kind, monkeypatch):
     at = mixed(kind)

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from computing import EITHER, compiled
 from scipy.linalg import eigh
 
 import kratos_lite as kl
@@ -25,17 +26,14 @@ WOOD = Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 45
 SOIL = Isotropic3D(2e3, 0.3, 700.0)
 UNIT = Isotropic3D(1.0, 0.3, 1.0)
 STEPS = [(False, 0.0), (True, 0.0), (True, 0.3)]
-compiled = pytest.mark.skipif(kernels("lagrange") is None, reason="the compiled kernels were not built")
 elements = pytest.mark.parametrize("name", NAMES)
 
 
-@pytest.fixture(params=["compiled", "numpy"])
+@pytest.fixture(params=EITHER)
 def way(request, monkeypatch):
     """Compute with the kernels, then without."""
     if request.param == "numpy":
         monkeypatch.setattr(element_groups, "kernels", lambda name: None)
-    elif kernels("lagrange") is None:
-        pytest.skip("the compiled kernels were not built")
     return request.param
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from computing import compiled
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
@@ -356,7 +357,7 @@ def test_without_kernels(monkeypatch):
     check(body("EnhancedStrain3D8N", cells=5), 50)
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D20N", "both"])
 def test_kernels_and_numpy_take_the_same_steps(element):
     mesh = two_meshes() if element == "both" else body(element, cells=3).mesh
@@ -371,7 +372,7 @@ def test_kernels_and_numpy_take_the_same_steps(element):
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9 * np.abs(plain).max())
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_both_start_anew_from_what_is_left(monkeypatch):
     monkeypatch.setattr(displacement_pressure, "DIRECTIONS", 12)
     system = system_of(body("BBar3D20N", cells=3))
@@ -385,7 +386,7 @@ def test_both_start_anew_from_what_is_left(monkeypatch):
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-7 * np.abs(plain).max())
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_the_kernel_refuses_what_does_not_fit():
     equations = system_of(body("EnhancedStrain3D8N", cells=3))._equations
     solver = equations._multigrid
@@ -411,7 +412,7 @@ def test_the_kernel_refuses_what_does_not_fit():
         made().solve(np.zeros(5), 1e-8, 1.0, 10, 10, 1e-10, lambda residual: True)
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_results_do_not_depend_on_the_number_of_threads():
     results = []
     for threads in (1, 2, 3):
