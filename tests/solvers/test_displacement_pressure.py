@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from computing import compiled
+from computing import compiled, most
+from rounding import round_off
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
@@ -24,7 +25,7 @@ CELLS = {
     "BBar3D20N": 4,
     "BBar3D27N": 3,
 }
-LIMIT = {"BBar3D15N": 45}
+LIMIT = most(45, 85)
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 
@@ -69,12 +70,16 @@ def moved(mesh, by=0.05):
     return kl.Mesh(X + change, mesh.blocks)
 
 
-def check(model, limit, rtol=1e-7):
-    """Solve by pressures in few iterations, and compare with a factorization of the same matrix."""
+def check(model, limit, rtol=1e-8):
+    """Solve by pressures in few iterations, and compare with a factorization of the same matrix.
+
+    Both are off by rounding times the condition of K, which ν makes large.
+    """
     found, exact = model.solve("amg"), model.solve("direct")
     assert found.report.solver == "displacement-pressure", found.report.reason
     assert found.report.iterations <= limit
-    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=rtol * np.abs(exact.u).max())
+    allowed = rtol + round_off(model)
+    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=allowed * np.abs(exact.u).max())
     return found
 
 
@@ -93,10 +98,10 @@ def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
     found = model.solve("amg", tolerance=1e-8)
     assert found.report.solver == "displacement-pressure", found.report.reason
-    assert found.report.iterations <= LIMIT.get(element, 40)
+    assert found.report.iterations <= LIMIT
     exact = model.solve("direct").u
-    # both are off by rounding times the condition of K, which ν makes large
-    np.testing.assert_allclose(found.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+    allowed = 1e-7 + round_off(model)
+    np.testing.assert_allclose(found.u, exact, rtol=0, atol=allowed * np.abs(exact).max())
 
 
 @pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (8, 14)), ("BBar3D27N", (3, 7))])
@@ -108,7 +113,7 @@ def test_iterations_hardly_grow_with_the_mesh(element, sizes):
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
 def test_a_beam(element):
     n = CELLS[element] // 2 + 1
-    check(body(element, cells=(4 * n, n, n), size=(8.0, 1.0, 1.0), face="x-"), 60, rtol=1e-6)
+    check(body(element, cells=(4 * n, n, n), size=(8.0, 1.0, 1.0), face="x-"), most(60, 75))
 
 
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
@@ -124,7 +129,7 @@ def test_distorted_cells(element):
     model = kl.Model(moved(body(element).mesh), rubber())
     model.fix("z-")
     model.add(kl.Gravity((3.0, 4.0, -9.0)))
-    check(model, LIMIT.get(element, 45))
+    check(model, most(45, 70))
 
 
 @pytest.mark.parametrize(
@@ -133,16 +138,16 @@ def test_distorted_cells(element):
         ("BBar3D8N", 10),
         ("BBar3D8N", 100),
         ("BBar3D10N", 10),
-        ("BBar3D10N", 100),
         ("BBar3D15N", 10),
         ("BBar3D20N", 10),
-        ("BBar3D20N", 100),
         ("BBar3D27N", 10),
-        ("BBar3D27N", 100),
+        pytest.param("BBar3D10N", 100, marks=compiled),  # pyamg leaves the last two to a factorization
+        pytest.param("BBar3D20N", 100, marks=compiled),
+        pytest.param("BBar3D27N", 100, marks=compiled),
     ],
 )
 def test_flat_cells(element, aspect):
-    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), 45)
+    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), most(45, 260))
 
 
 def test_lines_across_flat_quadratic_cells():
@@ -155,7 +160,7 @@ def test_lines_across_flat_quadratic_cells():
 
 @pytest.mark.parametrize(("element", "axis"), [("BBar3D8N", 0), ("BBar3D20N", 2), ("BBar3D27N", 1)])
 def test_long_cells(element, axis):
-    check(body(element, cells=5, size=tuple(10.0 if a == axis else 1.0 for a in range(3))), 45)
+    check(body(element, cells=5, size=tuple(10.0 if a == axis else 1.0 for a in range(3))), most(45, 160))
 
 
 @pytest.mark.parametrize(("element", "axis"), [("BBar3D27N", 0), ("BBar3D27N", 2), ("BBar3D15N", 2)])
@@ -196,13 +201,13 @@ def test_rubber_and_steel(element, inside):
     materials = (STEEL, rubber()) if inside == "rubber" else (rubber(), STEEL)
     model = body(element, materials[0])
     model.assign(materials[1], np.flatnonzero(np.abs(centers(model) - 0.5).max(axis=1) < 0.3))
-    check(model, 75)
+    check(model, most(75, 95))
 
 
 def test_two_rubbers():
     model = body("EnhancedStrain3D8N")
     model.assign(rubber(E=3e8), np.flatnonzero(centers(model)[:, 0] > 0.5))
-    check(model, 50)
+    check(model, most(50, 60))
 
 
 def test_a_rubber_with_fibers_is_nearly_incompressible():
@@ -225,6 +230,7 @@ def test_compressible_bodies_have_no_pressures():
     assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
 
+@compiled  # others factorize up to 10,000 unknowns, whatever the bulk modulus
 @pytest.mark.parametrize(
     ("element", "cells", "method"),
     [
@@ -328,7 +334,7 @@ def test_multi_point_constraints():
 def test_prescribed_displacements():
     model = body("BBar3D20N", cells=3)
     model.fix("z+", value=(0.01, 0.0, -0.05))
-    found = check(model, 65)
+    found = check(model, most(65, 85))
     assert found.report.backward_error < 1e-11
 
 
@@ -336,7 +342,7 @@ def test_tolerances_refer_to_forces_without_the_bulk_modulus():
     model = body("BBar3D20N", cells=5)
     model.fix("z+", value=(0.01, 0.0, -0.05))
     report = model.static("amg", tolerance=1e-5).solve().report
-    assert report.iterations < 50
+    assert report.iterations < most(50, 65)
     assert report.force_error < 1e-3
 
 
