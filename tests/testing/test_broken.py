@@ -584,7 +584,7 @@ def element_with(parent, **changes):
         (
             KinematicLinear3D13N,
             five_points(),
-            {"rank", "stretched", "linear patch", "quadratic patch", "bending"},
+            {"rank", "linear patch", "quadratic patch", "bending"},
         ),
         (KinematicLinear3D13N, pyramid(3), {"rank"}),
         (
