@@ -111,7 +111,7 @@ def weights(subject: CellRule) -> Measured:
     cell, rule = subject
     total, volume = float(rule.weights.sum()), VOLUME[cell]
     return Measured(
-        abs(total / volume - 1), 1e-14, f"the weights sum to {total:.17g}; the volume is {volume:.17g}"
+        abs(total / volume - 1), 1e-13, f"the weights sum to {total:.17g}; the volume is {volume:.17g}"
     )
 
 
@@ -125,7 +125,7 @@ def monomials(subject: CellRule) -> Measured:
         size = max(float(np.abs(rule.weights) @ np.abs(values)), abs(exact), 1e-300)
         errors[f"∫ {monomial(e)} gives {found:.17g}; exact is {exact:.17g}"] = abs(found - exact) / size
     error, text = worst(errors)
-    return Measured(error, 2e-14, f"{text} (degree claimed: {rule.degree})")
+    return Measured(error, 1e-13, f"{text} (degree claimed: {rule.degree})")
 
 
 def points_inside(subject: CellRule) -> Measured:

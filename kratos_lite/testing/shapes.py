@@ -169,7 +169,7 @@ def kronecker(shape: type[Shape]) -> Measured:
     miss = np.abs(N - np.eye(len(N)))
     b, a = np.unravel_index(int(np.argmax(miss)), miss.shape)
     text = f"N[{a}] at node {b} {at(shape.nodes[b])} is {N[b, a]:.6g}; expected {float(a == b):g}"
-    return Measured(float(miss[b, a]), 4e-15, text)
+    return Measured(float(miss[b, a]), 1e-14, text)
 
 
 def partition_of_unity(shape: type[Shape]) -> Measured:
@@ -180,13 +180,13 @@ def partition_of_unity(shape: type[Shape]) -> Measured:
     miss = np.maximum(functions, slopes)
     p = int(np.argmax(miss))
     text = f"at xi = {at(points[p])}: sum N = 1 is off by {functions[p]:.3g}, sum dN = 0 by {slopes[p]:.3g}"
-    return Measured(float(miss[p]), 4e-15, text)
+    return Measured(float(miss[p]), 1e-14, text)
 
 
 def reproduction(shape: type[Shape]) -> Measured:
     """Check that polynomials up to the degree of the shape, no higher ones, come back from nodal values."""
     error, text = worst(_misses(shape, exponents(shape.nodes.shape[1], shape.degree)))
-    limit, more = 4e-15, shape.degree + 1
+    limit, more = 1e-14, shape.degree + 1
     higher = [e for e in exponents(shape.nodes.shape[1], more) if sum(e) == more]
     if error <= limit and higher and worst(_misses(shape, higher))[0] <= 1e-9:
         text = f"the functions span degree {more} completely; write degree = {more}"
@@ -237,7 +237,7 @@ def mid_edges(shape: type[Shape]) -> Measured | str:
     miss = np.abs(shape.nodes[c : c + len(ends)] - shape.nodes[ends].mean(axis=1)).max(axis=1)
     e = int(np.argmax(miss))
     i, j = shape.edges[e]
-    return Measured(float(miss[e]), 1e-15, f"node {c + e} should lie in the middle of the edge {i}-{j}")
+    return Measured(float(miss[e]), 1e-14, f"node {c + e} should lie in the middle of the edge {i}-{j}")
 
 
 def faces(shape: type[Shape]) -> Measured | str:

@@ -1,13 +1,10 @@
 """M, G and H: compiled as in NumPy for every element, whatever the threads and the instruction set."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, each_instruction_set, printed, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation, Translation
@@ -18,7 +15,6 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.native import kernels
 from kratos_lite.solvers.mass import Mass
 
-compiled = pytest.mark.skipif(kernels("inertia") is None, reason="the compiled kernels were not built")
 KINDS = (4, 5, 6, 8, 10, 13, 15, 20, 27)
 VELOCITY = np.random.default_rng(1).uniform(-1, 1, (3, 4))
 
@@ -75,17 +71,16 @@ def test_only_what_is_asked_for_is_made_and_nothing_else_changes(names):
 
 
 @compiled
-@pytest.mark.parametrize("isa", ["base", "avx2", "avx512"])
+@each_instruction_set
 def test_every_instruction_set_gives_the_same_to_rounding(isa, tmp_path):
     kinds = (4, 8, 13, 27)
     code = (
-        "import sys, numpy as np\nfrom tests.ale.test_kernel import *\n"
+        "import numpy as np\nfrom tests.ale.test_kernel import *\n"
         f"made = {{f'{{kind}}{{name}}': data for kind in {kinds}\n"
         "        for name, data in inertia_matrices(*parts(kind), 'MGH', VELOCITY).items()}\n"
-        "np.savez(sys.argv[1], **made)"
+        f"np.savez({str(tmp_path / 'made.npz')!r}, **made)"
     )
-    environment = {**os.environ, "KRATOS_LITE_ISA": isa, "PYTHONPATH": os.getcwd()}
-    subprocess.run([sys.executable, "-c", code, tmp_path / "made.npz"], check=True, env=environment)
+    printed(code, KRATOS_LITE_ISA=isa)
     with np.load(tmp_path / "made.npz") as made:
         for kind in kinds:
             here = inertia_matrices(*parts(kind), "MGH", VELOCITY)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import EITHER, compiled, same_on_all_threads
 
 from kratos_lite import native
 from kratos_lite.analysis.integrators import pseudo_rigid, rigid
@@ -10,17 +10,14 @@ from kratos_lite.bodies.rotations import exp, hat
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
 
-compiled = pytest.mark.skipif(kernels("motion") is None, reason="the compiled kernels were not built")
 NONE3, NONE6, NONE12 = np.zeros(3), np.zeros(6), np.zeros(12)
 
 
-@pytest.fixture(params=["compiled", "numpy"])
+@pytest.fixture(params=EITHER)
 def engine(request, monkeypatch):
     """Run a test with the compiled kernel and without it."""
     if request.param == "numpy":
         monkeypatch.setattr(native, "kernels", lambda name: None)
-    elif kernels("motion") is None:
-        pytest.skip("the compiled kernels were not built")
     return request.param
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, same_on_all_threads
 
 from kratos_lite.assembly import element_groups, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
@@ -16,7 +16,6 @@ from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.errors import InputError, MaterialError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.materials.isotropic3d import Isotropic3D
-from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron
 
 
@@ -29,7 +28,7 @@ NAMES = [name for name in sorted(ELEMENTS) if ELEMENTS[name].formulation in ("en
 STEEL, RUBBER = Isotropic3D(210e9, 0.3), Isotropic3D(1e6, 0.4999)
 A = np.random.default_rng(8).standard_normal((6, 6))
 CRYSTAL = of_elasticity((A @ A.T + 6 * np.eye(6)) * 1e9)
-pytestmark = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
+pytestmark = compiled
 
 
 def group_of(element, material=STEEL, sizes=(1.0, 1.0, 1.0), distortion=0.03, rule=None, count=11):

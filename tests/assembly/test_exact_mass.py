@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite.ale import MotionMatrices, Rotation
@@ -16,7 +16,6 @@ from kratos_lite.elements.exact_rules import AFFINE, CURVED, STRAIGHT, exact_rul
 from kratos_lite.elements.kinematic_linear_3d10n import KinematicLinear3D10N
 from kratos_lite.elements.kinematic_linear_3d27n import KinematicLinear3D27N
 from kratos_lite.elements.surface import surface_pressure
-from kratos_lite.native import kernels
 from kratos_lite.quadrature import hexahedron, rule_for, tetrahedron
 from kratos_lite.shapes.faces import Quadrilateral4, Quadrilateral8, Quadrilateral9, Triangle3, Triangle6
 from kratos_lite.solvers.mass import Mass
@@ -155,7 +154,7 @@ def computed(at):
     }
 
 
-@pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
+@compiled
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_mesh_of_cells_of_all_geometries_is_the_same_compiled_and_in_numpy(kind, monkeypatch):
     at = mixed(kind)

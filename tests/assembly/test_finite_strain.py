@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import EITHER, compiled, same_on_all_threads
 from scipy.linalg import eigh
 
 import kratos_lite as kl
@@ -18,7 +18,6 @@ from kratos_lite.errors import MaterialError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.native import kernels
 from kratos_lite.testing.patches import patch
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
@@ -26,17 +25,14 @@ WOOD = Orthotropic3D(11e3, 0.9e3, 0.5e3, 0.4, 0.3, 0.4, 0.7e3, 0.05e3, 0.7e3, 45
 SOIL = Isotropic3D(2e3, 0.3, 700.0)
 UNIT = Isotropic3D(1.0, 0.3, 1.0)
 STEPS = [(False, 0.0), (True, 0.0), (True, 0.3)]
-compiled = pytest.mark.skipif(kernels("lagrange") is None, reason="the compiled kernels were not built")
 elements = pytest.mark.parametrize("name", NAMES)
 
 
-@pytest.fixture(params=["compiled", "numpy"])
+@pytest.fixture(params=EITHER)
 def way(request, monkeypatch):
     """Compute with the kernels, then without."""
     if request.param == "numpy":
         monkeypatch.setattr(element_groups, "kernels", lambda name: None)
-    elif kernels("lagrange") is None:
-        pytest.skip("the compiled kernels were not built")
     return request.param
 
 

@@ -1,13 +1,10 @@
 """Fields at Gauss points: the compiled way and the element's own methods give the same."""
 
 import json
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, printed, same_on_all_threads
 from meshes import changed_at, with_block
 
 import kratos_lite as kl
@@ -24,14 +21,12 @@ from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.materials.orthotropic3d import Orthotropic3D
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model import checks
-from kratos_lite.native import kernels
 from kratos_lite.quadrature import hexahedron
 
 NAMES = [f"KinematicLinear3D{n}N" for n in (4, 5, 6, 8, 10, 13, 15, 20, 27)]
 CONDENSED = ["EnhancedStrain3D8N", *(f"BBar3D{n}N" for n in (8, 10, 13, 15, 20, 27))]
 WOOD = Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.7e9, 450.0)
 SOIL = Isotropic3D(210e6, 0.3, 7620.0)
-compiled = pytest.mark.skipif(kernels("gauss") is None, reason="the compiled kernels were not built")
 
 
 @pytest.fixture
@@ -140,13 +135,7 @@ print(json.dumps([*result.totals(), *result.stress("node").sum(axis=0), *result.
 )
 def test_other_instruction_sets_and_numpy_give_the_same_solution(variable):
     name, value = variable.split("=")
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, env=os.environ | more
-        )
-        for more in ({}, {name: value})
-    ]
-    best, other = (np.array(json.loads(run.stdout)) for run in runs)
+    best, other = (np.array(json.loads(printed(SCRIPT, **more))) for more in ({}, {name: value}))
     np.testing.assert_allclose(other, best, rtol=1e-9, atol=1e-9 * np.abs(best).max())
 
 

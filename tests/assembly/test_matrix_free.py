@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from computing import compiled
 
 import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -16,7 +17,7 @@ from kratos_lite.quadrature import Rule
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.multigrid import multigrid
 
-pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+pytestmark = compiled
 
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 WOOD = kl.Orthotropic3D(11e9, 0.9e9, 0.5e9, 0.4, 0.3, 0.4, 0.7e9, 0.05e9, 0.6e9, 450.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite import voigt
@@ -11,7 +11,6 @@ from kratos_lite.assembly.patches import patches
 from kratos_lite.assembly.polynomial_fit import Lists, Samples, fit, lists
 from kratos_lite.assembly.recovery import Recovery, sampling
 from kratos_lite.mesh.refinement import refine
-from kratos_lite.native import kernels
 from kratos_lite.verification import fields, scenes
 from kratos_lite.verification.meshes import element, split, warped
 from kratos_lite.verification.pressure import cylinder
@@ -310,9 +309,8 @@ def test_fits_of_rank_deficient_samples_agree_with_numpy(request):
     assert np.abs(one - other).max() < 1e-9 * np.abs(other).max()
 
 
+@compiled
 def test_results_do_not_depend_on_the_number_of_threads():
-    if kernels("recovery") is None:
-        pytest.skip("no compiled kernels")
     scene = scenes.manufactured("20N", 4)
     same_on_all_threads(lambda: tuple(compared(scene)), (1, 2, 3))
 

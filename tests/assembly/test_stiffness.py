@@ -1,14 +1,11 @@
 """Assembly: both paths, compiled and NumPy, against the sum of full element matrices."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kernel_threads import same, same_on_all_threads
+from computing import EITHER, compiled, each_instruction_set, printed, same, same_on_all_threads
 from own_elements import tetrahedron_of_seven_nodes
 
 import kratos_lite as kl
@@ -28,17 +25,14 @@ CRYSTAL = SimpleNamespace(C=ROOT @ ROOT.T + np.eye(6))
 """A material without any symmetry."""
 NAMES = sorted(ELEMENTS)
 MODULE = kernels("stiffness")
-compiled = pytest.mark.skipif(MODULE is None, reason="the compiled kernels were not built")
 
 
-@pytest.fixture(params=["compiled", "numpy"])
+@pytest.fixture(params=EITHER)
 def path(request, monkeypatch):
     """Run a test on both paths."""
     if request.param == "numpy":
         for module in (element_groups, sparsity_pattern):
             monkeypatch.setattr(module, "kernels", lambda name: None)
-    elif MODULE is None:
-        pytest.skip("the compiled kernels were not built")
     return request.param
 
 
@@ -207,7 +201,7 @@ def test_stiffness_does_not_depend_on_the_number_of_threads(name, cells, order):
 
 
 @compiled
-@pytest.mark.parametrize("isa", ["base", "avx2", "avx512"])
+@each_instruction_set
 def test_every_instruction_set_gives_the_same_to_rounding(isa):
     code = (
         "from tests.assembly import test_stiffness as t\n"
@@ -217,16 +211,7 @@ def test_every_instruction_set_gives_the_same_to_rounding(isa):
         "        t.assert_sum(*t.scene(name, (3, 1, 1), 0.02, material))\n"
         "print(t.MODULE.isa())"
     )
-    environment = {
-        **os.environ,
-        "KRATOS_LITE_ISA": isa,
-        "PYTHONPATH": os.pathsep.join((os.getcwd(), "tests/fixtures")),
-    }
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment
-    )
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.split()[0] in ("baseline", "AVX2", "AVX-512")
+    assert printed(code, KRATOS_LITE_ISA=isa).split()[0] in ("baseline", "AVX2", "AVX-512")
 
 
 @compiled

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite.native import kernels
 
 BRICK = (0.4, 0.6, 1.0)
-
-
-@pytest.fixture(scope="session")
-def compiled() -> bool:
-    """Whether steps of rigid and pseudo-rigid bodies are compiled: then long motions cost nothing."""
-    return kernels("motion") is not None
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ Reference values: closed forms, and the equations of motion solved with 12 digit
 import motions
 import numpy as np
 import pytest
+from computing import BUILT, compiled
 
 import kratos_lite as kl
 
@@ -162,19 +163,15 @@ def test_damping_takes_a_half_omega_squared_times_eta(integrator):
     [
         ("DEF_EXP", 1e6, 1000, 1.68799e-3, 4.833e-5, 0.0),
         ("DEF_LIM", 1e6, 1000, 2.19968e-3, 4.807e-5, 3.574e-8),
-        ("DEF_EXP", 1e6, 8000, 1.30725e-5, 7.567e-7, 0.0),
-        ("DEF_LIM", 1e6, 8000, 2.40804e-5, 7.480e-7, 8.77e-12),
+        pytest.param("DEF_EXP", 1e6, 8000, 1.30725e-5, 7.567e-7, 0.0, marks=compiled),
+        pytest.param("DEF_LIM", 1e6, 8000, 2.40804e-5, 7.480e-7, 8.77e-12, marks=compiled),
         ("ENERGY_MOMENTUM", 1e6, 1000, 2.16e-3, 0.0, 0.0),
-        ("ENERGY_MOMENTUM", 1e6, 4000, 8.05e-5, 0.0, 0.0),
-        ("DEF_EXP", 1e8, 4000, 1.74584e-4, 3.021e-6, 0.0),
+        pytest.param("ENERGY_MOMENTUM", 1e6, 4000, 8.05e-5, 0.0, 0.0, marks=compiled),
+        pytest.param("DEF_EXP", 1e8, 4000, 1.74584e-4, 3.021e-6, 0.0, marks=compiled),
         ("DEF_LIM", 1e8, 1000, 5.32291e-4, 7.453e-5, 3.835e-6),
     ],
 )
-def test_errors_of_a_box_that_rotates_freely(
-    integrator, E, steps, error, gain, moment, brick, drift, compiled
-):
-    if steps > 1000 and not compiled:
-        pytest.skip("so many steps need the compiled kernels")
+def test_errors_of_a_box_that_rotates_freely(integrator, E, steps, error, gain, moment, brick, drift):
     body = brick(kl.PseudoRigidBody, E, integrator=integrator)
     body.set_velocity(angular=SPIN)
     assert body.kinetic_energy() == pytest.approx(1160.047, rel=1e-13)
@@ -206,9 +203,8 @@ def test_errors_fall_with_the_second_power_of_the_step(integrator, brick):
 @pytest.mark.parametrize(
     ("E", "stretches", "apart"), [(1e6, (0.99346, 1.01531), 1.0), (1e8, (0.999937, 1.000159), 0.0053)]
 )
-def test_stretches_and_nearness_to_the_rigid_body(E, stretches, apart, brick, compiled):
-    if not compiled:
-        pytest.skip("so many steps need the compiled kernels")
+@compiled
+def test_stretches_and_nearness_to_the_rigid_body(E, stretches, apart, brick):
     soft = brick(kl.PseudoRigidBody, E)
     rigid = brick(kl.RigidBody, E, integrator="RIG_IMP")
     low, high, far = 1.0, 1.0, 0.0
@@ -275,11 +271,11 @@ def test_energy_and_momenta_stay_whatever_the_step(E, h, brick, drift):
     np.testing.assert_allclose(body.linear_momentum(), p, rtol=1e-13)
 
 
-def test_a_stiff_spinning_box_for_a_hundred_thousand_steps(brick, drift, compiled):
+def test_a_stiff_spinning_box_for_a_hundred_thousand_steps(brick, drift):
     body = brick(kl.PseudoRigidBody, 2e11)
     body.set_velocity(angular=SPIN)
     start, worst = float(body.energy()), [0.0, 0.0]
-    for _ in kl.integrate(body, 1e-3, 100_000 if compiled else 400, every=100):
+    for _ in kl.integrate(body, 1e-3, 100_000 if BUILT else 400, every=100):
         worst[0] = max(worst[0], abs(float(body.energy()) / start - 1))
         worst[1] = max(worst[1], drift(MOMENTUM, body.angular_momentum()))
     assert worst[0] < 1e-10

@@ -151,7 +151,7 @@ def test_files_that_are_no_states(content, tmp_path):
 
 def test_a_file_of_pickled_objects_is_refused(tmp_path):
     path = tmp_path / "pickled.npz"
-    np.savez(path, kind=np.array([object()], dtype=object), allow_pickle=True)
+    np.savez(path, kind=np.array([object()], dtype=object))
     with pytest.raises(kl.InputError, match="not a state"):
         kl.read_state(path)
 

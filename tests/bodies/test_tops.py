@@ -6,6 +6,7 @@ Reference values: the equations of motion solved with 12 digits; Jacobi's ellipt
 import motions
 import numpy as np
 import pytest
+from computing import compiled
 
 import kratos_lite as kl
 from kratos_lite.bodies.rotations import exp
@@ -190,11 +191,9 @@ TABLE = {
 """H - H0 of the heavy top over 10 s: at the end, lowest, highest."""
 
 
-@pytest.mark.parametrize("h", [0.001, 0.003, 0.009])
+@pytest.mark.parametrize("h", [*(pytest.param(h, marks=compiled) for h in (0.001, 0.003)), 0.009])
 @each_integrator
-def test_energy_of_the_heavy_top(integrator, h, compiled):
-    if h < 0.009 and not compiled:
-        pytest.skip("so many steps need the compiled kernels")
+def test_energy_of_the_heavy_top(integrator, h):
     body, energy = heavy(integrator)
     assert energy(kl.State.of(body)) == pytest.approx(1269.97500520790, rel=1e-13)
     vertical = body.angular_momentum()[2]
@@ -270,9 +269,8 @@ def test_the_nutating_top_follows_the_reference():
 
 
 @pytest.mark.parametrize(("W", "angle"), [(50.0, 0.05), (25.0, 0.5)])
-def test_the_motion_of_the_heavy_tops_follows_eulers_equations(W, angle, compiled):
-    if not compiled:
-        pytest.skip("so many steps need the compiled kernels")
+@compiled
+def test_the_motion_of_the_heavy_tops_follows_eulers_equations(W, angle):
     times = np.linspace(0, 10, 21)
     rotations, _ = motions.top((5, 5, 1), (0, 0, W), exp([angle, 0, 0]), times, weight=20.0)
     body, _ = heavy("RIG_IMP", W, angle)

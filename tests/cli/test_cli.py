@@ -963,7 +963,7 @@ DESCRIBED = {
     "13_nu_half.mdpa": ":7: Properties 1: nu (POISSON_RATIO) 0.5 must be < 0.5",
     "14_E_zero.mdpa": ":6: Properties 1: E (YOUNG_MODULUS) 0 must be > 0 Pa",
     "20_unknown_variable.mdpa": ":6: unknown variable YOUNGS_MODULUS. Did you mean YOUNG_MODULUS?",
-    "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 4",
+    "23_inverted.mdpa": ":22: element 1 (SmallDisplacementElement3D8N): det J = -0.125 at Gauss point 1",
 }
 """Files that read well and mean nonsense: ``info`` describes them, nothing else takes them."""
 

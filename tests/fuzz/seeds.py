@@ -272,5 +272,5 @@ def _of_meshio(folder: Path, name: str, options: dict[str, object]) -> Seed:
 def pack(arrays: dict[str, object]) -> bytes:
     """Return an .npz file of arrays."""
     stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, **arrays)
+    np.savez(stream, **arrays)
     return stream.getvalue()

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import EITHER, compiled, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite.mesh import Block, Faces, components, equal_sets, topology
 from kratos_lite.native import kernels
-
-compiled = pytest.mark.skipif(kernels("mesh") is None, reason="the compiled kernels were not built")
-EITHER = ["numpy", pytest.param("compiled", marks=compiled)]
 
 
 @pytest.fixture(params=EITHER)

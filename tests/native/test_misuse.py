@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from computing import compiled
 from native_models import multigrid, stiffness
 
 from kratos_lite.native import kernels
 
-pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+pytestmark = compiled
 NATIVE = Path(__file__).parents[2] / "kratos_lite" / "native"
 
 

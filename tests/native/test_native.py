@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import same_on_all_threads
 
 from kratos_lite import native
 from kratos_lite.assembly.block_matrix import BlockMatrix

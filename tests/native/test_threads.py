@@ -1,20 +1,18 @@
 """One pool of threads serves all kernels; a second Python thread, or a wrong call there, changes nothing."""
 
 import os
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kernel_threads import set_threads
+from computing import compiled, printed, set_threads
 from native_models import multigrid, stiffness
 
 import kratos_lite as kl
 from kratos_lite.native import kernels
 
-pytestmark = pytest.mark.skipif(kernels("threads") is None, reason="the kernels are not compiled")
+pytestmark = compiled
 
 COUNTED = """
 import os, kratos_lite as kl
@@ -30,10 +28,7 @@ print(len(os.listdir("/proc/self/task")))
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted by Linux")
 def test_solutions_with_eight_threads_leave_few_of_them():
-    environment = {**os.environ, "KRATOS_LITE_THREADS": "8", "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-c", COUNTED]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert int(done.stdout) <= 16
+    assert int(printed(COUNTED, KRATOS_LITE_THREADS="8", OPENBLAS_NUM_THREADS="1")) <= 16
 
 
 def together(*works):

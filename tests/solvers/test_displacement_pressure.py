@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, most, same_on_all_threads
+from rounding import round_off
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.native import kernels
 from kratos_lite.solvers import block_inverse as block_inverse_module
 from kratos_lite.solvers import dilatation, displacement_pressure, multigrid
 from kratos_lite.solvers import linear_solver as equations
@@ -24,7 +24,7 @@ CELLS = {
     "BBar3D20N": 4,
     "BBar3D27N": 3,
 }
-LIMIT = {"BBar3D15N": 45}
+LIMIT = most(45, 85)
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3, density=7850.0)
 
 
@@ -69,12 +69,16 @@ def moved(mesh, by=0.05):
     return kl.Mesh(X + change, mesh.blocks)
 
 
-def check(model, limit, rtol=1e-7):
-    """Solve by pressures in few iterations, and compare with a factorization of the same matrix."""
+def check(model, limit, rtol=1e-8):
+    """Solve by pressures in few iterations, and compare with a factorization of the same matrix.
+
+    Both are off by rounding times the condition of K, which ν makes large.
+    """
     found, exact = model.solve("amg"), model.solve("direct")
     assert found.report.solver == "displacement-pressure", found.report.reason
     assert found.report.iterations <= limit
-    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=rtol * np.abs(exact.u).max())
+    allowed = rtol + round_off(model)
+    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=allowed * np.abs(exact.u).max())
     return found
 
 
@@ -93,10 +97,10 @@ def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     model = body(element, rubber(nu))
     found = model.solve("amg", tolerance=1e-8)
     assert found.report.solver == "displacement-pressure", found.report.reason
-    assert found.report.iterations <= LIMIT.get(element, 40)
+    assert found.report.iterations <= LIMIT
     exact = model.solve("direct").u
-    # both are off by rounding times the condition of K, which ν makes large
-    np.testing.assert_allclose(found.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+    allowed = 1e-7 + round_off(model)
+    np.testing.assert_allclose(found.u, exact, rtol=0, atol=allowed * np.abs(exact).max())
 
 
 @pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (8, 14)), ("BBar3D27N", (3, 7))])
@@ -108,7 +112,7 @@ def test_iterations_hardly_grow_with_the_mesh(element, sizes):
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
 def test_a_beam(element):
     n = CELLS[element] // 2 + 1
-    check(body(element, cells=(4 * n, n, n), size=(8.0, 1.0, 1.0), face="x-"), 60, rtol=1e-6)
+    check(body(element, cells=(4 * n, n, n), size=(8.0, 1.0, 1.0), face="x-"), most(60, 75))
 
 
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D27N"])
@@ -124,7 +128,7 @@ def test_distorted_cells(element):
     model = kl.Model(moved(body(element).mesh), rubber())
     model.fix("z-")
     model.add(kl.Gravity((3.0, 4.0, -9.0)))
-    check(model, LIMIT.get(element, 45))
+    check(model, most(45, 70))
 
 
 @pytest.mark.parametrize(
@@ -133,16 +137,16 @@ def test_distorted_cells(element):
         ("BBar3D8N", 10),
         ("BBar3D8N", 100),
         ("BBar3D10N", 10),
-        ("BBar3D10N", 100),
         ("BBar3D15N", 10),
         ("BBar3D20N", 10),
-        ("BBar3D20N", 100),
         ("BBar3D27N", 10),
-        ("BBar3D27N", 100),
+        pytest.param("BBar3D10N", 100, marks=compiled),  # pyamg leaves the last two to a factorization
+        pytest.param("BBar3D20N", 100, marks=compiled),
+        pytest.param("BBar3D27N", 100, marks=compiled),
     ],
 )
 def test_flat_cells(element, aspect):
-    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), 45)
+    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), most(45, 260))
 
 
 def test_lines_across_flat_quadratic_cells():
@@ -155,7 +159,7 @@ def test_lines_across_flat_quadratic_cells():
 
 @pytest.mark.parametrize(("element", "axis"), [("BBar3D8N", 0), ("BBar3D20N", 2), ("BBar3D27N", 1)])
 def test_long_cells(element, axis):
-    check(body(element, cells=5, size=tuple(10.0 if a == axis else 1.0 for a in range(3))), 45)
+    check(body(element, cells=5, size=tuple(10.0 if a == axis else 1.0 for a in range(3))), most(45, 160))
 
 
 @pytest.mark.parametrize(("element", "axis"), [("BBar3D27N", 0), ("BBar3D27N", 2), ("BBar3D15N", 2)])
@@ -196,13 +200,13 @@ def test_rubber_and_steel(element, inside):
     materials = (STEEL, rubber()) if inside == "rubber" else (rubber(), STEEL)
     model = body(element, materials[0])
     model.assign(materials[1], np.flatnonzero(np.abs(centers(model) - 0.5).max(axis=1) < 0.3))
-    check(model, 75)
+    check(model, most(75, 95))
 
 
 def test_two_rubbers():
     model = body("EnhancedStrain3D8N")
     model.assign(rubber(E=3e8), np.flatnonzero(centers(model)[:, 0] > 0.5))
-    check(model, 50)
+    check(model, most(50, 60))
 
 
 def test_a_rubber_with_fibers_is_nearly_incompressible():
@@ -225,6 +229,7 @@ def test_compressible_bodies_have_no_pressures():
     assert body("BBar3D27N", rubber(0.49)).solve("amg").report.solver == "amg"
 
 
+@compiled  # others factorize up to 10,000 unknowns, whatever the bulk modulus
 @pytest.mark.parametrize(
     ("element", "cells", "method"),
     [
@@ -328,7 +333,7 @@ def test_multi_point_constraints():
 def test_prescribed_displacements():
     model = body("BBar3D20N", cells=3)
     model.fix("z+", value=(0.01, 0.0, -0.05))
-    found = check(model, 65)
+    found = check(model, most(65, 85))
     assert found.report.backward_error < 1e-11
 
 
@@ -336,7 +341,7 @@ def test_tolerances_refer_to_forces_without_the_bulk_modulus():
     model = body("BBar3D20N", cells=5)
     model.fix("z+", value=(0.01, 0.0, -0.05))
     report = model.static("amg", tolerance=1e-5).solve().report
-    assert report.iterations < 50
+    assert report.iterations < most(50, 65)
     assert report.force_error < 1e-3
 
 
@@ -357,7 +362,7 @@ def test_without_kernels(monkeypatch):
     check(body("EnhancedStrain3D8N", cells=5), 50)
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 @pytest.mark.parametrize("element", ["EnhancedStrain3D8N", "BBar3D10N", "BBar3D20N", "both"])
 def test_kernels_and_numpy_take_the_same_steps(element):
     mesh = two_meshes() if element == "both" else body(element, cells=3).mesh
@@ -372,7 +377,7 @@ def test_kernels_and_numpy_take_the_same_steps(element):
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9 * np.abs(plain).max())
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_both_start_anew_from_what_is_left(monkeypatch):
     monkeypatch.setattr(displacement_pressure, "DIRECTIONS", 12)
     system = system_of(body("BBar3D20N", cells=3))
@@ -386,7 +391,7 @@ def test_both_start_anew_from_what_is_left(monkeypatch):
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-7 * np.abs(plain).max())
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_the_kernel_refuses_what_does_not_fit():
     equations = system_of(body("EnhancedStrain3D8N", cells=3))._equations
     solver = equations._multigrid
@@ -412,7 +417,7 @@ def test_the_kernel_refuses_what_does_not_fit():
         made().solve(np.zeros(5), 1e-8, 1.0, 10, 10, 1e-10, lambda residual: True)
 
 
-@pytest.mark.skipif(kernels("multigrid") is None, reason="the compiled kernels were not built")
+@compiled
 def test_results_do_not_depend_on_the_number_of_threads():
     same_on_all_threads(lambda: body("EnhancedStrain3D8N").solve("amg").u, (1, 2, 3))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernel_threads import same_on_all_threads
+from computing import compiled, same_on_all_threads
 
 import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -15,7 +15,7 @@ from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
 from kratos_lite.solvers.plate_level import bending_modes, plate_axes, plate_level
 
-pytestmark = pytest.mark.skipif(kernels("multigrid") is None, reason="multigrid is not compiled")
+pytestmark = compiled
 LIMIT = 60
 STEEL = kl.Isotropic3D(E=2e11, nu=0.3)
 CELLS = {"4N": (11, 11, 11), "8N": (11, 11, 11), "10N": (5, 5, 5), "20N": (6, 6, 6), "27N": (5, 5, 5)}

@@ -306,7 +306,7 @@ def test_constants_cut_to_eight_digits_fail_the_rule():
     found = failed(check_rule("tetrahedron", truncated()))
     assert set(found) == {"monomials"}
     assert 1e-10 < found["monomials"].measured < 1e-7
-    assert found["monomials"].limit == 2e-14
+    assert found["monomials"].limit == 1e-13
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "wedge", "tetrahedron", "pyramid"])
@@ -584,7 +584,7 @@ def element_with(parent, **changes):
         (
             KinematicLinear3D13N,
             five_points(),
-            {"rank", "stretched", "linear patch", "quadratic patch", "bending"},
+            {"rank", "linear patch", "quadratic patch", "bending"},
         ),
         (KinematicLinear3D13N, pyramid(3), {"rank"}),
         (

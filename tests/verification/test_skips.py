@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from computing import BUILT
 from meshes import elsewhere
 
 import kratos_lite as kl
@@ -249,7 +250,7 @@ def test_solving_computes_neither_stress_nor_mass(monkeypatch):
     model = bodies(1)
     model.add(kl.Traction("z+", (1.0, 0, 1.0)))
     result = model.solve()
-    assert asked == []
+    assert asked == ([] if BUILT else ["strain"])  # of which NumPy computes the forces inside, once
     assert result.stress().any()
     asked.clear()
     element = model.element_groups()[0].at(model.mesh.points)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernel_threads import set_threads
+from computing import compiled, set_threads
 
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.mdpa import scan
@@ -12,7 +12,7 @@ from kratos_lite.io.formats.mdpa.scan import Source
 from kratos_lite.native import kernels
 
 TEXT = kernels("text")
-pytestmark = pytest.mark.skipif(TEXT is None, reason="the kernels are not built")
+pytestmark = compiled
 LAYOUTS = [Layout("node", "irr"), Layout("id", "i"), Layout("node", "ibr"), Layout("element", "ip")]
 EDGES = (
     "0.1 -0 -0.0 +1.5 .5 5. 1e22 1e23 8.5D-3 1d+2 123456789012345678 0.30000000000000004 9007199254740993 "
