@@ -44,7 +44,6 @@ MUTATIONS = [
         "tests/elements/test_formulations.py",
     ),
     Mutation("model/locking.py", "* ratio**2", "* ratio", "tests/model/test_locking.py"),
-    Mutation("model/locking.py", "walls.taper * ratio", "ratio", "tests/model/test_locking.py"),
     Mutation(
         "model/spurious_modes.py",
         "joined.sum(axis=1) >= 2",
