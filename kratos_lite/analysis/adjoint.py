@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kratos_lite.analysis.error_estimate import SAFETY, Origin, QuantityError, in_few_elements
+from kratos_lite.analysis.error_estimate import SAFETY, QuantityError, in_few_elements
+from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.quantities import Quantity, Solved
 from kratos_lite.assembly.recovery import Recovery
 from kratos_lite.errors import ModelError

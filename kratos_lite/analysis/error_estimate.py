@@ -2,35 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, Kind, Kinds
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import ALONE, Alone
-from kratos_lite.model.loads import Load
 from kratos_lite.model.locking import better_element
-from kratos_lite.model.structure import Structure
 from kratos_lite.records import field, record
 from kratos_lite.typing import Array
-
-
-class Origin(Protocol):
-    """What a result is the solution of."""
-
-    @property
-    def model(self) -> Structure:
-        """The structure, as it was solved."""
-
-    @property
-    def loads(self) -> Sequence[Load]:
-        """Its loads."""
-
-    def adjoint(self, load: Array, motion: Array) -> Array:
-        """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
 @record(frozen=True, eq=False)
@@ -47,8 +27,7 @@ class ErrorEstimate:
     absolute : ‖e‖ of the whole model in √J.
     relative : ‖e‖ / ‖u‖, with ‖u‖ of the exact solution as the estimate has it.
     per_element : (m,) ‖e‖ of each element in √J; the root of the sum of their squares is `absolute`.
-    method : how it was found: ``"recovery"`` or ``"averaging"`` of stresses, whichever is smaller, or
-        ``"equilibrated"``.
+    method : how it was found: ``"recovery"`` or ``"averaging"`` of stresses, whichever is smaller.
     warnings : why it cannot be trusted; empty where nothing speaks against it.
     safety : factor in all these; without it they are the best guess.
     """

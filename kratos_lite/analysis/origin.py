@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Protocol
 
 from kratos_lite.errors import ModelError
-from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
 from kratos_lite.records import record
 from kratos_lite.typing import Array
@@ -22,10 +21,9 @@ class Analysis(Protocol):
 
 @record(frozen=True, eq=False)
 class Origin:
-    """An analysis with its loads, and the version of its model, when it was solved."""
+    """An analysis, and the version of its model, when it was solved."""
 
     analysis: Analysis
-    loads: list[Load]
     version: tuple[int, int]
 
     @property

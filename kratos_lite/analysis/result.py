@@ -16,20 +16,19 @@ from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.records import Tabular
 from kratos_lite.typing import Array, Numbers
-from kratos_lite.validation import choice, finite, flag, instance, whole_number
+from kratos_lite.validation import finite, flag, instance, whole_number
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import ArrayLike
 
-    from kratos_lite.analysis.error_estimate import ErrorEstimate, Origin, QuantityError
+    from kratos_lite.analysis.error_estimate import ErrorEstimate, QuantityError
     from kratos_lite.analysis.line_values import LineValues
+    from kratos_lite.analysis.origin import Origin
     from kratos_lite.analysis.point_values import PointValues
     from kratos_lite.analysis.quantities import Quantity
     from kratos_lite.mesh.locate import Located
-
-METHODS = ("recovery", "equilibrated")
 
 
 class Result(ElementFields, Tabular):
@@ -204,30 +203,24 @@ class Result(ElementFields, Tabular):
     # ---- error ---------------------------------------------------------------------------------
 
     @overload
-    def error(self, of: None = None, *, method: str = "recovery") -> ErrorEstimate: ...
+    def error(self, of: None = None) -> ErrorEstimate: ...
 
     @overload
     def error(self, of: Quantity) -> QuantityError: ...
 
-    def error(self, of: Quantity | None = None, *, method: str = "recovery") -> ErrorEstimate | QuantityError:
+    def error(self, of: Quantity | None = None) -> ErrorEstimate | QuantityError:
         """Return an estimate of the error in the energy norm, or of the error of a quantity.
 
         By recovery, the recovered nodal stresses take the place of the exact ones.  The error of a quantity
         takes another solution, of the adjoint; an analysis that is kept has its matrix ready:
         ``model.static()``.
 
-        Stresses in equilibrium with the loads give an upper bound, up to what prescribed displacements and
-        curved faces differ from those of the mesh.  They are sought in polynomials three degrees above
-        those of the elements, which is enough in practice, but no proof.  It takes longer than a solution.
-
         Sources: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 24 (1987) 337-357; Becker & Rannacher, Acta
-        Numerica 10 (2001) 1-102; Ladevèze & Pelle, Mastering Calculations in Linear and Nonlinear Mechanics
-        (2005).
+        Numerica 10 (2001) 1-102.
 
         Parameters
         ----------
         of : a quantity such as `DisplacementAt`, `ReactionOf` or `StressAt`; the energy norm if not given.
-        method : ``"recovery"``, or ``"equilibrated"`` for an upper bound in the energy norm.
 
         Returns
         -------
@@ -237,10 +230,9 @@ class Result(ElementFields, Tabular):
         Raises
         ------
         InputError
-            `of` is no quantity, there is no such method for it, or the result is not that of a static
-            analysis.
+            `of` is no quantity, or the result is not that of a static analysis.
         MeshError, ModelError
-            The quantity does not fit, the model has changed since, or it has no bound by equilibrium.
+            The quantity does not fit, or the model has changed since.
 
         Examples
         --------
@@ -252,28 +244,21 @@ class Result(ElementFields, Tabular):
         >>> result = bar.solve()
         >>> 0 < result.error(of=kl.MeanDisplacement("x+", "z")).relative < 0.05
         True
-        >>> result.error().relative < result.error(method="equilibrated").relative < 0.3
+        >>> 0.05 < result.error().relative < 0.3
         True
         """
-        choice(method, "method", METHODS)
-        if of is None and method == "recovery":
+        if of is None:
             return self._error
-        check_whole(self.mesh, "the error of a quantity, or its bound by equilibrium,")
+        check_whole(self.mesh, "the error of a quantity")
         if self._origin is None:
             raise InputError(
-                "the error of a quantity and the bound of an error need the model and the matrix of a static "
-                "analysis; this result has none"
+                "the error of a quantity needs the model and the matrix of a static analysis; this result "
+                "has none"
             )
-        if of is None:
-            from kratos_lite.analysis.error_bound import error_bound  # a quick start for results
-
-            return error_bound(self._origin, self.groups, self._strained, self.energy())
         from kratos_lite.analysis.adjoint import error_of
         from kratos_lite.analysis.quantities import Quantity
 
         quantity = instance(of, "of", Quantity, "kl.DisplacementAt((1, 0, 0), 'z')")
-        if method != "recovery":
-            raise InputError(f"the error of a quantity is estimated by recovery; got method={method!r}")
         return error_of(self, self._origin, quantity, self._strained, self._recovery)
 
     @cached_property

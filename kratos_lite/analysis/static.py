@@ -299,7 +299,7 @@ class StaticAnalysis:
             warnings += check_deformation(model, self.kinds, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
-        origin = Origin(self, case.loads, model.version)
+        origin = Origin(self, model.version)
         return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin, self.kinds)
 
     def release(self) -> None:

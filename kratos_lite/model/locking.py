@@ -1,10 +1,9 @@
 """Locking forecast: elements that will come out too stiff, and the better choice by name.
 
 A plain linear element bends by shearing: its energy exceeds that of bending by G/E (a/t)², with a its length
-and t the thickness of the whole wall, however many lie through it.  Eight-node bricks whose sides taper are
-stiff in bending whatever their strains are, if patches of them reproduce constant stress.
+and t the thickness of the wall; here that of the element, as if it were alone through the wall.
 
-Sources: Hughes, The Finite Element Method (1987), ch. 4; MacNeal, IJNME 24 (1987) 1793.
+Source: Hughes, The Finite Element Method (1987), ch. 4.
 """
 
 from __future__ import annotations
@@ -17,36 +16,23 @@ from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_of_library
 from kratos_lite.elements.overridden_steps import MECHANICS
-from kratos_lite.mesh import Faces, Mesh
-from kratos_lite.model.opposite_faces import OppositeFaces, opposite_of
-from kratos_lite.model.supports import Supports
-from kratos_lite.model.walls import STIFF, Walls, shear_over_young, walls_of
+from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 
-TAPER = 2.0
-"""Slope of the sides against each other, times length over thickness, that makes cells too stiff."""
+LONG = 2.0
+"""Longest edge over the shortest one from which a cell may come out too stiff in bending."""
 QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexahedron": "3D20N"}
 
 
-def check_locking(
-    mesh: Mesh,
-    groups: Sequence[ElementGroup],
-    supports: Supports,
-    faces: Faces,
-    kinds: Kinds | None = None,
-) -> list[str]:
+def check_locking(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | None = None) -> list[str]:
     """Return a warning for each kind of elements that will lock, with the better choice.
 
     Over ranks, `kinds` are those of all.
     """
     kinds = groups if kinds is None else kinds
     warnings = [*_near_half(kinds), *_with_apex(kinds)]
-    bending = [kind for kind in kinds if _has_two_sides(kind.element)]
-    if bending:
-        mine = [group for group in groups if _has_two_sides(group.element)]
-        walls = walls_of(OppositeFaces(mesh, faces), mine, bending, supports.fixed)
-        for element in dict.fromkeys(kind.element for kind in bending):
-            warnings += _in_bending(mesh, element, [g for g in mine if g.element is element], walls)
+    for element in dict.fromkeys(kind.element for kind in kinds if _shears(kind.element)):
+        warnings += _in_bending(mesh, element, [group for group in groups if group.element is element])
     return warnings
 
 
@@ -94,52 +80,40 @@ def better_element(kind: type[KinematicLinear], family: str = "KinematicLinear")
 # ---- in bending ----------------------------------------------------------------------------------------
 
 
-def _has_two_sides(kind: type[KinematicLinear]) -> bool:
-    """Return whether an element is a linear brick or wedge of the library."""
-    return is_of_library(kind) and len(kind.nodes) == kind.shape.corners and max(opposite_of(kind.shape)) > 0
-
-
-def _in_bending(
-    mesh: Mesh, kind: type[KinematicLinear], groups: Sequence[ElementGroup], walls: Walls
-) -> list[str]:
-    """Return the warning about elements of one kind in walls that may bend."""
-    modulus = np.full(mesh.n_elements, np.nan)
+def _in_bending(mesh: Mesh, kind: type[KinematicLinear], groups: Sequence[ElementGroup]) -> list[str]:
+    """Warn of plain linear bricks and wedges that are long: of the one with most G/E (a/t)², by its edges."""
+    most, text = 0.0, ""
+    edges = np.array(kind.shape.edges).T
     for group in groups:
-        modulus[group.rows] = shear_over_young(group.material.C)
-    walls = walls.take(~np.isnan(modulus[walls.element]))
-    ratio, name = walls.length / walls.thickness, kind.__name__
-    if kind.formulation == "enhanced":
-        most, place = _worst(mesh, walls, walls.taper * ratio)
-        if not most > TAPER:
-            return []
-        cure = "take KinematicLinear3D20N or KinematicLinear3D27N, or cells with parallel sides"
-        return [
-            f"{name} with sides that taper, {place}, is too stiff in bending as all of 8 nodes are; {cure}"
-        ]
-    if kind.formulation == "b_bar":
-        most, place = _worst(mesh, walls, np.where(walls.layers == 1, ratio, 0.0))
-        if most > 0:
-            wrong = "far too easily in short cells, too stiffly in long ones"
-            better = better_element(kind)
-            return [f"{name} alone through a thickness, {place}, may bend {wrong}; take {better}"]
-    most, place = _worst(mesh, walls, modulus[walls.element] * ratio**2)
-    if most > STIFF:
-        more = f"{1 + most:.2g} times too stiff in bending"
-        return [f"{name} may come out {more}, {place}; take {better_element(kind)}"]
-    return []
+        X = mesh.points[group.nodes]
+        length = np.linalg.norm(X[:, edges[0]] - X[:, edges[1]], axis=2)
+        thickness = np.where(length > 0, length, np.inf).min(axis=1)
+        ratio = length.max(axis=1) / thickness
+        ratio[~mesh.own_elements[group.rows]] = 0.0
+        excess = _shear_over_young(group.material.C) * ratio**2
+        worst = int(np.argmax(excess))
+        if ratio[worst] > LONG and excess[worst] > most:
+            element = mesh.element_ids[group.rows[worst]]
+            most = float(excess[worst])
+            text = f"such as element {element} ({ratio[worst]:.3g} times as long as thick)"
+    most, text = min(mesh.ranks.gather((-most, text)))
+    if not text:
+        return []
+    return [
+        f"{kind.__name__} may come out up to {1 - most:.2g} times too stiff in bending, {text}; "
+        f"take {better_element(kind)}"
+    ]
 
 
-def _worst(mesh: Mesh, walls: Walls, size: Array) -> tuple[float, str]:
-    """Return the largest of the sizes of walls, 0 without any, and the place of the first that has it."""
-    mine = None
-    if len(size):
-        worst = int(np.argmax(size))
-        element = walls.element[worst]
-        text = (
-            f"such as element {mesh.element_ids[element]} ({walls.length[worst]:.3g} m long, "
-            f"{walls.layers[worst]} of them through the thickness of {walls.thickness[worst]:.3g} m)"
-        )
-        mine = -float(size[worst]), int(walls.side[worst]), int(mesh.element_ids[element]), text
-    found = [one for one in mesh.ranks.gather(mine) if one is not None]
-    most, _, _, place = min(found, default=(0.0, 0, 0, ""))
-    return -most, place
+def _shear_over_young(C: Array) -> float:
+    """Return the mean shear modulus over the mean of Young's moduli of a C (6, 6)."""
+    try:
+        return float(C.diagonal()[3:].mean() * np.linalg.inv(C).diagonal()[:3].mean())
+    except np.linalg.LinAlgError:
+        return 0.0
+
+
+def _shears(kind: type[KinematicLinear]) -> bool:
+    """Return whether an element is a plain linear brick or wedge of the library, which bends by shearing."""
+    linear = kind.shape.cell in ("hexahedron", "wedge") and len(kind.nodes) == kind.shape.corners
+    return linear and is_of_library(kind) and kind.formulation != "enhanced"

@@ -243,7 +243,7 @@ class Structure(SupportedSolid, Tabular):
         warnings += check_joints(mesh, faces)
         warnings += check_coincident(mesh, used, self.supports.own_constraints)
         warnings += checks.check_scales(mesh, kinds)
-        warnings += check_locking(mesh, groups, self.supports, faces, kinds)
+        warnings += check_locking(mesh, groups, kinds)
         if any(kind.element.spurious_modes for kind in kinds):
             from kratos_lite.model.spurious_modes import check_spurious_modes  # rarely needed
 

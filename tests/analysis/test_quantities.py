@@ -395,5 +395,5 @@ def test_results_of_a_motion_or_a_time_are_refused():
     wheel = kl.Model(kl.annulus(0.2, 1.0, 0.1), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
     wheel.fix("inner")
     wheel.add(kl.ale.Rotation("z", rate=10.0))
-    with pytest.raises(InputError, match="need the model and the matrix of a static"):
+    with pytest.raises(InputError, match="needs the model and the matrix of a static"):
         wheel.solve().error(of=kl.DisplacementAt((0.5, 0, 0), "x"))

@@ -16,18 +16,6 @@ def warnings(size, cells, element, material=STEEL, supports=(("x-", "xyz"),)):
     return model.check()
 
 
-def bent(shift):
-    """Return MacNeal and Harder's straight beam of six cells, with the ends of the cells shifted."""
-    mesh = kl.box((6, 0.1, 0.2), (6, 1, 1), "EnhancedStrain3D8N")
-    X = mesh.points.copy()
-    for x in range(1, 6):
-        row = np.abs(X[:, 0] - x) < 1e-9
-        X[row, 0] += np.where(X[row, 2] > 0.1, 1, -1) * shift(x)
-    model = kl.Model(mesh.replace(points=X), STEEL)
-    model.fix("x-")
-    return model
-
-
 @pytest.mark.parametrize("cells", [(10, 10, 1), (10, 10, 4), (40, 4, 1)])
 def test_plain_bricks_that_are_long_beside_a_wall_are_forecast_to_lock(cells):
     (text,) = warnings((10, 1, 0.1), cells, PLAIN)
@@ -45,7 +33,7 @@ def test_the_forecast_has_the_size_of_the_error(cells, measured):
     exact = 4 * 0.1 * 10**3 / (210e9 * 1 * 0.1**3)
     share = float(deflection / exact)
     assert abs(share / measured - 1) < 0.2
-    factor = float(model.check()[0].split("come out ")[1].split(" times")[0])
+    factor = float(model.check()[0].split("come out up to ")[1].split(" times")[0])
     assert 0.7 < factor * share < 1.1
 
 
@@ -60,12 +48,6 @@ def test_the_forecast_has_the_size_of_the_error(cells, measured):
 )
 def test_well_refined_plain_bricks_and_single_cells_are_not_warned_of(size, cells):
     assert warnings(size, cells, PLAIN) == []
-
-
-@pytest.mark.parametrize("supports", [[("z-", "z")], [("z+", "z")], [("z-", "z"), ("z+", "z")]])
-def test_walls_whose_sides_are_held_cannot_bend(supports):
-    assert warnings((1, 1, 0.02), (20, 20, 1), PLAIN) != []
-    assert warnings((1, 1, 0.02), (20, 20, 1), PLAIN, supports=[("x-", "xyz"), *supports]) == []
 
 
 def test_elements_that_do_not_lock_are_not_warned_of():
@@ -90,23 +72,6 @@ def test_pyramids_are_warned_of_unless_they_are_few():
     (text,) = [t for t in warnings((1, 1, 0.01), (4, 4, 1), "KinematicLinear3D5N") if "3D5N" in t]
     assert "locks in bending" in text
     assert "take KinematicLinear3D13N" in text
-
-
-def test_mean_dilatation_with_one_brick_through_the_thickness_bends_wrongly():
-    (text,) = warnings((10, 1, 1), (10, 1, 1), "BBar3D8N")
-    assert "alone through a thickness" in text
-    assert text.endswith("take EnhancedStrain3D8N")
-
-
-def test_trapezoids_are_stiff_for_every_brick_of_eight_nodes():
-    (text,) = bent(lambda x: 0.1 * (-1) ** x).check()
-    assert "sides that taper" in text
-    assert "take KinematicLinear3D20N or KinematicLinear3D27N" in text
-
-
-@pytest.mark.parametrize("shift", [lambda x: 0.0, lambda x: 0.1], ids=["rectangles", "parallelograms"])
-def test_parallel_sides_are_no_trapezoids(shift):
-    assert bent(shift).check() == []
 
 
 @pytest.mark.parametrize(
