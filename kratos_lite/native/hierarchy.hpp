@@ -58,6 +58,7 @@ public:
         Level& fine = levels.back();
         fine.clusters.exact = {};
         fine.thin = true;
+        X.clear();
         settings.thin = std::max(settings.thin, 1);
         transfers.emplace_back();
         Transfer& t = transfers.back();
@@ -110,12 +111,13 @@ public:
             matrix = std::move(next);
             data = matrix.data.data();
             B.swap(R);
+            X = centroids(X, aggregates, static_cast<int32_t>(count / sets), sets);
             fixed.assign(count * MODES, 0);
             Level& coarse = add_coarse(matrix, fixed);
             graph = coarse.graph;
             if (sets > 1)
                 coarse.cluster_equally(data, fixed, sets);
-            else
+            else if (!X.empty())
                 coarse.cluster(data, fixed, X.data(), settings.theta, planes ? COARSE_FAR : FAR);
             coarse.largest = largest_eigenvalue(coarse);
         }
@@ -234,16 +236,19 @@ private:
         dispatch<double>([&](auto V) KL_INLINE_LAMBDA { factorize_rows<V>(coarsest, 0, N, 1e-13 * scale); });
     }
 
-    // The mean coordinates of each aggregate, where there is one coarse node for each.
-    static Doubles centroids(const Doubles& X, const Ints& of, int32_t count) {
-        Doubles sum(3 * static_cast<size_t>(count), 0.0), nodes(count, 0.0);
+    // The mean coordinates of each aggregate, for each of its coarse nodes; none where those of nodes are unknown.
+    static Doubles centroids(const Doubles& X, const Ints& of, int32_t count, int sets) {
+        if (X.empty()) return {};
+        Doubles sum(3 * static_cast<size_t>(count), 0.0), nodes(count, 0.0), repeated;
         for (size_t i = 0; i < of.size(); ++i) {
             if (of[i] < 0) continue;
             nodes[of[i]] += 1;
             for (int c = 0; c < 3; ++c) sum[3 * static_cast<size_t>(of[i]) + c] += X[3 * i + c];
         }
         for (size_t e = 0; e < sum.size(); ++e) sum[e] /= nodes[e / 3];
-        return sum;
+        for (auto at = sum.begin(); at != sum.end(); at += 3)
+            for (int e = 0; e < sets; ++e) repeated.insert(repeated.end(), at, at + 3);
+        return repeated;
     }
 
     // The first six of the columns of B.
@@ -283,7 +288,6 @@ private:
         Transfer& t = transfers.back();
         t.P = clusters.empty() ? smoothed_prolongator<b>(smoothing, inverse.data())
                                : smoothed_prolongator<b>(smoothing, clusters);
-        if (sets == 1) X = centroids(X, of, count);
         t.columns = Transposed(nodes, t.P.indptr, t.P.indices);
         next = galerkin<b>(g, data, t.P, t.columns, nodes);
         return nodes;
@@ -297,7 +301,7 @@ private:
     Ints aggregates;       // of the nodes of the last level
     Skyline<double> coarsest;  // a direction without stiffness is left at zero
     Doubles inverse;  // D^-1 of the last level, while setting up
-    Doubles X;        // nodes of the last level
+    Doubles X;        // nodes of the last level, where they are known
 };
 
 }  // namespace kl

@@ -2,7 +2,6 @@
 
 import shutil
 import tempfile
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,6 @@ from kratos_part_files import write_part_files
 
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MeshError
-from kratos_lite.io.formats import ranks as reading
-from kratos_lite.io.formats.mdpa.ranks import read_mdpa_by_ranks
 from kratos_lite.mesh import ids_of
 from kratos_lite.records import replace
 
@@ -34,22 +31,7 @@ def read(path, **options):
         return None, str(error)
 
 
-@contextmanager
-def ranges(bytes_of_file):
-    """Let files of so many bytes be read by ranges."""
-    before, reading.LARGE = reading.LARGE, bytes_of_file
-    try:
-        yield
-    finally:
-        reading.LARGE = before
-
-
-def test_the_shares_make_the_whole(ranks, path, large):
-    with ranges(large):
-        check_input(ranks, path)
-
-
-def check_input(ranks, path):
+def test_the_shares_make_the_whole(ranks, path):
     whole, expected = read(path)
     case, error = read(path, comm=ranks)
     assert error == expected
@@ -82,7 +64,7 @@ def check_shares(ranks, whole, case):
         assert np.array_equal(u0, whole_u0[rows])
 
 
-test_the_shares_make_the_whole.cases = [(path, large) for path in inputs() for large in (0, 10**9)]
+test_the_shares_make_the_whole.cases = inputs()
 
 
 def malformed():
@@ -91,20 +73,16 @@ def malformed():
     )
 
 
-def test_malformed_files_give_the_error_of_one_process(ranks, path, large):
-    with ranges(large):
-        expected, found = read(path)[1], read(path, comm=ranks)[1]
+def test_malformed_files_give_the_error_of_one_process(ranks, path):
+    expected, found = read(path)[1], read(path, comm=ranks)[1]
     assert found == expected
     assert len(set(ranks.gather(found))) == 1
 
 
-test_malformed_files_give_the_error_of_one_process.cases = [
-    (path, large) for path in malformed() for large in (0, 10**9) if large == 0 or path.suffix == ".mdpa"
-]
+test_malformed_files_give_the_error_of_one_process.cases = malformed()
 
 
-def test_a_large_file_is_read_by_ranges(ranks, element):
-    """Of a file of ordinary form, nobody reads all; values, loads and constraints come along."""
+def test_values_loads_and_constraints_come_along(ranks, element):
     folder = folder_of(ranks)
     try:
         path, _ = parts_of_beam(ranks, folder, element=element)
@@ -116,10 +94,7 @@ def test_a_large_file_is_read_by_ranges(ranks, element):
             )
         ranks.sum(1)
         whole = kl.read_case(path)
-        document = read_mdpa_by_ranks(path, ranks, strict=True)  # no error: it was not read whole
-        assert document.mesh.subdomain.n_all == whole.model.mesh.n_nodes
-        with ranges(0):
-            case = kl.read_case(path, comm=ranks)
+        case = kl.read_case(path, comm=ranks)
         check_shares(ranks, whole, case)
         found = {one.slave for of_rank in ranks.gather(_by_ids(case.model)) for one in of_rank}
         assert found == {one.slave for one in _by_ids(whole.model)}
@@ -129,11 +104,7 @@ def test_a_large_file_is_read_by_ranges(ranks, element):
             shutil.rmtree(folder)
 
 
-test_a_large_file_is_read_by_ranges.cases = [
-    "KinematicLinear3D8N",
-    "KinematicLinear3D27N",
-    "KinematicLinear3D4N",
-]
+test_values_loads_and_constraints_come_along.cases = [f"KinematicLinear3D{n}N" for n in (8, 27, 4)]
 
 
 def _by_ids(model):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,6 @@ from kratos_lite.distributed.partition import partitioned, parts_of
 from kratos_lite.distributed.pieces import Piece
 from kratos_lite.distributed.subdomains import scattered
 from kratos_lite.io.formats.document import Constraint, Document
-from kratos_lite.io.formats.mdpa.ranges import Unusual
-from kratos_lite.io.formats.mdpa.ranks import read_mdpa_by_ranks
 from kratos_lite.io.formats.part_files import part_files, read_part_files
 from kratos_lite.io.formats.pieces import joined, piece_of
 from kratos_lite.mesh import Mesh, without_repeats
@@ -21,12 +18,9 @@ from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
-LARGE = 4_000_000
-"""Bytes of a file from which no rank but one may hold all of it; smaller ones are read whole by all."""
-
 
 def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bool], Document]) -> Document:
-    """Return what this rank holds of a model file, or of the part files that it stands for.
+    """Return what this rank holds of a model file that rank 0 reads, or of the part files that it stands for.
 
     Parameters
     ----------
@@ -37,27 +31,10 @@ def read_shared(path: Path, ranks: Alone, strict: bool, read: Callable[[Path, bo
     """
     if files := part_files(path):
         return read_part_files(files, path, ranks, strict)
-    size = ranks.gather(path.stat().st_size if path.is_file() else 0)[0]
-    if size < LARGE:
-        return shared(read(path, strict), ranks)
-    if path.suffix.lower() == ".mdpa":
-        with suppress(Unusual):
-            return read_mdpa_by_ranks(path, ranks, strict)
-    return handed_out(lambda: read(path, strict), ranks)
-
-
-def handed_out(read: Callable[[], Document], ranks: Alone) -> Document:
-    """Return what this rank holds of a document that rank 0 alone reads; all ranks call it.
-
-    Parameters
-    ----------
-    read : returns the document.
-    ranks : that share it.
-    """
     with ranks.together():
-        whole = read() if ranks.rank == 0 else None
+        whole = read(path, strict) if ranks.rank == 0 else None
         if ranks.any(whole is not None and _has_repeated_values(whole)):
-            return shared(whole or read(), ranks)  # in which order they count, only the whole knows
+            return shared(ranks.first(whole), ranks)  # in which order they count, only the whole knows
         rest = ranks.first(None if whole is None else _without_mesh(whole))
         document = rest if whole is None else replace(whole, mesh=rest.mesh, geometries=[])
         piece = Piece() if whole is None else piece_of(whole.mesh)
@@ -83,7 +60,7 @@ def _without_mesh(document: Document) -> Document:
 
 
 def shared(document: Document, ranks: Alone) -> Document:
-    """Return what this rank holds of a document that every rank has read.
+    """Return what this rank holds of a document that every rank has.
 
     Values of nodes and conditions that are elsewhere stay in it; whoever uses them skips them.
 
