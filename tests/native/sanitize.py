@@ -46,14 +46,14 @@ def main(kind: str = "memory", *arguments: str) -> int:
     """Build, run, and return the exit code of pytest."""
     flags, libraries, options = KINDS[kind]
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder)
-        for name in ("kratos_lite", "tests", "examples", "docs", "benchmarks"):
-            shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("*.so", "__pycache__"))
-        shutil.copy(ROOT / "pyproject.toml", copy)
+        copy = Path(folder) / ROOT.name
+        shutil.copytree(
+            ROOT, copy, ignore=shutil.ignore_patterns("*.so", "__pycache__", ".git", ".venv*", "build")
+        )
         native = copy / "kratos_lite" / "native"
         build(sorted(native.glob("*.cpp")), native, *FLAGS, *flags)
         preload = " ".join(map(library, libraries))
-        environment = {**os.environ, **options, "PYTHONPATH": folder, "LD_PRELOAD": preload}
+        environment = {**os.environ, **options, "PYTHONPATH": str(copy), "LD_PRELOAD": preload}
         command = [
             sys.executable,
             "-m",
@@ -64,7 +64,7 @@ def main(kind: str = "memory", *arguments: str) -> int:
             "no:cacheprovider",
             *(arguments or TESTS),
         ]
-        return subprocess.run(command, cwd=folder, env=environment, check=False).returncode
+        return subprocess.run(command, cwd=copy, env=environment, check=False).returncode
 
 
 def library(name: str) -> str:
