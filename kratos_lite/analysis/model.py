@@ -94,8 +94,8 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken or its supports leave rigid-body modes free; what belongs to `error` is
-            wrong or given without it; or the quantity is 0.
+            If the model is broken, or its supports leave rigid-body modes free along which loads do not
+            balance; what belongs to `error` is wrong or given without it; or the quantity is 0.
         SolveError
             If the accuracy asked for cannot be reached.
         """
@@ -147,7 +147,7 @@ class Model(Structure):
         Raises
         ------
         MeshError, ModelError, InputError
-            If the model is broken, its supports leave rigid-body modes free, or it has a motion.
+            If the model is broken, or it has a motion.
 
         Examples
         --------

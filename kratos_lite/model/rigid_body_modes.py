@@ -33,24 +33,23 @@ REST = 1e-6
 """What these passes leave at most of a motion of size 1 that is not free."""
 
 
-def free_motions(
-    mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup], found: Bodies | None = None
-) -> FreeMotions:
+def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup]) -> FreeMotions:
     """Return the rigid motions that the supports leave free, part by part."""
-    found = found or bodies(mesh)
+    found = bodies(mesh)
     frames = found.frames(mesh)
     equations = _equations(mesh, found, supports)
     if mesh.subdomain is not None:
         equations = _of_all_ranks(mesh, frames, equations)
     group_of = _groups(len(frames[0]), equations)
-    found_modes: list[tuple[Ints, list[Array]]] = []
-    for group, mine in zip(*_by_group(group_of, equations), strict=True):
-        free = (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, mine)
-        found_modes.append((group, free))
-    counts = np.array([free[0].shape[1] for _, free in found_modes], dtype=np.int64)
+    members, mine = _by_group(group_of, equations)
+    free = [
+        (_free_modes if len(group) <= FEW else _free_modes_of_many)(mesh, frames, group, some)
+        for group, some in zip(members, mine, strict=True)
+    ]
+    counts = np.array([one.shape[2] for one in free], dtype=np.int64)
     modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
-    for group, free in found_modes:
-        modes[group, :, : free[0].shape[1]] = free
+    for group, one in zip(members, free, strict=True):
+        modes[group, :, : one.shape[2]] = one
     if modes.size:  # the same basis on all ranks
         modes = mesh.ranks.gather(modes)[0]
     return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
@@ -129,8 +128,8 @@ def _by_group(group_of: Ints, equations: _Constraints) -> tuple[list[Ints], list
     return groups, [equations.take(rows) for rows in mine]
 
 
-def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints) -> list[Array]:
-    """Return the free modes (6, k) of each body of a group under its equations.
+def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints) -> Array:
+    """Return the free modes (b, 6, k) of the bodies of a group under its equations.
 
     A rotation is scaled with the size of its body, so that all modes move points about as far.
     """
@@ -145,10 +144,10 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
         least = _spectrum(mesh, frames, group, equations.take(mine), some[row[mine]])[0].min()
         # further equations lift the smallest value; the largest is at most the root of all squares
         if least > 2 * FREE * (6 * len(group) * len(rows)) ** 0.5:
-            return [np.zeros((6, 0))] * len(group)
+            return np.zeros((len(group), 6, 0))
     values, directions = _spectrum(mesh, frames, group, equations, row)
     free = directions[values <= FREE * values.max(initial=1.0)].T
-    return [free[6 * i : 6 * i + 6] for i in range(len(group))]
+    return free.reshape(len(group), 6, -1)
 
 
 def _spectrum(
@@ -187,8 +186,8 @@ def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) 
 
 def _free_modes_of_many(
     mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations: _Constraints
-) -> list[Array]:
-    """Return as `_free_modes` motions (6, k) of each body of a group that span its free ones.
+) -> Array:
+    """Return as `_free_modes` motions (b, 6, k) of the bodies of a group that span its free ones.
 
     Motions at random lose what the equations C resist by (C^T C + s)^-1 s, s small, again and again.
     """
@@ -206,4 +205,4 @@ def _free_modes_of_many(
     for _ in range(PASSES):
         motions = small * np.column_stack([factors.solve(motion) for motion in motions.T])
     span, size, _ = np.linalg.svd(motions, full_matrices=False)
-    return list(span[:, size > REST].reshape(len(group), 6, -1))
+    return np.asarray(span[:, size > REST].reshape(len(group), 6, -1))

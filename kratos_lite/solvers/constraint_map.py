@@ -60,6 +60,8 @@ class ConstraintMap:
     def holding(self, held: Mask) -> ConstraintMap:
         """Return the map with some of the free ones (N,) held, too, where they are at q = 0."""
         keep = ~held.ravel()[self.free]
+        if keep.all():
+            return self
         return ConstraintMap(self.free[keep], self.c, None if self.T is None else self.T[:, keep])
 
     def transform(self, q: NDArray[Any]) -> NDArray[Any]:
