@@ -18,10 +18,6 @@ TITLES = {
     "concentration": "Concentrations of stress",
     "nafems": "NAFEMS",
     "order": "Orders of convergence",
-    "vibration": "Frequencies",
-    "time": "Integration in time",
-    "body": "Bodies in motion",
-    "ale": "Material moving through the mesh",
 }
 """Headings of the families."""
 SMALL = 1e-9

@@ -7,20 +7,14 @@ from fnmatch import fnmatchcase
 
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.verification import (
-    bodies_in_motion,
     concentrations,
     macneal_harder,
-    moving_frames,
-    moving_material,
     nafems,
     orders,
     patch,
     pressure,
-    rotors,
     shells,
     single_element,
-    stepping,
-    vibration,
 )
 from kratos_lite.verification.meshes import element, kind_of
 from kratos_lite.verification.problem import ELEMENTS, Problem, Row, solved
@@ -34,12 +28,6 @@ FAMILIES = (
     concentrations,
     nafems,
     orders,
-    vibration,
-    stepping,
-    bodies_in_motion,
-    moving_material,
-    rotors,
-    moving_frames,
 )
 """Modules with problems, in the order of the table; a new one is a module with a list PROBLEMS."""
 PROBLEMS: dict[str, Problem] = {problem.name: problem for family in FAMILIES for problem in family.PROBLEMS}

@@ -12,9 +12,9 @@ from kratos_lite.analysis.modal import reduced
 from kratos_lite.analysis.stepping import integrate
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import is_quadratic, on_plane
-from kratos_lite.verification.moving_material import BRICKS, WAVE, bar, problem
 from kratos_lite.verification.problem import Problem
 from kratos_lite.verification.scenes import SOIL
+from tests.verification.moving.moving_material import BRICKS, WAVE, bar, problem
 
 LENGTH, FORCE, BED = 40.0, 1e5, 2e6
 """m, N and N/m⁴, of the bar on an elastic bed under a moving load."""

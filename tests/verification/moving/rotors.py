@@ -14,10 +14,10 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads.nodal import NodalForces
 from kratos_lite.typing import Array
 from kratos_lite.verification.meshes import face_forces, is_quadratic
-from kratos_lite.verification.moving_material import BRICKS, RATE, problem, rotor
 from kratos_lite.verification.problem import Problem
-from kratos_lite.verification.rotating_axes import INNER, OUTER, Waves, ramp, waves
 from kratos_lite.verification.scenes import SOIL
+from tests.verification.moving.moving_material import BRICKS, RATE, problem, rotor
+from tests.verification.moving.rotating_axes import INNER, OUTER, Waves, ramp, waves
 
 CELLS = 3, 24
 """Bricks along the radius and around."""

@@ -28,8 +28,8 @@ from kratos_lite.verification.meshes import (
     warped,
 )
 from kratos_lite.verification.problem import Of, Problem, every
-from kratos_lite.verification.rotating_axes import INNER, OUTER
 from kratos_lite.verification.scenes import SOIL
+from tests.verification.moving.rotating_axes import INNER, OUTER
 
 RATE = 30.0
 WAVE = float(np.sqrt(SOIL.C[0, 0] / SOIL.density))
