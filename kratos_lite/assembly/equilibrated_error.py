@@ -108,7 +108,7 @@ def _energies(
     inverse, dV = np.linalg.inv(J), np.linalg.det(J) * rule.weights
     gradients = basis.derivatives(rule.points) @ inverse
     moved = np.einsum("mai,mgaj->mgij", u[group.nodes[chunk]], dN @ inverse)
-    stress = group.material.stress(voigt.symmetric_gradient(moved)) + group.initial_stress(chunk)
+    stress = group.stress(voigt.symmetric_gradient(moved)) + group.initial_stress(chunk)
     load = basis.values(rule.points).T @ ((N @ body) * dV[..., None])
     load -= (gradients @ (voigt.tensor(stress) * dV[..., None, None])).sum(axis=1)
     for face, forces in sides:

@@ -159,7 +159,7 @@ def own_tractions(sides: Sides, groups: Sequence[ElementGroup], u: Array) -> tup
                 nodes = group.nodes[chunk]
                 gradient = np.einsum("mai,mgaj->mgij", u[nodes], group.at(points, chunk).dNdX(xi))
                 strain = voigt.symmetric_gradient(gradient)
-                stress = group.material.stress(strain) + group.initial_stress(chunk)
+                stress = group.stress(strain) + group.initial_stress(chunk)
                 vectors = area_vectors(form, points[nodes[:, list(face)]])
                 t = np.einsum("mgij,mgj->mgi", voigt.tensor(stress), vectors)
                 forces[where[chunk]] = N.T @ t
