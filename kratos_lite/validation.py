@@ -50,7 +50,6 @@ def finite(
     what: str,
     shape: tuple[int | str, ...] | None = None,
     *,
-    largest: float = LARGEST,
     error: type[KratosLiteError] = InputError,
 ) -> Array:
     """Return a finite real number or array of them as floats.
@@ -60,7 +59,6 @@ def finite(
     value : what the caller gave.
     what : what it is for, with its article.
     shape : lengths of the axes; a word such as ``"n"`` stands for any length.
-    largest : size of the largest number that is taken.
     error : class of the error.
 
     Raises
@@ -86,9 +84,9 @@ def finite(
         raise error(f"{what} must be made of real numbers; got {short(value)}") from None
     if shape is not None and not _has(array.shape, shape):
         raise error(f"{what} must have shape ({_axes(shape)}); got {array.shape}")
-    if not (np.abs(array) <= largest).all():
-        first = tuple(map(int, np.argwhere(~(np.abs(array) <= largest))[0]))
-        wanted = f"at most {largest:g} in size" if math.isfinite(array[first]) else "finite"
+    if not (np.abs(array) <= LARGEST).all():
+        first = tuple(map(int, np.argwhere(~(np.abs(array) <= LARGEST))[0]))
+        wanted = f"at most {LARGEST:g} in size" if math.isfinite(array[first]) else "finite"
         found = f"{float(array[first])} at {list(first)}" if array.size > 9 else short(value)
         raise error(f"{what} must be {wanted}; got {found}")
     return array

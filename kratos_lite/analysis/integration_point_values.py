@@ -66,7 +66,7 @@ class GaussPoints:
         """Return ½ ε:C:ε (m, g) in J/m³."""
         strain = self.strain()
         if self.group.element.inherits("stress"):
-            elastic = self.group.material.stress(strain)
+            elastic = self.group.stress(strain)
         else:
             elastic = self.stress() - self.group.initial_stress(slice(None))
         return (strain * elastic).sum(axis=-1) / 2

@@ -18,13 +18,12 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.mass import MASS
 from kratos_lite.elements.overridden_steps import STRAIN, STRESS, internal_load_of, strain_of, stress_of
-from kratos_lite.materials import LinearMaterial
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 
 def compiled_law(group: ElementGroup, *methods: str, stress: bool = True) -> Any:
     """Return the kernels if they stand for the strains, or the stresses, of a group, else None."""
-    if stress and type(group.material).stress is not LinearMaterial.stress:
+    if stress and group.has_own_stress:
         return None
     return compiled("gauss", group.element, *GEOMETRY, *(STRESS if stress else STRAIN), *methods)
 
@@ -132,7 +131,7 @@ def _elastic(element: KinematicLinear, group: ElementGroup, u: Array) -> Array:
     """Return the stresses of nodal displacements (m, k, 3): by the element's own law, or by the material."""
     if not group.element.inherits("stress"):
         return stress_of(element, group.material.C, u)
-    return group.material.stress(strain_of(element, u, group.material.C))
+    return group.stress(strain_of(element, u, group.material.C))
 
 
 def internal_load(points: Array, groups: Sequence[ElementGroup], u: Array) -> Array:

@@ -46,7 +46,7 @@ def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, st
                 "ask for result.stress('gauss')"
             )
         if stress:
-            value = group.material.stress(value)
+            value = group.stress(value)
             value = value if group.prestress is None else value + group.prestress[mine]
         out[at] = value
     return out.reshape(*located.rows.shape, 6)

@@ -164,7 +164,7 @@ class LinearMaterial:
         InputError
             The strain has another shape, or is not finite.
         """
-        e = finite(strain, "a strain", largest=MAX_FLOAT)  # of a solution, of any size
+        e = finite(strain, "a strain")
         if e.shape[-1:] != (6,):
             raise InputError(f"a strain has six components xx yy zz xy yz zx; got shape {e.shape}")
         return e @ self.C.T

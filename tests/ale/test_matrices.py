@@ -48,9 +48,9 @@ def test_rotation_of_the_unit_cube(wheels):
             [-4, 124, -34, -86, -2, 62, -17, -43],
         ]
     )
-    np.testing.assert_allclose(m.G[:2], G, atol=1e-16)
-    np.testing.assert_allclose(m.H[:2], H / 1080, atol=1e-16)
-    assert abs(np.trace(m.G)) < 1e-16
+    np.testing.assert_allclose(m.G[:2], G, atol=1e-15)
+    np.testing.assert_allclose(m.H[:2], H / 1080, atol=1e-15)
+    assert abs(np.trace(m.G)) < 1e-15
     assert np.trace(m.H) == pytest.approx(79 / 135, rel=1e-14)
     assert np.abs(m.G).sum() == pytest.approx(7 / 6, rel=1e-14)
     assert np.abs(m.H).sum() == pytest.approx(9 / 5, rel=1e-14)
@@ -223,7 +223,7 @@ def test_nothing_passes_through_a_uniform_rim(kind, wheels):
     share = scaled(m.G.T @ np.ones(len(m.G))) / scaled(m.G)
     assert share < (1e-13 if kind == "8N" else 2e-3)
     if kind == "8N":
-        np.testing.assert_allclose(m.S, m.G, atol=2e-15 * scaled(m.G))
+        np.testing.assert_allclose(m.S, m.G, atol=1e-14 * scaled(m.G))
     model = graded(model)
     g = wheels.matrices(Rotation("z"), model)
     assert scaled(g.G + g.G.T) > 1e-3 * scaled(g.G)

@@ -67,7 +67,7 @@ def test_smoothing_is_that_of_the_matrix(kind, material):
     linear = system._equations.linear_level()
     r[~free] = 0.0
     z = [multigrid(A, free, model.mesh.points, linear).precondition(r) for A in (product, K)]
-    assert np.abs(z[0] - z[1]).max() < 2e-5 * np.abs(z[1]).max()
+    assert np.abs(z[0] - z[1]).max() < 1e-4 * np.abs(z[1]).max()  # in single precision
 
 
 def test_groups_of_several_kinds_and_a_last_group_that_is_not_full():

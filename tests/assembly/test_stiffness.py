@@ -48,7 +48,7 @@ def pattern_of(points, groups):
     return Pattern(len(points), [group.nodes for group in groups])
 
 
-def assert_sum(points, groups, tolerance=1e-14, skipped=None):
+def assert_sum(points, groups, tolerance=1e-13, skipped=None):
     """Assert that the sparse matrix is the dense one, and return it."""
     want = assemble_dense(points, groups)
     K = assemble_stiffness(points, groups, pattern_of(points, groups), skipped=skipped)

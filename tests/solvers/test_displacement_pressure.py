@@ -180,7 +180,7 @@ def test_means_of_pressures_around_halves_of_long_edges(element, axis):
     assert (first ^ second).all()
     assert first.sum() == second.sum()
     volumes = one[at] ** 2 * 2 * (3e6 / (2 * 1.4999))
-    np.testing.assert_allclose(volumes.sum(), 8.0, rtol=1e-12)
+    np.testing.assert_allclose(volumes.sum(), 8.0, rtol=1e-11)
 
 
 def test_means_of_pressures_around_nodes():
@@ -188,7 +188,7 @@ def test_means_of_pressures_around_nodes():
     one = K.means.matrix.T @ (K.D @ kl.box((1.0, 1.0, 1.0), (2, 2, 2), "BBar3D27N").points.ravel() / 3)
     assert np.count_nonzero(one) == 27
     assert (K.means.ends[:, 0] == K.means.ends[:, 1]).all()
-    np.testing.assert_allclose((one**2).sum() * 2 * (3e6 / (2 * 1.4999)), 1.0, rtol=1e-12)
+    np.testing.assert_allclose((one**2).sum() * 2 * (3e6 / (2 * 1.4999)), 1.0, rtol=1e-11)
 
 
 # ---- materials -------------------------------------------------------------------------------------------
@@ -298,7 +298,7 @@ def test_inverse_within_groups_of_nodes(size):
         dofs = dofs[free[dofs]]
         exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
     found = block_inverse_module.block_inverse(A, free, system.points, D, kept).toarray()
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
 
 
 def test_large_groups_are_single_nodes(monkeypatch):

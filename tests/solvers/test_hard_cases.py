@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
+from rounding import round_off
 
 import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
@@ -278,8 +279,7 @@ def test_other_bodies_are_no_plates(side):
 @pytest.mark.parametrize("element", CELLS)
 def test_stiff_and_soft_layers(element):
     soft = body(element, (1.0, 1.0, 1.0), "z-", contrast=lambda x: np.floor(5 * x[:, 2]) % 2 == 1)
-    # both solutions of the 20-node bricks are off by up to a tenth of rounding times their condition, 9e8
-    check(soft, rtol=3e-8 if element == "20N" else 1e-8)
+    check(soft, rtol=1e-8 + round_off(soft))
 
 
 @pytest.mark.parametrize("element", CELLS)
@@ -421,6 +421,6 @@ def bonded(kind, thickness, layers=40):
 def test_one_very_thin_layer_among_cubes_does_not_stall(kind, thickness):
     analysis = bonded(kind, thickness).static("amg")
     report = analysis.solve().report
-    assert (report.solver, report.backward_error < 2e-15) == ("amg", True)
+    assert (report.solver, report.backward_error < 2e-14) == ("amg", True)
     assert report.iterations <= 30  # 60 to 190 with single nodes, or none that converge
     assert isinstance(analysis.system.K, BlockMatrix)

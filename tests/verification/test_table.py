@@ -31,7 +31,7 @@ CLOSER = {
     **dict.fromkeys(
         ("patch/linear", "patch/seven_bricks", "patch/quadratic", "patch/quadratic_moved"), 1e-13
     ),
-    "patch/bending": 1e-12,
+    "patch/bending": 1e-11,
     "pressure/lame_cylinder_hoop": {"27N": 0.01},
     "pressure/lame_sphere": {"15N": 4e-3, "20N": 2e-3, "27N": 2e-3},
 }
