@@ -141,14 +141,14 @@ def stiffness(element: Element) -> Measured:
     for name, C in (("isotropic", C_ISOTROPIC), ("general", anisotropic())):
         B, S = _by_unit_displacements(cell, C)
         hand = np.einsum("gki,gkj,g->ij", B, S, cell.dV, optimize=True)
-        by_axis = cell.stiffness_by_axis(C).transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
-        errors[f"stiffness(C) of {name} C against Σ B^T C B γ det J"] = difference(cell.stiffness(C), hand)
-        errors[f"stiffness_by_axis(C) of {name} C against Σ B^T C B γ det J"] = difference(by_axis, hand)
-        errors[f"stiffness(C) of a batch, {name} C, against one cell"] = difference(
-            batch.stiffness(C)[0], hand
-        )
-        by_axis = batch.stiffness_by_axis(C)[0].transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
-        errors[f"stiffness_by_axis(C) of a batch, {name} C, against one cell"] = difference(by_axis, hand)
+        for whose, K, parts in (
+            ("", cell.stiffness(C), cell.stiffness_by_axis(C)),
+            (" of a batch", batch.stiffness(C)[0], batch.stiffness_by_axis(C)[0]),
+        ):
+            by_axis = parts.transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
+            for method, found in (("stiffness", K), ("stiffness_by_axis", by_axis)):
+                text = f"{method}(C){whose}, {name} C, against Σ B^T C B γ det J of one cell"
+                errors[text] = difference(found, hand)
     return Measured(worst(errors)[0], 1e-13, worst(errors)[1])
 
 
@@ -172,9 +172,8 @@ def rank(element: Element) -> Measured:
 
     A class may state `spurious_modes` of an element alone; eight bricks of it have none.
     """
-    counts = []
-    for X in (element.shape.nodes, distorted(element)):
-        counts.append(_zeros(element(X).stiffness(C_ISOTROPIC)))
+    cells = (element(X) for X in (element.shape.nodes, distorted(element)))
+    counts = [_zeros(cell.stiffness(C_ISOTROPIC)) for cell in cells]
     spurious = element.spurious_modes
     text = (
         f"{counts[0]} zero-energy modes on the reference cell, {counts[1]} on a distorted one; expected are "
