@@ -68,8 +68,6 @@ def _array(file: ZipFile, name: str, path: str) -> NDArray[Any]:
 
 def write_arrays(path: str | Path, arrays: Mapping[str, Any]) -> None:
     """Write named arrays or numbers to an .npz file, as a whole or not at all; SolveError if one is NaN."""
-    for name, values in arrays.items():
-        refuse_nan(path, name, values)
     from zipfile import ZipFile
 
     from numpy.lib.format import write_array  # np.savez takes allow_pickle for a name before NumPy 2.1
@@ -77,6 +75,7 @@ def write_arrays(path: str | Path, arrays: Mapping[str, Any]) -> None:
     buffer = io.BytesIO()
     with ZipFile(buffer, "w") as file:
         for name, values in arrays.items():
+            refuse_nan(path, name, values)
             with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
                 write_array(entry, np.asarray(values), allow_pickle=False)
     write_whole(path, buffer.getvalue())
