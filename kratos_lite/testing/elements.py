@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,6 @@ from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.overridden_steps import internal_load_of, strain_of
 from kratos_lite.quadrature import Rule
-from kratos_lite.records import replace
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.testing import patches
