@@ -11,7 +11,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 PACKAGE = DOCS.parent / "kratos_lite"
 PICTURE = DOCS / "images" / "structure.svg"
-GROUND = "errors typing validation records registry voigt time_series atomic"
+GROUND = "errors typing validation tabular registry voigt time_series atomic"
 FLOORS = [
     {name: (1.5, "") for name in GROUND.split()},
     {"native": (0, "compiled kernels"), "shapes": (1, "N, dN, faces"), "quadrature": (2, "Gauss points")},

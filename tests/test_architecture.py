@@ -111,7 +111,7 @@ def small_scene(cells, element):
 
 @pytest.mark.parametrize(("cells", "element"), [(1, "Element3D8N"), (3, "Element3D8N"), (2, "Element3D27N")])
 def test_small_scene_loads_nothing_heavy(cells, element):
-    heavy = {"scipy", "pyamg", "meshio", "matplotlib", "dataclasses"}
+    heavy = {"scipy", "pyamg", "meshio", "matplotlib"}
     heavy |= {f"numpy.{name}" for name in ("ma", "polynomial", "random")}
     assert not heavy & small_scene(cells, element) - loaded("import numpy")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +16,6 @@ from kratos_lite.assembly.gauss_point_fields import totals
 from kratos_lite.errors import ModelError
 from kratos_lite.mesh.finer import Finer
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 CORRECTED = 1.25
@@ -32,7 +32,7 @@ ROUNDING = 1e-10
 """Share of the sizes that a quantity is the sum of, up to which its value is rounding."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Level:
     """A model solved, and what is known of its error; the level before it, and the steps from there."""
 
@@ -172,7 +172,7 @@ class Level:
         return cuts
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class QuantityLevel(Level):
     """The same for the error of a quantity: products of two errors stand for the squares of one."""
 

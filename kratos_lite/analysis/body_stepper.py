@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from kratos_lite.analysis.state import State, state_of_body
 from kratos_lite.bodies.batched import together
 from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.constraint_projection import project_velocity
-from kratos_lite.records import replace
 from kratos_lite.typing import Array
 
 CHECKED = 100

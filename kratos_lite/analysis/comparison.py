@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kratos_lite import voigt
@@ -11,12 +13,12 @@ from kratos_lite.analysis.result import Result
 from kratos_lite.assembly.gauss_point_fields import volumes
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import Tabular, record
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Difference:
     """Difference of a field at the nodes of the first result.
 
@@ -50,7 +52,7 @@ class Difference:
         return f"{', '.join(parts)}, largest at node {self.node}, {vector(self.point)} m"
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Comparison(Tabular):
     """How far two results differ; it prints as a table.
 

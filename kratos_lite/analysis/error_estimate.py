@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, Kind, Kinds
@@ -9,11 +11,10 @@ from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.locking import better_element
-from kratos_lite.records import field, record
 from kratos_lite.typing import Array
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """How far a result is from the exact solution, in the energy norm ‖e‖² = ∫ e : C : e dV.
 
@@ -128,7 +129,7 @@ def _locks(group: ElementGroup | Kind) -> bool:
     return plain and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class QuantityError:
     """How far a quantity of a result is from that of the exact solution: Q(u) - Q(u_h).
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,11 +12,10 @@ from kratos_lite import voigt
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import at_gauss
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class GaussPoints:
     """The g Gauss points of m elements.
 

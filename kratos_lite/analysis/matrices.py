@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,6 @@ from kratos_lite.elements.stiffness import by_dof
 from kratos_lite.model.loads import ScaledLoad
 from kratos_lite.model.loads.body import BodyForce
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, flag, number
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Matrices:
     """M u'' + C u' + K u = f + reactions of a model, with u = T q + c; made by `Model.matrices`.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from kratos_lite.errors import ModelError
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 
@@ -19,7 +19,7 @@ class Analysis(Protocol):
         """Return the displacement (n, 3) under a load alone, with supports displaced by a motion alone."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Origin:
     """An analysis, and the version of its model, when it was solved."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from kratos_lite.assembly.element_groups import Kinds
 from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
-from kratos_lite.records import Tabular, field, record
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 
 
@@ -24,7 +25,7 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else peak * 1024)
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class RefinementStep:
     """One mesh on the way to the accuracy asked for.
 
@@ -46,7 +47,7 @@ class RefinementStep:
         return f"{self.error:.2%} with {self.unknowns} unknowns, {self.elements} {self.kinds}"
 
 
-@record
+@dataclass
 class Report(Tabular):
     """What was solved, how, and how well.
 

@@ -14,7 +14,7 @@ from kratos_lite.analysis.report import Report, element_counts, vector
 from kratos_lite.assembly.element_groups import ElementGroup, Kinds
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
-from kratos_lite.records import Tabular
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, flag, instance, whole_number
 

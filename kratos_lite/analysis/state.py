@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite, number, short, whole_number
 
@@ -28,7 +28,7 @@ class InTime(Protocol):
         """Go on from a state."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class State:
     """A body or a model at one time; one that is restored goes on bit by bit as if it had never stopped.
 

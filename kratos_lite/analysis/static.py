@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from kratos_lite.model import checks
 from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import record
 from kratos_lite.solvers.constrained_system import among
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
@@ -35,7 +35,7 @@ ADJOINT_TOLERANCE = 1e-5
 """Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class LoadSet:
     """Loads, their nodal forces (n, 3) in N without and with initial stress, and the parts that they move."""
 

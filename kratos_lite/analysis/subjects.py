@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,7 +13,6 @@ from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import replace
 from kratos_lite.typing import Array, Numbers
 from kratos_lite.validation import finite, number, short
 from kratos_lite.view.scene import Options, Subject, Values, factor_of

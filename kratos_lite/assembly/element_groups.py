@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -24,7 +25,6 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, by_order, rule_for
-from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints, Mask, Numbers, Rows
 from kratos_lite.validation import whole_number
 
@@ -48,7 +48,7 @@ def floats(values: Any) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class ElementGroup:
     """Elements that share class, rule and material.
 
@@ -227,7 +227,7 @@ def _rule_of(element: type[KinematicLinear], given: Rule | int | None) -> Rule:
     return _fitting(element, element.rule if given is None else given)
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Kind:
     """Elements that share class, rule and material, as an `ElementGroup` does: how many all ranks have."""
 

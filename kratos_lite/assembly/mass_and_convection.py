@@ -10,6 +10,7 @@ over the elements makes G and H.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.exact_rules import geometries
 from kratos_lite.elements.mass import MASS
 from kratos_lite.elements.tables import lumped
-from kratos_lite.records import replace
 from kratos_lite.typing import Array
 
 STEPS = (*MASS, "gauss_points")

@@ -9,6 +9,7 @@ hexahedra, whose stresses are good at one point alone, it takes the elements aro
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.topology import corners as corners_of
 from kratos_lite.mesh.topology import faces_of
 from kratos_lite.native import kernels
-from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask
@@ -30,7 +30,7 @@ DECAY = 4
 """Power of the distance, in radii of an element, with which its weight in such a patch falls."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Patches:
     """Patches of some elements, numbered 0 … m - 1.
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kratos_lite.assembly.element_groups import floats
 from kratos_lite.native import kernels
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 MONOMIALS = (1, 4, 10, 20)
@@ -15,7 +16,7 @@ DEPENDENT, NOTHING, UNTOLD, FLAT, ALIGNED = 1e-3, 1e-6, 1e-2, 1e-12, 1e-6
 """See ``native/recovery.hpp``."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Lists:
     """Rows of numbers of any length, one after another: row i is ``entries[start[i] : start[i + 1]]``."""
 
@@ -68,7 +69,7 @@ def integers(numbers: Numbers) -> Ints:
     return np.ascontiguousarray(numbers, dtype=np.int64)
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Values at points of elements.
 
@@ -84,7 +85,7 @@ class Samples:
     offset: Ints
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Polynomials:
     """Fitted polynomials.
 

@@ -9,6 +9,7 @@ Source: Zienkiewicz & Zhu, Int. J. Numer. Meth. Eng. 33 (1992) 1331-1364: superc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -27,13 +28,12 @@ from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
 from kratos_lite.native import kernels
 from kratos_lite.quadrature import Rule, hexahedron, rule_for
-from kratos_lite.records import record, replace
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.base import at_points
 from kratos_lite.typing import Array, Ints, Numbers
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Sampling:
     """Where the values of an element are taken, and what is fitted to them.
 
@@ -84,7 +84,7 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
     return Sampling(N, T, np.ones((len(at_nodes), 1)) if means else to_nodes, min(degree, 3), means)
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Region:
     """Elements of one material, over which stresses are smooth.
 

@@ -7,6 +7,7 @@ A body has a configuration q and a velocity u.  Its kind says how these move its
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -19,11 +20,10 @@ from kratos_lite.errors import ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints
 
 
-@record
+@dataclass
 class Clock:
     """Time in s and number of steps; bodies share one while they advance together."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,6 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Traction
-from kratos_lite.records import replace
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:

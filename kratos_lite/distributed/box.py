@@ -51,9 +51,10 @@ def box(
 
     if comm is None:
         return generators.box(size, cells, element, origin)
+    from dataclasses import replace
+
     from kratos_lite.distributed.communicator import ranks_of
     from kratos_lite.distributed.subdomains import subdomain_mesh
-    from kratos_lite.records import replace
 
     ranks = ranks_of(comm)
     with ranks.together():
@@ -64,13 +65,14 @@ def box(
 
 def _piece(ranks: Alone, cells: Sequence[int], element: str) -> Piece:
     """Return the block of the unit cube that a rank makes, by the ids of the whole."""
+    from dataclasses import replace
+
     import numpy as np
 
     from kratos_lite.distributed.box_ids import element_ids, node_ids
     from kratos_lite.distributed.pieces import Kind, Piece
     from kratos_lite.mesh import SIDES
     from kratos_lite.mesh.generators import counts_of, kind_of, sides_of, unit_cells
-    from kratos_lite.records import replace
 
     (name, shape), counts = kind_of(element), counts_of(cells)
     low, high = block_of(counts, ranks.rank, ranks.size)

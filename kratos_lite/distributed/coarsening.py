@@ -7,13 +7,13 @@ multigrid, Supercomputing 2000 (aggregates within ranks).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.records import record
 from kratos_lite.solvers.multigrid import STRENGTH
 from kratos_lite.typing import Array, Ints
 
@@ -21,7 +21,7 @@ LEAST_GAIN = 0.9
 """Unknowns of a level to those of the level above, beyond which coarsening has come to a halt."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Rows:
     """Rows of blocks of a sparse matrix, with columns by number over all ranks.
 
@@ -58,7 +58,7 @@ class Rows:
         return np.unique(self.columns[(self.columns < first) | (self.columns >= first + own)])
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Coarser:
     """The next level: its matrix, the way to it, and its rigid modes.
 

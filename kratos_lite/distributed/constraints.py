@@ -7,11 +7,11 @@ They are few, and the result is the same on all ranks.  Degrees of freedom are c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kratos_lite.mesh.subdomain import Subdomain
-from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import MultiPointConstraint, Slaves, eliminate
 from kratos_lite.typing import Array, Ints, Mask
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, Kind, Kinds
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.shared_faces import cell_keys
-from kratos_lite.records import record, replace
 from kratos_lite.typing import Array, Ints, Mask
 
 
@@ -89,7 +89,7 @@ class Grown:
         return np.union1d(asked, around), np.unique(np.concatenate([around, *every]))
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Cells:
     """Elements of one kind, those here first: numbers (m, k) of their nodes over ranks, prestress (m, 6)."""
 

@@ -7,6 +7,7 @@ Else, and for meshes too large for one rank, the ranks halve the mesh together (
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
 
@@ -19,7 +20,6 @@ from kratos_lite.distributed.node_directory import places
 from kratos_lite.distributed.pieces import Kind, Piece, aligned, cell_ids
 from kratos_lite.mesh import Block, Faces, Mesh
 from kratos_lite.mesh.subdomain import ALONE, Alone
-from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
 METIS_ELEMENTS = 10_000_000

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,7 +31,6 @@ from kratos_lite.errors import SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.subdomain import ALONE, Subdomain
 from kratos_lite.native import kernels
-from kratos_lite.records import record, replace
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
@@ -47,7 +47,7 @@ CURE_OF_FACTORS = "look for nearly free parts or a large stiffness contrast, or 
 """What helps where a factorization fails."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Prescribed:
     """What holds the nodes of a rank: supports and constraints, by its degrees of freedom.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,11 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh import NO_ROWS, Block, Part
 from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.records import field, record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Rows
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """Cells of one kind by the ids of their nodes: what is a `Block` once the nodes are here.
 
@@ -68,7 +68,7 @@ class Kind:
         return Block(self.name, rows.astype(np.int32), self.ids, self.properties, self.shape, self.lines)
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Piece:
     """What one rank has of a mesh, by ids.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.mesh.subdomain import Alone, Subdomain
-from kratos_lite.records import replace
 from kratos_lite.typing import Ints, Mask
 from kratos_lite.validation import whole_numbers
 

@@ -7,6 +7,7 @@ prescribed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
 from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.native import kernels
-from kratos_lite.records import replace
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
 from kratos_lite.solvers.constrained_system import LARGEST_CONTRAST
 from kratos_lite.solvers.constraint_map import rigid_modes

@@ -16,9 +16,9 @@ from kratos_lite.elements.overridden_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
-from kratos_lite.records import Tabular
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
 

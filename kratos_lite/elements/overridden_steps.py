@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError, ModelError
-from kratos_lite.records import Tabular
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array
 from kratos_lite.validation import short
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.structure import Structure
 from kratos_lite.model.supports import Supports
-from kratos_lite.records import field, record, replace
 from kratos_lite.typing import Array
 from kratos_lite.validation import flag, positive_step, whole_number
 
@@ -38,7 +38,7 @@ def number_of_steps(value: Any) -> int:
     return steps
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TimeIntegration:
     """How a model or body moves through time.
 
@@ -98,7 +98,7 @@ class TimeIntegration:
         return f"{self.steps} steps of {self.step:g} s{by}"
 
 
-@record
+@dataclass
 class Outputs:
     """Files to write.
 
@@ -130,7 +130,7 @@ class Outputs:
         return [*self.results, *(path for path in single if path is not None)]
 
 
-@record
+@dataclass
 class Case:
     """A model or body with all that an input says about its analysis, outputs and expected values.
 

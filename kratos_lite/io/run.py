@@ -11,7 +11,7 @@ from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import check_outputs
 from kratos_lite.io.runners.outcome import Outcome
 from kratos_lite.model.structure import Structure
-from kratos_lite.records import aligned
+from kratos_lite.tabular import aligned
 from kratos_lite.typing import Progress
 from kratos_lite.view.progress import watched
 

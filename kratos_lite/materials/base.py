@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from kratos_lite.errors import InputError, MaterialError
-from kratos_lite.records import names_of
 from kratos_lite.registry import Registry
+from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from kratos_lite.errors import MaterialError
 from kratos_lite.materials.base import LinearMaterial
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Orthotropic3D(LinearMaterial):
     """Orthotropic linear elasticity; nu_xy is the contraction along y under stress along x.
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
-from kratos_lite.records import field, names_of, record, replace
 from kratos_lite.shapes import Shape
+from kratos_lite.tabular import names_of
 from kratos_lite.typing import Ints, Mask, Numbers, Rows
 from kratos_lite.validation import instance, read_only, short, whole_numbers
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 NO_ROWS: Ints = read_only(np.zeros(0, dtype=np.int64))
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Block:
     """Cells of one kind: elements, or the conditions that carry loads; its arrays are read-only.
 
@@ -111,7 +112,7 @@ def _column(
     return read_only(whole_numbers(values, f"block {name}: {what}", shape, dtype=dtype, error=MeshError))
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Part:
     """A named part (Kratos: SubModelPart): rows of what belongs to it, in read-only arrays.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,14 +11,13 @@ from kratos_lite.mesh.blocks import Block, Part
 from kratos_lite.mesh.centers import Keys, corners_around, keys_of
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.selection import Where, WhereElements, elements_among
-from kratos_lite.records import record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES
 from kratos_lite.typing import Array, Ints, Mask, Rows
 from kratos_lite.validation import finite
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Finer:
     """A mesh made from a coarser one, whose nodes are the first of its own.
 

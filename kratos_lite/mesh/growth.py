@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -15,7 +16,6 @@ from kratos_lite.mesh.finer import Finer
 from kratos_lite.mesh.hanging import hanging_nodes
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import Piece
-from kratos_lite.records import replace
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
 

@@ -7,13 +7,13 @@ u_h = Σ N_a(ξ_h) u_a.  A master may hang itself, on an edge or face that is la
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of
-from kratos_lite.records import record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.faces import FACE_SHAPES, Line3
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -21,7 +21,7 @@ from kratos_lite.typing import Array, Ints, Mask, Rows
 NO_WEIGHTS: Array = np.zeros(0)
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class HangingNodes:
     """Nodes whose displacement others interpolate, and the faces that meet without sharing their nodes.
 
@@ -134,7 +134,7 @@ class _Found:
         self.around.append(np.full(count, around))
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Split:
     """Edges or faces of elements whose middle is a corner of smaller elements.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,6 @@ from kratos_lite.mesh.blocks import NO_ROWS, with_rows
 from kratos_lite.mesh.boxes import BoxTree, cell_boxes, curvature, is_solid
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.nearest import nearest_element
-from kratos_lite.records import record
 from kratos_lite.shapes import Shape
 from kratos_lite.shapes.inverse import inverse_map, outside_by
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -38,7 +38,7 @@ STARTS = 4
 """Points near nodes of such a cell, those nearest to the point, from which Newton starts again."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Located:
     """Points (...) in a mesh: the element that contains each, and where in it the point lies.
 

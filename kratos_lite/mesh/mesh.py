@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,7 @@ from kratos_lite.mesh.selection import (
 from kratos_lite.mesh.subdomain import Subdomain
 from kratos_lite.mesh.topology import inverted, mirror
 from kratos_lite.mesh.totals import Totals
-from kratos_lite.records import Tabular, replace
+from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
 

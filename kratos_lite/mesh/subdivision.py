@@ -7,9 +7,10 @@ tetrahedra: Bey, Computing 55 (1995) 355-378; the octahedron inside is cut along
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import LINEAR, Shape
 from kratos_lite.typing import Array, Ints
@@ -18,7 +19,7 @@ DIAGONALS = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 """Edges of a tetrahedron whose middles are the ends of each diagonal of the octahedron inside."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Piece:
     """One piece of a cell: its own family, and the places (c, d) of its corners in the cell."""
 

@@ -131,8 +131,7 @@ def _verdict(ranks: Alone, problems: list[tuple[int, int, str]], counts: Ints) -
 
 
 def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) -> str:
-    equal = 1e-10 * np.abs(det).max()  # of places that only rounding tells apart, the first
-    worst = int(np.argmax(det <= det.min() + equal))
+    worst = int(np.argmax(det <= det.min() + 1e-10 * np.abs(det).max()))  # the first of equal ones
     where = f"Gauss point {worst + 1}" if worst < g else f"its node {worst - g + 1}"
     nodes = " ".join(str(i) for i in mesh.node_ids[block.nodes[cell]])
     if (det < 0).all():

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kratos_lite.mesh import Faces, Mesh, components, distinct, with_rows
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 FEW = 40
 """Up to this many bodies that hang together are looked at with full matrices."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Bodies:
     """Which nodes belong to which bodies: a node has one pair (node, body) for each body around it.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from kratos_lite.errors import InputError
 from kratos_lite.model.equal import key_of
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def axis_numbers(axes: str) -> list[int]:
     return [AXES.index(a) for a in axes]
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PrescribedMotion:
     """The displacement of nodes along an axis as a function of time.
 
@@ -48,7 +48,7 @@ class PrescribedMotion:
     given: object
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Fixing:
     """One call of `Structure.fix`, from which a finer mesh is fixed alike.
 

@@ -11,6 +11,7 @@ Source: Farhat & Géradin, Int. J. Numer. Meth. Eng. 41 (1998) 675-696.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 
@@ -21,7 +22,6 @@ from kratos_lite.errors import MAX_PROBLEMS, ModelError
 from kratos_lite.mesh import NO_ROWS, Mesh
 from kratos_lite.model.connected_bodies import Bodies
 from kratos_lite.model.supports import Supports
-from kratos_lite.records import record
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints, Mask
 
@@ -33,7 +33,7 @@ TOGETHER = 1e-5
 """Difference of the rotations of bodies up to which they turn as one, where modes have the size 1."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class FreeMotions:
     """Rigid motions that supports and constraints leave free, by parts of a model.
 

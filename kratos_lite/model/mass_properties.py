@@ -6,6 +6,7 @@ Source: Solfec-1.0 theory, shape mass_properties; Goldstein, Classical Mechanics
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,6 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup, by_mass_rule
 from kratos_lite.errors import InputError, MeshError, ModelError
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import finite
 
@@ -26,7 +26,7 @@ SINGULAR = 1e-15
 """Ratio of the smallest to the largest eigenvalue down to which a tensor counts as positive definite."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class MassProperties:
     """Mass properties of one body, or of many through leading axes (...) that broadcast.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,7 +13,6 @@ from kratos_lite.mesh.finer import Finer
 from kratos_lite.model.fixing import Fixing
 from kratos_lite.model.structure import Structure
 from kratos_lite.quadrature import Rule
-from kratos_lite.records import replace
 
 S = TypeVar("S", bound=Structure)
 

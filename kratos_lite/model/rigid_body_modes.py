@@ -8,6 +8,7 @@ and joints are the equations that these must meet.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from kratos_lite.mesh import NO_ROWS, Mesh, components, distinct
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.supports import Supports
-from kratos_lite.records import record
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints
@@ -55,7 +55,7 @@ def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup])
     return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class _Constraints:
     """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight.
 

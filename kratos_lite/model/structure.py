@@ -22,7 +22,7 @@ from kratos_lite.model.loads import Load, ScaledLoad
 from kratos_lite.model.locking import check_locking
 from kratos_lite.model.rigid_body_modes import free_motions
 from kratos_lite.model.supported_solid import SupportedSolid
-from kratos_lite.records import Tabular
+from kratos_lite.tabular import Tabular
 from kratos_lite.time_series import Factor
 from kratos_lite.validation import instance
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.fixing import AXES, Fixing, PrescribedMotion, Selected, axis_numbers
-from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import (
     ConstraintMap,
     MultiPointConstraint,

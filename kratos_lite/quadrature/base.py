@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import whole_number
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Rule:
     """A quadrature rule: sum of weights · f(points) is exact for polynomials up to `degree`.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +20,6 @@ from kratos_lite.elements.kinematic_linear_3d6n import KinematicLinear3D6N
 from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
-from kratos_lite.records import record, replace
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
@@ -30,7 +30,7 @@ LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
 """The linear element of each linear shape."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class LinearLevel:
     """The linear elements inside a mesh of quadratic ones, as the coarse level of a p-multigrid.
 
@@ -65,7 +65,7 @@ LONG = 3.0
 """Length of a cell to its second length from which its halves are the linear elements."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class _Part:
     """Some elements of a group, and the linear ones in each of them."""
 

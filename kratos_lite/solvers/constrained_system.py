@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,6 @@ from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.errors import InputError
-from kratos_lite.records import replace
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.direct import is_quick
 from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize

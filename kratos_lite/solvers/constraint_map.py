@@ -7,12 +7,12 @@ exactly, without a penalty.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite.errors import ModelError
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints, Mask
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ Slaves: TypeAlias = "dict[int, tuple[dict[int, float], float]]"
 """For each slave the weights of free degrees of freedom, and a constant."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class MultiPointConstraint:
     """One linear multi-point constraint: u[slave] = Σ weights · u[masters] + constant.
 
@@ -42,7 +42,7 @@ class MultiPointConstraint:
     symmetric: bool = False
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class ConstraintMap:
     """The map u = T q + c from the free degrees of freedom q to all.
 

@@ -7,6 +7,7 @@ modulus that is taken off the material, and A is the stiffness with what is left
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -21,7 +22,6 @@ from kratos_lite.elements.geometry import GEOMETRY
 from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.records import record, replace
 from kratos_lite.solvers.pressure_means import PressureMeans, pressure_means
 from kratos_lite.typing import Array, Progress
 
@@ -34,7 +34,7 @@ KEPT = 1.0
 """λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class SplitMatrix:
     """K = A + Dᵀ κ D, (3n, 3n) in N/m, which is only multiplied.
 
@@ -129,7 +129,7 @@ def is_split(group: ElementGroup) -> bool:
     return known and bulk_over_shear(group.material.C) > NEAR_HALF
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class _Part:
     """A group, the bulk modulus taken off it, its shear modulus; its dilatations and their polynomials."""
 

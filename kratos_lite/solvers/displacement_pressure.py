@@ -202,7 +202,7 @@ class _Directions:
         """Return x changed along the directions so that the residual is smallest."""
         found = x.copy()
         for factor, z in zip(self._y, self._Z, strict=False):
-            found += factor * z
+            found += factor * z.astype(float)  # NumPy before 2 keeps single precision otherwise
         return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import SolveError
 from kratos_lite.native import kernels
-from kratos_lite.records import record, replace
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.typing import Array, Ints, Mask, Progress
@@ -38,7 +38,7 @@ ROUND_OFF = 1e-15
 """Tolerance that the iteration cannot reach: it stops at what round-off allows."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Solution:
     """The solution of A x = b and how it was found.
 
@@ -86,7 +86,7 @@ def choose(method: str, unknowns: int, dofs: int = 0, symmetric: bool = True) ->
     return "amg", f"{unknowns} unknowns > {DIRECT_LIMIT}: multigrid is fastest and takes least memory"
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class LinearSolver:
     """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c).
 

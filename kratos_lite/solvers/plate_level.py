@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from kratos_lite.records import record
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints, Mask, Rows
@@ -16,7 +17,7 @@ VERY_THIN = 0.004
 """The same from which single precision no longer holds energies of bending beside those of shear."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class PlateLevel:
     """Lines of nodes as the coarse level of a thin body, flat or curved.
 

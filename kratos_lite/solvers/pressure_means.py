@@ -7,12 +7,12 @@ though they move nodes along the cells as much as smooth ones: the cells around 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.records import record
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.coarse_level import sides_of
 from kratos_lite.typing import Array, Ints
@@ -32,7 +32,7 @@ class Pressures(Protocol):
     """(m, r, r): by 1 and, where r is 4, x, y and z from the center over the root of the volume."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class PressureMeans:
     """The means (p, c) of pressures around c places, over the root of the modulus there.
 

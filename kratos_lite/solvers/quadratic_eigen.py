@@ -10,12 +10,12 @@ Appl. 26 (2004) 252-256, for the scale of λ.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError
-from kratos_lite.records import record
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.eigen import DENSE_MODES, RESTARTS, check_residuals, first_shift, not_converged
 from kratos_lite.typing import Array, Complexes
@@ -29,7 +29,7 @@ NEUTRAL = 1e-11
 """Share of the stiffness up to which a motion is not resisted at all."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Pencil:
     """λ² M + λ C + K, sparse (n, n), and the motions (n, k) that neither C nor K resists.
 

@@ -119,9 +119,8 @@ def conjugacy(make: Make) -> Measured:
         v = body.velocity(X)
         power = float(body.generalized_force(X, f, body.q) @ body.u)
         error = max(error, abs(power - f @ v) / np.linalg.norm(v), difference(H @ body.u[dofs], v))
-    return Measured(
-        error, 1e-12, "generalized_force(X, f) · u, or jacobian(X) u, is not what velocity(X) says"
-    )
+    text = "generalized_force(X, f) · u, or jacobian(X) u, is not what velocity(X) says"
+    return Measured(error, 1e-12, text)
 
 
 def free_flight(make: Make) -> Measured:
@@ -144,11 +143,8 @@ def rigid_motions(make: Make) -> Measured:
     moved = _stirred(make)
     scale = float(np.abs(moved.internal_load()).max())
     load = float(np.abs(body.internal_load()).max()) / scale
-    return Measured(
-        max(load, float(body.internal_energy()) / float(moved.internal_energy())),
-        1e-12,
-        "internal_load or internal_energy of a turned body",
-    )
+    stored = float(body.internal_energy()) / float(moved.internal_energy())
+    return Measured(max(load, stored), 1e-12, "internal_load or internal_energy of a turned body")
 
 
 def balance_of_moments(make: Make) -> Measured:
@@ -161,9 +157,8 @@ def balance_of_moments(make: Make) -> Measured:
         error = max(error, abs(float(load @ body.u)))
         body.set_velocity(angular=axis)
         error = max(error, abs(float(load @ body.u)))
-    return Measured(
-        error / float(np.abs(load).max()), 1e-12, "internal_load · u of a translation or rotation"
-    )
+    text = "internal_load · u of a translation or rotation"
+    return Measured(error / float(np.abs(load).max()), 1e-12, text)
 
 
 def energy(make: Make) -> Measured:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,6 @@ from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.overridden_steps import internal_load_of, strain_of
 from kratos_lite.quadrature import Rule
-from kratos_lite.records import replace
 from kratos_lite.shapes import Shape
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.testing import patches
@@ -103,9 +103,8 @@ def functions(element: Element) -> Measured:
         name: difference(getattr(element, name)(xi), getattr(element.shape, name)(xi)) for name in ("N", "dN")
     }
     error, name = worst(errors)
-    return Measured(
-        error, 1e-14, f"{name} of the element against that of its shape, which loads on faces and places take"
-    )
+    text = f"{name} of the element against that of its shape, which loads on faces and places take"
+    return Measured(error, 1e-14, text)
 
 
 def volume(element: Element) -> Measured:
@@ -113,9 +112,8 @@ def volume(element: Element) -> Measured:
     X, exact = affine(element)
     cell = element(X)
     found = max(float(cell.volume()), float(cell.dV.sum()), key=lambda value: abs(value - exact))
-    return Measured(
-        abs(found / exact - 1), 1e-13, f"volume of a sheared cell is {found:.15g}; exact is {exact:.15g}"
-    )
+    text = f"volume of a sheared cell is {found:.15g}; exact is {exact:.15g}"
+    return Measured(abs(found / exact - 1), 1e-13, text)
 
 
 def strain_operator(element: Element) -> Measured:
@@ -141,14 +139,14 @@ def stiffness(element: Element) -> Measured:
     for name, C in (("isotropic", C_ISOTROPIC), ("general", anisotropic())):
         B, S = _by_unit_displacements(cell, C)
         hand = np.einsum("gki,gkj,g->ij", B, S, cell.dV, optimize=True)
-        by_axis = cell.stiffness_by_axis(C).transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
-        errors[f"stiffness(C) of {name} C against Σ B^T C B γ det J"] = difference(cell.stiffness(C), hand)
-        errors[f"stiffness_by_axis(C) of {name} C against Σ B^T C B γ det J"] = difference(by_axis, hand)
-        errors[f"stiffness(C) of a batch, {name} C, against one cell"] = difference(
-            batch.stiffness(C)[0], hand
-        )
-        by_axis = batch.stiffness_by_axis(C)[0].transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
-        errors[f"stiffness_by_axis(C) of a batch, {name} C, against one cell"] = difference(by_axis, hand)
+        for whose, K, parts in (
+            ("", cell.stiffness(C), cell.stiffness_by_axis(C)),
+            (" of a batch", batch.stiffness(C)[0], batch.stiffness_by_axis(C)[0]),
+        ):
+            by_axis = parts.transpose(1, 0, 3, 2).reshape(3 * n, 3 * n)
+            for method, found in (("stiffness", K), ("stiffness_by_axis", by_axis)):
+                text = f"{method}(C){whose}, {name} C, against Σ B^T C B γ det J of one cell"
+                errors[text] = difference(found, hand)
     return Measured(worst(errors)[0], 1e-13, worst(errors)[1])
 
 
@@ -172,9 +170,8 @@ def rank(element: Element) -> Measured:
 
     A class may state `spurious_modes` of an element alone; eight bricks of it have none.
     """
-    counts = []
-    for X in (element.shape.nodes, distorted(element)):
-        counts.append(_zeros(element(X).stiffness(C_ISOTROPIC)))
+    cells = (element(X) for X in (element.shape.nodes, distorted(element)))
+    counts = [_zeros(cell.stiffness(C_ISOTROPIC)) for cell in cells]
     spurious = element.spurious_modes
     text = (
         f"{counts[0]} zero-energy modes on the reference cell, {counts[1]} on a distorted one; expected are "
@@ -222,9 +219,8 @@ def rigid_motions(element: Element) -> Measured:
         miss = np.abs(K @ R).max(axis=0) / (np.abs(K).max() * np.abs(R).max(axis=0))
         mode = int(np.argmax(miss))
         kind = "translation along" if mode < 3 else "rotation about"
-        errors[f"|K r| / |K| |r| of {name} cell is largest for the {kind} {'xyz'[mode % 3]}"] = float(
-            miss[mode]
-        )
+        text = f"|K r| / |K| |r| of {name} cell is largest for the {kind} {'xyz'[mode % 3]}"
+        errors[text] = float(miss[mode])
     return Measured(worst(errors)[0], 1e-13, worst(errors)[1])
 
 
@@ -248,9 +244,8 @@ def numbering_invariance(element: Element) -> Measured:
         turned = element(X[order]).stiffness(C_ISOTROPIC)
         errors[tuple(order.tolist())] = difference(turned, K[np.ix_(dofs, dofs)])
     error, listed = worst(errors)
-    return Measured(
-        error, 1e-13, f"K with its nodes listed as {listed}, a rotation of the cell, against K reordered"
-    )
+    text = f"K with its nodes listed as {listed}, a rotation of the cell, against K reordered"
+    return Measured(error, 1e-13, text)
 
 
 def length_scaling(element: Element) -> Measured:
@@ -269,9 +264,8 @@ def offset(element: Element) -> Measured:
     X = distorted(element)
     K = element(X).stiffness(C_ISOTROPIC)
     loss = [difference(element(X + c).stiffness(C_ISOTROPIC), K) / (EPS * c) for c in (1e3, 1e6)]
-    return Measured(
-        max(loss), 20, "error of K at a distance c from the origin, in units of the rounding of c"
-    )
+    text = "error of K at a distance c from the origin, in units of the rounding of c"
+    return Measured(max(loss), 20, text)
 
 
 def internal_load(element: Element) -> Measured:
@@ -326,9 +320,8 @@ def lumped_mass(element: Element) -> Measured:
     """Check that each node has a positive mass."""
     masses = np.concatenate([element(X).lumped_mass(1.0) for X in (element.shape.nodes, distorted(element))])
     bad = int((~(masses > 1e-9 * np.abs(masses).max())).sum())
-    return Measured(
-        bad, 0, f"nodes without a positive mass; the smallest is {masses.min():.3g} kg of 1 kg/m³"
-    )
+    text = f"nodes without a positive mass; the smallest is {masses.min():.3g} kg of 1 kg/m³"
+    return Measured(bad, 0, text)
 
 
 SINGLE = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -12,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.errors import MAX_PROBLEMS, KratosLiteError
-from kratos_lite.records import record
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -30,7 +30,7 @@ class Measured(NamedTuple):
     detail: str
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Finding:
     """The result of one check.
 

@@ -110,9 +110,8 @@ def weights(subject: CellRule) -> Measured:
     """Check that the weights sum to the volume of the cell."""
     cell, rule = subject
     total, volume = float(rule.weights.sum()), VOLUME[cell]
-    return Measured(
-        abs(total / volume - 1), 1e-13, f"the weights sum to {total:.17g}; the volume is {volume:.17g}"
-    )
+    text = f"the weights sum to {total:.17g}; the volume is {volume:.17g}"
+    return Measured(abs(total / volume - 1), 1e-13, text)
 
 
 def monomials(subject: CellRule) -> Measured:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -9,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.records import record
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Numbers
 from kratos_lite.view.canvas import polygons
@@ -27,7 +27,7 @@ FINEST, SHADES = 40, 8
 """Parts of an edge at most, with and without values that vary along it."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Facets:
     """What of a body is seen.
 

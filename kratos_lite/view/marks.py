@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.records import field, record
 from kratos_lite.typing import Array
 
 DARK = "#3a3a44"
@@ -18,7 +18,7 @@ def _none() -> Array:
     return np.zeros((0, 2, 3))
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Marks:
     """What holds a body.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Any
 
@@ -9,7 +10,6 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Block
-from kratos_lite.records import record
 from kratos_lite.registry import remembered
 from kratos_lite.shapes.hexahedra import Hexahedron8
 from kratos_lite.typing import Array, Ints
@@ -27,7 +27,7 @@ POLYGONS = 6000
 FINEST = 8
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Plane:
     """The plane n·X = offset of the undeformed body; what lies on one side is taken away.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, box_corners, rows_of, window_of
@@ -21,7 +21,7 @@ DECADES = 4
 """Powers of ten that a logarithmic scale of colors shows."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Values:
     """Numbers that color a body.
 
@@ -39,7 +39,7 @@ class Values:
     log: bool = False
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """What is drawn of a body.
 
@@ -61,7 +61,7 @@ class Subject:
     moving: bool = False
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Options:
     """How it is drawn; see `kratos_lite.plot`."""
 
@@ -74,7 +74,7 @@ class Options:
     title: str = ""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Scene:
     """Subjects with what they share.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.view import canvas
 from kratos_lite.view.camera import View, rows_of, window_of
@@ -25,7 +25,7 @@ CURVES = (4.0, 1.3)
 """Least width, and height, of the curves in inches."""
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Path:
     """A body along its path.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rounding import close
 
 import kratos_lite as kl
 from kratos_lite.ale import Rotation, Translation
@@ -22,10 +23,6 @@ def wheel(element="8N", radial=2, around=12, density=1000.0):
 def gauss_points(model):
     (group,) = model.element_groups()
     return group.at(model.mesh.points).gauss_points()
-
-
-def close(found, expected, tolerance=1e-12):
-    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("element", ["4N", "6N", "8N", "10N", "20N", "27N"])

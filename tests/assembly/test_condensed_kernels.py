@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from computing import compiled, same_on_all_threads
+from rounding import all_close
 
 from kratos_lite.assembly import element_groups, nodal_values
 from kratos_lite.assembly import gauss_point_fields as fields
@@ -62,10 +63,7 @@ def assert_same(points, group, monkeypatch, tolerance=1e-11):
     with monkeypatch.context() as without:
         without.setattr(element_groups, "kernels", lambda name: None)
         wanted = everything(points, group)
-    for name, value in wanted.items():
-        np.testing.assert_allclose(
-            found[name], value, rtol=0, atol=tolerance * np.abs(value).max(), err_msg=name
-        )
+    all_close(found, wanted, tolerance)
 
 
 @pytest.mark.parametrize("material", [STEEL, RUBBER, CRYSTAL], ids=["isotropic", "incompressible", "general"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from computing import compiled, printed, same_on_all_threads
 from meshes import changed_at, with_block
+from rounding import all_close
 
 import kratos_lite as kl
 from kratos_lite.assembly import element_groups, mass_and_convection, nodal_values
@@ -87,19 +88,13 @@ def everything(mesh):
     return found
 
 
-def assert_close(found, wanted):
-    assert found.keys() == wanted.keys()
-    for name, value in wanted.items():
-        np.testing.assert_allclose(found[name], value, rtol=0, atol=1e-11 * np.abs(value).max(), err_msg=name)
-
-
 @compiled
 @pytest.mark.parametrize("name", NAMES + CONDENSED)
 def test_kernels_give_what_the_elements_own_methods_give(name, numpy_only):
     mesh = distorted(name)
     found = everything(mesh)
     numpy_only()
-    assert_close(found, everything(mesh))
+    all_close(found, everything(mesh), 1e-11)
 
 
 @compiled
@@ -107,7 +102,7 @@ def test_mixed_meshes_give_the_same(numpy_only):
     mesh = joined(*(distorted(name) for name in NAMES + CONDENSED))
     found = everything(mesh)
     numpy_only()
-    assert_close(found, everything(mesh))
+    all_close(found, everything(mesh), 1e-11)
 
 
 @compiled

@@ -1,5 +1,7 @@
 """Equations over ranks in PETSc: the same displacements and reactions as those of one process."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,6 @@ from kratos_lite.distributed.petsc_system import PetscSystem, Prescribed
 from kratos_lite.distributed.scatter import scattered
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.mesh import Block
-from kratos_lite.records import replace
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 
 EXACT = -1.3221477551020406e-4

@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from kratos_part_files import write_part_files
 import kratos_lite as kl
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.mesh import ids_of
-from kratos_lite.records import replace
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rounding import close
 
 import kratos_lite as kl
 from kratos_lite.assembly import finite_strain
@@ -100,10 +101,6 @@ def solved(K, model, loads):
     u = np.zeros(len(K))
     u[free] = np.linalg.solve(K[np.ix_(free, free)], loads.ravel()[free])
     return u.reshape(-1, 3)
-
-
-def close(found, exact, tolerance=1e-10):
-    np.testing.assert_allclose(found, exact, rtol=0, atol=tolerance * np.abs(exact).max())
 
 
 # ---- static ------------------------------------------------------------------------------------

@@ -1,12 +1,13 @@
 """Own element classes with hourglass modes are refused before they are solved: against dense eigenvalues."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import kratos_lite as kl
 from kratos_lite.model import hourglass_modes
 from kratos_lite.quadrature import hexahedron, tetrahedron, wedge
-from kratos_lite.records import replace
 
 STEEL = kl.Isotropic3D(E=210e9, nu=0.3, density=7850.0)
 

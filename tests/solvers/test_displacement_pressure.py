@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from computing import compiled, most, same_on_all_threads
-from rounding import round_off
+from rounding import close, round_off
 
 import kratos_lite as kl
 from kratos_lite.assembly.stiffness import assemble_dense
@@ -56,6 +56,14 @@ def system_of(model):
     )
 
 
+def both_ways(system):
+    """Solve by the kernels, then without them."""
+    forces = np.random.default_rng(0).standard_normal(system.points.shape)
+    compiled = system.solve(forces, tolerance=1e-8)
+    system._equations._multigrid._kernel = None
+    return compiled, system.solve(forces, tolerance=1e-8)
+
+
 def centers(model):
     return np.vstack([model.mesh.points[block.nodes].mean(axis=1) for block in model.mesh.blocks])
 
@@ -77,8 +85,7 @@ def check(model, limit, rtol=1e-8):
     found, exact = model.solve("amg"), model.solve("direct")
     assert found.report.solver == "displacement-pressure", found.report.reason
     assert found.report.iterations <= limit
-    allowed = rtol + round_off(model)
-    np.testing.assert_allclose(found.u, exact.u, rtol=0, atol=allowed * np.abs(exact.u).max())
+    close(found.u, exact.u, rtol + round_off(model))
     return found
 
 
@@ -98,9 +105,7 @@ def test_iterations_do_not_grow_towards_incompressibility(element, nu):
     found = model.solve("amg", tolerance=1e-8)
     assert found.report.solver == "displacement-pressure", found.report.reason
     assert found.report.iterations <= LIMIT
-    exact = model.solve("direct").u
-    allowed = 1e-7 + round_off(model)
-    np.testing.assert_allclose(found.u, exact, rtol=0, atol=allowed * np.abs(exact).max())
+    close(found.u, model.solve("direct").u, 1e-7 + round_off(model))
 
 
 @pytest.mark.parametrize(("element", "sizes"), [("EnhancedStrain3D8N", (8, 14)), ("BBar3D27N", (3, 7))])
@@ -131,22 +136,15 @@ def test_distorted_cells(element):
     check(model, most(45, 70))
 
 
-@pytest.mark.parametrize(
-    ("element", "aspect"),
-    [
-        ("BBar3D8N", 10),
-        ("BBar3D8N", 100),
-        ("BBar3D10N", 10),
-        ("BBar3D15N", 10),
-        ("BBar3D20N", 10),
-        ("BBar3D27N", 10),
-        pytest.param("BBar3D10N", 100, marks=compiled),  # pyamg leaves the last two to a factorization
-        pytest.param("BBar3D20N", 100, marks=compiled),
-        pytest.param("BBar3D27N", 100, marks=compiled),
-    ],
-)
-def test_flat_cells(element, aspect):
-    check(body(element, cells=4, size=(1.0, 1.0, 1 / aspect)), most(45, 260))
+@pytest.mark.parametrize("element", ["BBar3D8N", "BBar3D10N", "BBar3D15N", "BBar3D20N", "BBar3D27N"])
+def test_flat_cells(element):
+    check(body(element, cells=4, size=(1.0, 1.0, 0.1)), most(45, 260))
+
+
+@compiled  # pyamg leaves the last two to a factorization
+@pytest.mark.parametrize("element", ["BBar3D8N", "BBar3D10N", "BBar3D20N", "BBar3D27N"])
+def test_very_flat_cells(element):
+    check(body(element, cells=4, size=(1.0, 1.0, 0.01)), 45)
 
 
 def test_lines_across_flat_quadratic_cells():
@@ -277,7 +275,7 @@ def test_what_is_left_is_that_of_an_ordinary_material(element):
         model.mesh.points, kl.Model(model.mesh, kl.Isotropic3D(E=2.5 * shear, nu=0.25)).element_groups()
     )
     if element.startswith("BBar") and element != "BBar3D10N":  # the others depend on the material
-        np.testing.assert_allclose(A, ordinary, rtol=0, atol=1e-9 * np.abs(ordinary).max())
+        close(A, ordinary, 1e-9)
     values = np.linalg.eigvalsh(A)
     assert values[0] > -1e-9 * values[-1]
     assert values[-1] < 3 * np.linalg.eigvalsh(ordinary)[-1]
@@ -298,7 +296,7 @@ def test_inverse_within_groups_of_nodes(size):
         dofs = dofs[free[dofs]]
         exact[np.ix_(dofs, dofs)] = np.linalg.inv(full[np.ix_(dofs, dofs)])
     found = block_inverse_module.block_inverse(A, free, system.points, D, kept).toarray()
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
+    close(found, exact, 1e-11)
 
 
 def test_large_groups_are_single_nodes(monkeypatch):
@@ -353,7 +351,7 @@ def test_a_system_is_prepared_once_for_many_right_sides(monkeypatch):
     direct = body("EnhancedStrain3D8N").static("direct")
     for g in ((0.0, 0.0, -9.81), (5.0, 0.0, 0.0)):
         found, exact = (one.solve(kl.Gravity(g)).u for one in (analysis, direct))
-        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+        close(found, exact, 1e-7)
     assert made == [1]
 
 
@@ -369,26 +367,20 @@ def test_kernels_and_numpy_take_the_same_steps(element):
     model = kl.Model(mesh, rubber())
     model.fix(mesh.points[:, 2] == 0)
     system = system_of(model)
-    forces = np.random.default_rng(0).standard_normal(mesh.points.shape)
-    compiled, found = system.solve(forces, tolerance=1e-8)
-    system._equations._multigrid._kernel = None
-    plain, expected = system.solve(forces, tolerance=1e-8)
+    (compiled, found), (plain, expected) = both_ways(system)
     assert found.iterations == expected.iterations > 10
-    np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9 * np.abs(plain).max())
+    close(compiled, plain, 1e-9)
 
 
 @compiled
 def test_both_start_anew_from_what_is_left(monkeypatch):
     monkeypatch.setattr(displacement_pressure, "DIRECTIONS", 12)
     system = system_of(body("BBar3D20N", cells=3))
-    forces = np.random.default_rng(0).standard_normal(system.points.shape)
-    compiled, found = system.solve(forces, tolerance=1e-8)
-    system._equations._multigrid._kernel = None
-    plain, expected = system.solve(forces, tolerance=1e-8)
+    (compiled, found), (plain, expected) = both_ways(system)
     assert found.method == expected.method == "displacement-pressure"
     assert found.iterations > 30
     assert abs(found.iterations - expected.iterations) <= 2
-    np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-7 * np.abs(plain).max())
+    close(compiled, plain, 1e-7)
 
 
 @compiled

@@ -16,8 +16,8 @@ from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.prescribed_motion import Kinematics
 from kratos_lite.bodies.body import Body
 from kratos_lite.errors import InputError
-from kratos_lite.records import names_of
 from kratos_lite.registry import Registry
+from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array
 
 INTEGRATORS: Registry[type[ModelIntegrator]] = Registry("integrator")

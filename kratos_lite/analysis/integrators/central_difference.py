@@ -6,6 +6,8 @@ Source: Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; Belytschko, Liu & Mora
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
@@ -13,10 +15,9 @@ from kratos_lite.analysis.integrators.base import ModelIntegrator
 from kratos_lite.analysis.prescribed_motion import Kinematics, at_end
 from kratos_lite.assembly.finite_strain import highest_frequency
 from kratos_lite.errors import ModelError
-from kratos_lite.records import record
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class CentralDifference(ModelIntegrator):
     """Central differences with lumped mass: explicit, order 2, stable for steps below 2/ω.
 

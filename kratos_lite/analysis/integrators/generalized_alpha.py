@@ -12,13 +12,13 @@ Mech. Div. ASCE 85 (1959) 67-94.
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from kratos_lite.analysis.equations_of_motion import EquationsOfMotion
 from kratos_lite.analysis.integrators.base import ModelIntegrator
 from kratos_lite.analysis.prescribed_motion import Kinematics, at_end, prescribed_part
 from kratos_lite.errors import InputError
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 from kratos_lite.validation import number
 
@@ -73,7 +73,7 @@ class _Implicit(ModelIntegrator):
         return u + du, s.gamma / (s.beta * h) * du + v_new, du / (s.beta * h * h) - a_old
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Newmark(_Implicit):
     """Newmark's method; the trapezoidal rule if nothing is given: order 2, no dissipation.
 
@@ -109,7 +109,7 @@ class Newmark(_Implicit):
         return NewmarkNumbers(float(self.beta), float(self.gamma), 0.0, 0.0)
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class HHT(_Implicit):
     """The method of Hilber, Hughes and Taylor: order 2, high frequencies die out.
 
@@ -134,7 +134,7 @@ class HHT(_Implicit):
         return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, 0.0, -self.alpha)
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Bossak(_Implicit):
     """The method of Wood, Bossak and Zienkiewicz: order 2, high frequencies die out.
 
@@ -166,7 +166,7 @@ class Bossak(_Implicit):
         return NewmarkNumbers((1 - self.alpha) ** 2 / 4, 0.5 - self.alpha, self.alpha, 0.0)
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class GeneralizedAlpha(_Implicit):
     """The method of Chung and Hulbert: order 2, the highest frequencies shrink by ρ∞ a step.
 

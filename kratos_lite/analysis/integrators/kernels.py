@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from kratos_lite import native
 from kratos_lite.errors import SolveError
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 Arrays: TypeAlias = tuple[Array, ...]
@@ -33,7 +33,7 @@ def compiled(name: str, *arguments: Any) -> Any:
         return NotImplemented
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class StepKernel:
     """Compiled steps of a kind of body beside those in NumPy.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -14,7 +15,6 @@ from kratos_lite.errors import InputError, ModelError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
-from kratos_lite.records import record
 from kratos_lite.time_series import Factor, function_of
 from kratos_lite.typing import Array
 
@@ -30,7 +30,7 @@ def no_potential(q: Array) -> Array:
     return np.zeros(q.shape[:-1])
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class AppliedLoad:
     """A load as it acts on one body.
 

@@ -6,14 +6,14 @@ The readers of `.mdpa` and `.elem` fill one, the `.mdpa` writer writes one, and
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 from kratos_lite.mesh import Block, Mesh
-from kratos_lite.records import field, record
 from kratos_lite.typing import Array, Ints, Mask
 
 
-@record
+@dataclass
 class Properties:
     """One ``Properties`` block: variables by name, with the line of each.
 
@@ -27,7 +27,7 @@ class Properties:
     source: str = ""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Data:
     """Values of one variable on nodes, elements or conditions.
 
@@ -49,7 +49,7 @@ class Data:
     source: str = ""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Constraint:
     """One linear multi-point constraint: u[slave] = sum(weights · u[masters]) + constant.
 
@@ -65,7 +65,7 @@ class Constraint:
     name: str = "LinearMasterSlaveConstraint"
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Note:
     """Something the reader kept without use, skipped, or found odd.
 
@@ -82,7 +82,7 @@ class Note:
         return f"{place or f'line {self.line}'}: {self.text}" if place or self.line else self.text
 
 
-@record
+@dataclass
 class Document:
     """Everything that a model file says."""
 

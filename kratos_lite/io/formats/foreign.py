@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError
-from kratos_lite.records import field, record
 
 OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 """Endings left to others: read by ourselves, pictures, or spread over several files."""
@@ -20,7 +20,7 @@ OURS = {".mdpa", ".svg", ".ele", ".node", ".xml"}
 Numbers = NDArray[Any]
 
 
-@record
+@dataclass
 class Cells:
     """Cells of one type of meshio: rows (m, k) of the points; (m, 0) where their number of nodes differs."""
 
@@ -29,7 +29,7 @@ class Cells:
     data: Numbers
 
 
-@record
+@dataclass
 class Found:
     """What meshio finds in a file; data that are no numbers are None.  `output` is what meshio says."""
 

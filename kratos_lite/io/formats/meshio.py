@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,6 @@ from kratos_lite.io.formats.document import Document, Note, Properties
 from kratos_lite.io.formats.foreign import Found, check_ending, guarded, read_foreign
 from kratos_lite.io.formats.gmsh import check_solids
 from kratos_lite.mesh import NO_ROWS, Block, Mesh, Part, with_rows
-from kratos_lite.records import replace
 from kratos_lite.shapes import SHAPES, Shape
 from kratos_lite.typing import Ints
 

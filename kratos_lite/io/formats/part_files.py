@@ -7,6 +7,7 @@ NodalData PARTITION_INDEX names the rank that owns a node.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from kratos_lite.io.formats.document import Data, Document
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
 from kratos_lite.io.formats.pieces import joined, piece_of
 from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
 OWNER = "PARTITION_INDEX"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from kratos_lite.errors import InputError
 from kratos_lite.io.formats.document import Constraint, Data, Document
 from kratos_lite.mesh import Block, Mesh, ids_of, rows_of_ids
 from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.records import replace
 from kratos_lite.typing import Array, Ints
 
 

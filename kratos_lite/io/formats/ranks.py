@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,6 @@ from kratos_lite.io.formats.part_files import part_files, read_part_files
 from kratos_lite.io.formats.pieces import joined, piece_of
 from kratos_lite.mesh import Mesh, without_repeats
 from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.records import replace
 from kratos_lite.typing import Ints
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ import numpy as np
 from kratos_lite.errors import nearest
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh, Part
-from kratos_lite.records import record
 
 FOREVER = 1e30
 """What Kratos takes for "End" of an interval."""
@@ -19,7 +19,7 @@ MAX_STEPS = 1_000_000
 """Steps of a run; each process lists those in which it acts."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Interval:
     """Span of time in s in which a process acts, with the tolerance of Kratos.
 
@@ -45,7 +45,7 @@ def interval_of(settings: Settings) -> Interval:
     raise settings.error("interval", f'interval must be [number, number or "End"]; got {shown(value)}')
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RunContext:
     """The mesh and the time steps that processes and checks refer to.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -14,7 +15,6 @@ from kratos_lite.io.kratos.context import RunContext, interval_of
 from kratos_lite.io.kratos.expressions import evaluate
 from kratos_lite.io.kratos.processes import refuse_local_axes
 from kratos_lite.io.settings import Settings, find_file, is_number, read_settings, shown
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 Comparison: TypeAlias = Callable[[Result], str]
@@ -31,7 +31,7 @@ FILE_KEYS = (
 )  # fmt: skip
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class NodeComparison:
     """Compares a component on nodes with the values that `expected` gives.
 

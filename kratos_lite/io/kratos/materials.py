@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from kratos_lite.io.kratos.properties import ELASTIC, USED, material_from
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import Block, Mesh, with_rows
-from kratos_lite.records import replace
 
 
 def materials_of(

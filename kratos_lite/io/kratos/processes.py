@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
@@ -20,7 +21,6 @@ from kratos_lite.io.kratos.variables import PRESSURES, VECTORS, Variables
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 Value = float | str
@@ -33,7 +33,7 @@ COMMON = ("help", "mesh_id", "model_part_name", "variable_name", "interval", "lo
 NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Action:
     """One component that a process sets, fixes or both.
 
@@ -126,7 +126,7 @@ def _kept(settings: Settings) -> list[Factors]:
     return [(), (), ()]
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Process:
     """A kind of process: what it sets, and of what.
 

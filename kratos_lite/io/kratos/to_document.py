@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -16,9 +17,9 @@ from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Block, Mesh, Part, with_rows
 from kratos_lite.model.loads import TimeDependentLoad
 from kratos_lite.model.loads.body import Gravity
-from kratos_lite.records import names_of, replace
 from kratos_lite.shapes.faces import Point1
 from kratos_lite.solvers.constraint_map import MultiPointConstraint
+from kratos_lite.tabular import names_of
 from kratos_lite.typing import Array, Ints
 
 KRATOS_LAW = {"Isotropic3D": "LinearElastic3DLaw", "Orthotropic3D": USER_LAW}

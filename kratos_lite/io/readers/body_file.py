@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,6 @@ from kratos_lite.io.writers.endings import SERIES, check_ending
 from kratos_lite.mesh import Mesh
 from kratos_lite.mesh.generators import annulus, box
 from kratos_lite.model.mass_properties import MassProperties
-from kratos_lite.records import replace
 
 OUTPUTS = (*(ending[1:] for ending in SERIES), "picture", "state")
 KEYS = ("mesh", "material", "body", "start", "loads", "constraints", "time", "output", "restart")

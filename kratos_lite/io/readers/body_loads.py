@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from kratos_lite import bodies
@@ -14,10 +15,9 @@ from kratos_lite.mesh import Mesh
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Traction
-from kratos_lite.records import record
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Kind:
     """A type of load or constraint: its class, and the keys that it needs and takes."""
 

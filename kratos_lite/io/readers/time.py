@@ -12,7 +12,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.readers.values import number_or_series
 from kratos_lite.io.settings import Settings, find_file, is_number, shown
 from kratos_lite.model.loads import Load, ScaledLoad
-from kratos_lite.records import names_of
+from kratos_lite.tabular import names_of
 from kratos_lite.validation import positive_step, whole_number
 
 if TYPE_CHECKING:

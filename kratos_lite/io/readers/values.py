@@ -11,7 +11,7 @@ from kratos_lite.io.json_file import Object
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.materials import MATERIALS, LinearMaterial
 from kratos_lite.mesh import Mesh
-from kratos_lite.records import names_of
+from kratos_lite.tabular import names_of
 from kratos_lite.time_series import TimeSeries
 from kratos_lite.typing import Array
 

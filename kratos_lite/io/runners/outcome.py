@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
 from kratos_lite.io.outputs import write_at_end, written_as
-from kratos_lite.records import field, record
 
 WIDTH = 22
 """Of the left column of tables."""
 
 
-@record
+@dataclass
 class Outcome:
     """What a case came to; printed, it is the summary.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.formats.document import Note
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import blank_comments, integer, read_bytes, real
-from kratos_lite.records import field, record
 from kratos_lite.typing import Array, Ints, Mask
 
 INT = rb"\d+(?![\w.+-])"
@@ -45,7 +45,7 @@ _EXPONENTS = bytes.maketrans(b"dD", b"ee")
 _FOUND = re.compile(rb"[\w.+-]+|[^\s]")
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Form:
     """One kind of statement, or of row in a list.
 
@@ -94,7 +94,7 @@ def _word(word: str) -> tuple[bytes, str]:
     return re.escape(word.encode()) + (rb"\b\s*" if word.isalpha() else rb"\s*"), repr(word)
 
 
-@record
+@dataclass
 class Run:
     """Statements or rows of one form that follow each other: their values by column, and their offsets."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 from kratos_lite.io.formats.mdpa.scan import SMALL, Source, Span
 from kratos_lite.io.text import integer, real, shown
 from kratos_lite.native import kernels
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 
 TRUTH = {b"1": 1, b"true": 1, b"True": 1, b"0": 0, b"false": 0, b"False": 0}
@@ -22,7 +22,7 @@ TRUTH = {b"1": 1, b"true": 1, b"True": 1, b"0": 0, b"false": 0, b"False": 0}
 Words = list[re.Match[bytes]]
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Layout:
     """What a row holds.
 
@@ -44,7 +44,7 @@ class Layout:
     alone: bool = False
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Rows:
     """Columns of a block: ints (m, a), reals (m, b) and the line (m,) of each row."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.text import Source as TextSource
 from kratos_lite.io.text import shown
 from kratos_lite.native import kernels
-from kratos_lite.records import field, record
 
 Span = tuple[int, int]
 T = TypeVar("T")
@@ -39,7 +39,7 @@ INSIDE = {"Properties": ("Table",), "SubModelPart": ("SubModelPart", "SubModelPa
 """Blocks that may stand inside another one."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Frame:
     """One block: its words after ``Begin``, its own text in pieces, and the blocks inside it."""
 

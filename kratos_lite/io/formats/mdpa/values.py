@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from kratos_lite.io.formats.mdpa.scan import NAME, WORD, Frame, Source, Span
 from kratos_lite.io.names import nearest_variable
 from kratos_lite.io.text import real, shown
 from kratos_lite.materials import MATERIALS
-from kratos_lite.records import record
 from kratos_lite.typing import Array
 
 BRACKET = re.compile(rb"(?:\[([^\]()]*)\]\s*)?\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
@@ -54,7 +54,7 @@ KINDS: dict[str, str] = {
 """What the value of a known variable is."""
 
 
-@record(eq=False)
+@dataclass(eq=False)
 class Table:
     """Pairs (m, 2) of a variable `x` and a variable `y` that depends on it."""
 

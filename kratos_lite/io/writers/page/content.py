@@ -7,13 +7,13 @@ import json
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face
 from kratos_lite.mesh.blocks import with_rows
-from kratos_lite.records import record
 from kratos_lite.typing import Array, Ints
 from kratos_lite.view.facets import sharp_edges
 from kratos_lite.view.rulers import rounded
@@ -31,7 +31,7 @@ QUANTUM = 30_000
 """Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""
 
 
-@record(frozen=True)
+@dataclass(frozen=True)
 class Field:
     """A field of a page.
 
@@ -49,7 +49,7 @@ class Field:
     at: str = "node"
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One state or mode of a page.
 
@@ -63,7 +63,7 @@ class Frame:
     values: Sequence[Array]
 
 
-@record(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Content:
     """All that a page shows.
 
