@@ -8,19 +8,13 @@ import os
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kratos_lite.errors import InputError, SolveError
-from kratos_lite.validation import fits_memory
-
-if TYPE_CHECKING:
-    from zipfile import ZipFile
-
 
 FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None), None}
 """Errors of a full disk, of a file or user that may take no more, and of NumPy, which gives no number."""
@@ -34,36 +28,13 @@ def read_arrays(path: str | Path, names: Sequence[str], what: str) -> dict[str, 
     >>> float(read_arrays(folder / "a.npz", ["time"], "a state")["time"])
     2.0
     """
-    import zlib  # these two only where they are needed, for a quick start
-    from zipfile import BadZipFile, ZipFile
-
     try:
-        with ZipFile(io.BytesIO(Path(path).read_bytes())) as file:
-            return {name: _array(file, name, str(path)) for name in names}
+        with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
+            return {name: np.asarray(file[name]) for name in names}
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error, RuntimeError):
-        raise InputError(f"{path}: not {what}, or not all of it") from None
-
-
-def _array(file: ZipFile, name: str, path: str) -> NDArray[Any]:
-    """Return an array of an .npz file; ValueError for one that states more numbers than there are."""
-    from numpy.lib.format import read_array, read_array_header_1_0, read_array_header_2_0, read_magic
-
-    entry = file.getinfo(f"{name}.npy")
-    fits_memory(2.0 * entry.file_size, f"{path}: {name}", "is the file damaged?")
-    data = io.BytesIO(file.read(entry))
-    header = {(1, 0): read_array_header_1_0, (2, 0): read_array_header_2_0}[read_magic(data)]
-    shape, _, dtype = header(data)
-    if prod(shape) * dtype.itemsize != entry.file_size - data.tell():
-        raise ValueError
-    data.seek(0)
-    array = read_array(data, allow_pickle=False)
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise InputError(f"{path}: {name} is not finite; write the state anew")
-    return array
+    except Exception as error:  # whatever NumPy and zipfile raise for a damaged file
+        raise InputError(f"{path}: not {what}, or not all of it") from error
 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, Any]) -> None:
@@ -116,8 +87,7 @@ def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> N
     >>> (folder / "a.txt").read_bytes(), len(list(folder.iterdir()))
     (b'second', 1)
     """
-    needed = len(data) if isinstance(data, bytes) else 0
-    with replacing(path, needed) as temporary, open(temporary, "r+b") as file:
+    with replacing(path) as temporary, open(temporary, "r+b") as file:
         if callable(data):
             data(file)
         else:
@@ -125,7 +95,7 @@ def write_whole(path: str | Path, data: bytes | Callable[[BinaryIO], None]) -> N
 
 
 @contextmanager
-def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
+def replacing(path: str | Path) -> Iterator[Path]:
     """Give an empty temporary file, with the ending of `path`, that replaces `path` on success.
 
     Use this where another library insists on a file name; otherwise use `write_whole`.
@@ -133,7 +103,6 @@ def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
     Parameters
     ----------
     path : the file to write; its folder must exist.
-    needed : bytes that will be written, if known; they appear in the error of a full disk.
 
     Raises
     ------
@@ -157,27 +126,19 @@ def replacing(path: str | Path, needed: int = 0) -> Iterator[Path]:
             os.replace(temporary, target)
         except BaseException:
             with suppress(OSError):
-                needed = max(needed, temporary.stat().st_size)
                 temporary.unlink()
             raise
     except OSError as error:
-        raise InputError(_text(Path(path), error, needed)) from error
+        raise InputError(_text(Path(path), error)) from error
 
 
-def _text(path: Path, error: OSError, needed: int) -> str:
-    """Say what went wrong with `path` and how to cure it; `needed` are the bytes known to be needed."""
+def _text(path: Path, error: OSError) -> str:
+    """Say what went wrong with `path` and how to cure it."""
     folder = path.absolute().parent
     missing = False
     with suppress(OSError):  # a folder that may not even be looked at is there
         missing = not folder.is_dir()
     if missing:
         return f"{path}: cannot be written: there is no folder {folder}; create it or choose another path"
-    cure = "choose a file name in a folder where you may write"
-    with suppress(OSError):
-        import shutil
-
-        free = shutil.disk_usage(folder).free
-        if error.errno in FULL:
-            cure = f"{free} bytes are free; free some space"
-            cure = f"at least {needed} bytes are needed, {cure}" if needed else cure
+    cure = "free some space" if error.errno in FULL else "choose a file name in a folder where you may write"
     return f"{path}: cannot be written: {error.strerror or error}; {cure}"

@@ -14,7 +14,6 @@ one of some names      ``choice(value, what, names)``
 True or False          ``flag(value, what)``
 a function or None     ``function_or_none(value, what)``
 an instance            ``instance(value, what, cls)``
-room in memory         ``fits_memory(bytes, what, cure)``
 =====================  =============================================================
 """
 
@@ -23,7 +22,6 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable
-from contextlib import suppress
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -41,8 +39,6 @@ T = TypeVar("T")
 AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
 LARGEST = 1e50
 """Size of the largest number that is taken, so that products of some of them are finite."""
-SMALL = 1e7
-"""Bytes that every machine has; nobody asks for the free memory before."""
 
 
 def finite(
@@ -324,46 +320,6 @@ def instance(
         such = f", such as {example}" if example else ""
         raise error(f"{what} must be a {names}{such}; got {short(value)}")
     return value
-
-
-def free_memory() -> float:
-    """Return the bytes that this process may still take; infinite where the system does not tell."""
-    from pathlib import Path
-
-    found = [math.inf]
-    with suppress(OSError, ValueError, IndexError):
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                found.append(1024.0 * int(line.split()[1]))
-    with suppress(OSError, ValueError):  # containers have a limit of their own
-        group = Path("/sys/fs/cgroup")
-        found.append(
-            float((group / "memory.max").read_text()) - float((group / "memory.current").read_text())
-        )
-    with suppress(ImportError, OSError, ValueError):
-        import resource  # Unix alone has it
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY:
-            pages = int(Path("/proc/self/statm").read_text().split()[0])
-            found.append(limit - pages * float(resource.getpagesize()))
-    return max(0.0, min(found))
-
-
-def fits_memory(needed: float, what: str, cure: str) -> None:
-    """Raise InputError, before anything is allocated, for what needs more bytes than are free.
-
-    >>> fits_memory(1e30, "a box of 10^27 cells", "take fewer cells")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    kratos_lite.errors.InputError: a box of 10^27 cells needs about 1e+21 GB of memory; ... GB are free; ...
-    """
-    if needed < SMALL:
-        return
-    free = free_memory()
-    if needed > free:
-        raise InputError(
-            f"{what} needs about {needed / 1e9:.3g} GB of memory; {free / 1e9:.3g} GB are free; {cure}"
-        )
 
 
 def short(value: Any) -> str:

@@ -29,21 +29,13 @@ def test_bytes_and_functions_replace_the_old_file(old):
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_failing_disk_leaves_the_old_file_and_says_how_much_was_needed(old, monkeypatch, call):
+def test_a_failing_disk_leaves_the_old_file(old, monkeypatch, call):
     monkeypatch.setattr(os, call, _full)
-    with pytest.raises(
-        InputError, match=r"result\.vtu: .*No space left.*at least 7 bytes are needed, \d+"
-    ) as error:
+    with pytest.raises(InputError, match=r"result\.vtu: .*No space left.*; free some space$") as error:
         write_whole(old, b"seven b")
     assert isinstance(error.value.__cause__, OSError)
     assert old.read_bytes() == b"old"
     assert list(old.parent.iterdir()) == [old]
-
-
-def test_a_full_disk_without_a_known_size_tells_what_is_free(old, monkeypatch):
-    monkeypatch.setattr(os, "fsync", _full)
-    with pytest.raises(InputError, match=r"No space left on device; \d+ bytes are free; free some space$"):
-        write_whole(old, b"")
 
 
 def test_a_disk_that_fills_midway_leaves_the_old_file(old):
@@ -52,7 +44,7 @@ def test_a_disk_that_fills_midway_leaves_the_old_file(old):
         file.flush()
         _full()
 
-    with pytest.raises(InputError, match="at least 4 bytes are needed"):
+    with pytest.raises(InputError, match="free some space"):
         write_whole(old, write)
     assert old.read_bytes() == b"old"
     assert list(old.parent.iterdir()) == [old]

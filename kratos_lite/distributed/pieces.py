@@ -86,11 +86,11 @@ class Piece:
 
     elements: tuple[Kind, ...] = ()
     conditions: tuple[Kind, ...] = ()
-    node_ids: Ints = NO_ROWS
+    node_ids: Ints = field(default_factory=lambda: NO_ROWS)
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     owners: Ints | Rows | None = None
     parts: dict[str, Part] = field(default_factory=dict)
-    wanted: Ints = NO_ROWS
+    wanted: Ints = field(default_factory=lambda: NO_ROWS)
 
 
 def aligned(ranks: Alone, kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:

@@ -104,8 +104,6 @@ def check_targets(read: Iterable[Path], targets: Iterable[str], *, new_folders: 
             real, name = os.path.realpath(path), target if path == Path(target) else str(path)
             if path.exists() and not path.is_file():
                 raise InputError(f"{name}: cannot be written: it is a folder or a device, not a file")
-            if os.path.islink(real):
-                raise InputError(f"{name}: cannot be written: its symbolic links lead in a circle")
             if real in taken:
                 raise InputError(f"{name}: is an input or another output; choose another name")
         taken |= {os.path.realpath(path) for path in _set_of(Path(target))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import stat
 from functools import cached_property
@@ -14,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from kratos_lite.errors import InputError, Problems
 from kratos_lite.io.formats.document import Note
 from kratos_lite.typing import Ints
-from kratos_lite.validation import fits_memory, free_memory
 
 MAX_LINE = 1_000_000
 """Longest line that is read, in bytes."""
@@ -39,7 +37,6 @@ def read_bytes(path: str | Path) -> bytes:
         if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
             # Reading a pipe or a device may never end.
             raise InputError(f"{path}: is no ordinary file but a pipe or device; name a file")
-        fits_memory(3.0 * path.stat().st_size, f"{path}", "free some memory, or split the file")
         data = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
@@ -62,22 +59,14 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def _unzip(path: Path, data: bytes) -> bytes:
-    """Return what a gzip file holds, unless memory cannot hold it several times over."""
+    """Return what a gzip file holds."""
     import gzip
     import zlib
 
-    most, pieces, size = int(min(free_memory() / 4, 2.0**62)), list[bytes](), 0
     try:
-        with gzip.open(io.BytesIO(data)) as file:
-            while piece := file.read(1 << 24):
-                pieces.append(piece)
-                size += len(piece)
-                if size > most:
-                    text = f"holds more than {most / 1e9:.3g} GB when unzipped; free some memory, or split it"
-                    raise InputError(f"{path}: {text}")
+        return gzip.decompress(data)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: broken gzip file: {error}") from None
-    return b"".join(pieces)
 
 
 def _long_line(data: bytes) -> int:

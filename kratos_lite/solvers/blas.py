@@ -8,15 +8,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from kratos_lite.validation import fits_memory
-
-BUFFERS = 1e8
+BUFFERS = 10**8
 """Bytes that such a library takes at its first product; without them OpenBLAS ends the program."""
 
 
 def reserve_buffers(of_scipy: bool = False) -> None:
-    """Let the library of NumPy, or of SciPy, take its memory now; InputError where there is not enough."""
-    fits_memory(BUFFERS, "dense algebra", "end other programs, or raise the limit of memory")
+    """Let the library of NumPy, or of SciPy, take its memory now; MemoryError where there is not enough."""
+    np.empty(BUFFERS, dtype=np.uint8)
     if of_scipy:
         from scipy.linalg.lapack import dpotrf
 

@@ -720,8 +720,6 @@ def test_links_in_a_circle_and_pipes_are_refused(run, box):
     for name in ("loop.mdpa", "loop.vtu"):
         Path(name).symlink_to(name)
         assert run("info", name).refuses(name)
-        assert run("convert", "box.mdpa", name).refuses(f"{name}: cannot be written: its symbolic links")
-        assert Path(name).is_symlink()
     for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem", "pipe.json"):
         os.mkfifo(name)
     for name in ("pipe.mdpa", "pipe.vtu", "pipe.elem"):

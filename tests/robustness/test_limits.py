@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import io
 import json
 import sys
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 
 import kratos_lite as kl
-from kratos_lite import validation
 from kratos_lite.io.formats.vtu import write_vtu
 
 
@@ -53,38 +51,12 @@ def test_a_missing_meshio_is_named_with_its_cure(monkeypatch, tmp_path):
         kl.read(tmp_path / "bar.vtu")
 
 
-def test_a_gzip_bomb_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("kratos_lite.io.text.free_memory", lambda: 4e7)
-    path = tmp_path / "bomb.mdpa.gz"
-    path.write_bytes(gzip.compress(b"//" + b" " * 3 * 10**7, 1))
-    with pytest.raises(kl.InputError, match=r"bomb\.mdpa\.gz: holds more than 0\.01 GB when unzipped"):
-        kl.read(path)
-
-
 @pytest.mark.parametrize("element", ["KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D27N"])
 def test_a_box_that_no_memory_holds_is_refused_at_once(element):
     with pytest.raises(kl.InputError, match="bricks has more than"):
         kl.box(cells=(10**6,) * 3, element=element)
     with pytest.raises(kl.InputError, match="bricks has"):
         kl.annulus(1.0, 2.0, 1.0, cells=(1e40, 3, 1))
-
-
-def test_a_box_larger_than_the_free_memory_is_refused_with_both_numbers(monkeypatch):
-    monkeypatch.setattr(validation, "free_memory", lambda: 1e8)
-    with pytest.raises(kl.InputError, match=r"about 0\.48 GB of memory; 0\.1 GB are free; take fewer cells"):
-        kl.box(cells=(100, 100, 100))
-
-
-def test_the_memory_asked_for_is_near_what_a_box_takes():
-    import tracemalloc
-
-    cells = (20, 20, 20)
-    for element in ("KinematicLinear3D8N", "KinematicLinear3D4N", "KinematicLinear3D20N"):
-        tracemalloc.start()
-        mesh = kl.box(cells=cells, element=element)
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        assert peak < 60 * mesh.blocks[0].nodes.size
 
 
 def scene(tmp_path, **more):
@@ -107,23 +79,6 @@ def test_a_scene_with_an_absurd_number_of_steps_is_refused_at_its_place(tmp_path
     run("solve", scene(tmp_path), "--time", "1e-9:10000000000").refuses(
         "10000000000 steps are more than 1000000000"
     )
-
-
-def test_states_that_memory_cannot_hold_are_refused_before_the_first_step(tmp_path, run, monkeypatch):
-    monkeypatch.setattr(validation, "free_memory", lambda: 1e9)
-    path = scene(tmp_path, time={"step": 1e-6, "steps": 10**7}, output={"npz": "all.npz"})
-    run("solve", path).refuses("a series of 10000001 states needs about", "keep fewer of them, with every")
-    assert [p.name for p in tmp_path.iterdir()] == ["scene.json"]
-
-
-def test_frames_that_the_disk_cannot_hold_are_refused_before_the_first_step(tmp_path, run, monkeypatch):
-    import shutil
-    from types import SimpleNamespace
-
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=10**6))
-    path = scene(tmp_path, time={"step": 1e-3, "steps": 10**4}, output={"pvd": "all.pvd"})
-    run("solve", path).refuses("all.pvd: 10001 frames need about", "0.001 GB are free on the disk")
-    assert [p.name for p in tmp_path.iterdir()] == ["scene.json"]
 
 
 def test_a_step_that_needs_absurdly_many_substeps_is_refused(tmp_path, run):

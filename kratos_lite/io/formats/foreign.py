@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
@@ -51,6 +52,7 @@ def read_foreign(path: Path) -> Found:
     try:
         with guarded(path, "read") as (meshio, output):
             check_ending(path)
+            _check_end(path)
             mesh = meshio.read(path)
             cells = [Cells(one.type, int(one.dim), _rows(one.data)) for one in mesh.cells]
             sets = {name: _numbers(getattr(mesh, name)) for name in FIELDS}
@@ -63,6 +65,14 @@ def read_foreign(path: Path) -> Found:
         if not isinstance(values, list) or [-1 if v is None else len(v) for v in values] != counts:
             sets["cell_data"][name] = []  # no numbers: its name is all that is of use
     return Found(points, cells, **sets, output=output.getvalue())
+
+
+def _check_end(path: Path) -> None:
+    """Refuse Nastran files without ENDDATA, which meshio 5.3.5 would read for ever if they are cut early."""
+    if path.suffix.lower() not in {".bdf", ".fem", ".nas"}:
+        return
+    if not re.search(rb"BEGIN BULK.*[\r\n]ENDDATA", path.read_bytes(), re.DOTALL):
+        raise InputError(f"{path}: there is no ENDDATA behind a BEGIN BULK; is the file complete?")
 
 
 def _rows(data: Any) -> Numbers:

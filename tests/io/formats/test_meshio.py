@@ -247,6 +247,7 @@ def test_a_geometry_is_answered_with_the_command_that_meshes_it(tmp_path, ending
             "$MeshFormat\n4.1 0 8\n$EndMesh",
             r"a\.msh: cannot be read by meshio: .*is the file complete",
         ),
+        ("a.bdf", "BEGIN BULK\n", r"a\.bdf: there is no ENDDATA behind a BEGIN BULK; is the file complete"),
         ("a.vtu", "<VTKFile", r"a\.vtu: cannot be read by meshio"),
         ("a.vtk", "", r"a\.vtk: cannot be read by meshio"),
         ("a.inp", "*NODE\n1,0,0\n", r"a\.inp: the points form \(1, 2\); expected \(n, 3\)"),

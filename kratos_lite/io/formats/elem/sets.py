@@ -105,7 +105,7 @@ def write_elem(path: str | Path, document: Document) -> list[Note]:
         # All are on the disk before the first takes its place.
         for ending, text in lines.items():
             data = "".join(f"{line}\n" for line in text).encode("ascii")
-            stack.enter_context(replacing(stem(path) + ending, len(data))).write_bytes(data)
+            stack.enter_context(replacing(stem(path) + ending)).write_bytes(data)
     return notes
 
 
