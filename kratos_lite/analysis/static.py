@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kratos_lite.analysis.engines import System, displacements, engine_of, release, system_of
+from kratos_lite.analysis.engines import System, engine_of, release, system_of
 from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
 from kratos_lite.analysis.origin import Origin
 from kratos_lite.analysis.report import Report
@@ -82,17 +82,15 @@ class StaticAnalysis:
         petsc: str | None = None,
     ) -> None:
         check_arguments(solver, tolerance)
-        self.engine, self.petsc = engine_of(model.mesh, engine, petsc), petsc
+        self.engine, self.petsc = engine_of(engine, petsc), petsc
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance = model, solver, tolerance
-        self.ranks = model.mesh.ranks
-        self.progress = progress if self.ranks.rank == 0 else None
+        self.progress = progress
         self.system: System | None = None
         self._solved = np.zeros(0, dtype=bool)  # parts in the equations
         self._phase = Phases(self.progress)
-        with self.ranks.together():
-            self._prepare()
+        self._prepare()
 
     def solve(
         self,
@@ -123,14 +121,13 @@ class StaticAnalysis:
         SolveError
             If the accuracy asked for cannot be reached.
         """
-        with self.ranks.together():
-            self._follow()
-            case = self._load(self.model.loads if loads is None else loads)
-            if tolerance is not None:
-                check_arguments(self.solver, tolerance)
-            if start is not None:
-                start = finite(start, "start", (self.model.mesh.n_nodes, 3))
-            return self._solve(case, case.moving, tolerance, start)
+        self._follow()
+        case = self._load(self.model.loads if loads is None else loads)
+        if tolerance is not None:
+            check_arguments(self.solver, tolerance)
+        if start is not None:
+            start = finite(start, "start", (self.model.mesh.n_nodes, 3))
+        return self._solve(case, case.moving, tolerance, start)
 
     def check(self) -> list[str]:
         """Check the loads of the model, too, as a solution does, without solving.
@@ -144,20 +141,18 @@ class StaticAnalysis:
         MeshError, ModelError, InputError
             A load does not fit, or a change of the model has broken it.
         """
-        with self.ranks.together():
-            self._follow()
-            case = self._load(self.model.loads)
-            return self._warnings(case) + self.free.notes(case.moving)
+        self._follow()
+        case = self._load(self.model.loads)
+        return self._warnings(case) + self.free.notes(case.moving)
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
             raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
-        with self.ranks.together():
-            self._follow()
-            loaded = {name: self._load(loads) for name, loads in cases.items()}
-            moving = np.any([case.moving for case in loaded.values()], axis=0)
-            return {name: self._solve(case, moving) for name, case in loaded.items()}
+        self._follow()
+        loaded = {name: self._load(loads) for name, loads in cases.items()}
+        moving = np.any([case.moving for case in loaded.values()], axis=0)
+        return {name: self._solve(case, moving) for name, case in loaded.items()}
 
     # ---- what is kept from one solution to the next ------------------------------------------------
 
@@ -168,11 +163,10 @@ class StaticAnalysis:
         with self._phase("check"):
             version = model.version
             self.groups, self.warnings = model.checked()
-            self.kinds = model.kinds(self.groups)
             self.free = model.free_motions(self.groups)
             self.part = self.free.part
             self._used = self.part >= 0
-            self._n_used, self._n_unused = self._count(self._used), self._count(~self._used)
+            self._n_used = int(self._used.sum())
             self._read_supports()
             self.initial = initial_loads(model, self.groups)
             self.release()
@@ -190,24 +184,20 @@ class StaticAnalysis:
         moved.flat[np.array(pushed, dtype=np.int64)] = True
         self._moved = _any_axis(moved)
         self._held = ~_any_axis(~supports.fixed) & ~self._moved
-        own = self._used & self.model.mesh.own_nodes
-        fixed = supports.fixed if own.all() else supports.fixed[own]
-        self._fixed = self.ranks.sum(int(fixed.sum()))
+        self._fixed = int(supports.fixed[self._used].sum())
 
     def _follow(self) -> None:
         """Take over what has changed in the model."""
         supports = self.model.supports
-        changed = self._version != self.model.version, self._value_version != supports.value_version
-        prepare, read = self.ranks.any(np.array(changed)).tolist()
-        if prepare:
+        if self._version != self.model.version:
             self._prepare()
-        elif read:
+        elif self._value_version != supports.value_version:
             held = self._held
             self._read_supports()
-            if self.ranks.any(not np.array_equal(held, self._held)):
+            if not np.array_equal(held, self._held):
                 self.release()  # elements that were left out may be needed now
             if self.system:
-                self._prescribed = displacements(self.model, self.system)
+                self._prescribed = supports.constraint_map(self.system.nodes).c
 
     def _load(self, given: Load | Sequence[Load]) -> LoadSet:
         """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
@@ -221,8 +211,6 @@ class StaticAnalysis:
         with phase("load"):
             mesh, fixed = self.model.mesh, self.model.supports.fixed
             external = self.model.supports.on_masters(external_loads(mesh, self.groups, loads))
-            if mesh.subdomain is not None:
-                external = mesh.subdomain.fetch(external)  # at ghosts, not all of it is here
             forces = external if self.initial is None else external - self.initial
             acts = forces != 0
             checks.check_carried(mesh, forces, self._used)
@@ -231,16 +219,15 @@ class StaticAnalysis:
         return LoadSet(loads, external, forces, moving, phase)
 
     def _parts_with(self, nodes: Mask) -> Mask:
-        """Return the parts with one of some own nodes, a mask (n,)."""
+        """Return the parts with one of some nodes, a mask (n,)."""
         parts = np.zeros(len(self.free.counts), dtype=bool)
-        parts[self.part[nodes & self._used & self.model.mesh.own_nodes]] = True
-        found: Mask = self.ranks.any(parts)
-        return found
+        parts[self.part[nodes & self._used]] = True
+        return parts
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
-        idle = checks.check_loads(case.loads, self.kinds, case.forces, self.model.supports)
-        return self.warnings + idle + equal_loads(case.loads, self.ranks)
+        idle = checks.check_loads(case.loads, self.groups, case.forces, self.model.supports)
+        return self.warnings + idle + equal_loads(case.loads)
 
     def _system_of(self, moving: Mask) -> System:
         """Return the system of the elements in moving parts, made anew only for a part that is new."""
@@ -254,9 +241,7 @@ class StaticAnalysis:
             self.release()
             self.system = system
             self._prescribed = None
-            own = model.mesh.own_elements
-            still = (sum(int(own[group.rows].sum()) for group in some) for some in (every, groups))
-            self._still = self.ranks.sum(next(still) - next(still))
+            self._still = sum(map(len, every)) - sum(map(len, groups))
             self._solved = solved
         return self.system
 
@@ -278,13 +263,11 @@ class StaticAnalysis:
                 u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
                 warnings += system.warnings
                 u = self.free.without(self._complete(u, system, case.moving))
-                noise *= self.ranks.max(float(np.abs(u).max(initial=0.0)))
+                noise *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
-            if model.mesh.subdomain is not None:
-                reactions = model.mesh.subdomain.fetch(reactions)
             inner = model.supports.on_masters(stress_load(model, self.groups, u))
             if self.initial is not None and self.system is not None:
                 rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
@@ -296,14 +279,14 @@ class StaticAnalysis:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
-            warnings += check_deformation(model, self.kinds, u)
+            warnings += check_deformation(model, self.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = Origin(self, model.version)
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin, self.kinds)
+        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin)
 
     def release(self) -> None:
-        """Let go of the matrix and what is made of it; another solution makes them anew."""
+        """Release the matrix and what is made of it; another solution makes them anew."""
         if self.system is not None:
             release(self.system)
         self.system, self._solved = None, np.zeros(0, dtype=bool)
@@ -328,14 +311,13 @@ class StaticAnalysis:
         self._follow()
         supports, load = self.model.supports, self.free.balanced(load)
         moved = np.where(supports.fixed, motion, 0.0)
-        motions = self.ranks.any(np.array([motion.any(), moved.any()]))
-        if motions[0] and not motions[1]:
+        if motion.any() and not moved.any():
             raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
         moving = self._parts_with(_any_axis(load != 0) | _any_axis(moved != 0))
         if not moving.any():
             return np.zeros_like(load)
         system = self._system_of(moving)
-        displaced, at_rest = (displacements(self.model, system, u) for u in (moved, 0.0 * moved))
+        displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
     def _report(
@@ -346,18 +328,16 @@ class StaticAnalysis:
         balance: tuple[float, float],
         warnings: list[str],
     ) -> Report:
-        own = self.model.mesh.own_nodes
-        slaves = self.ranks.sum(sum(bool(own[slave // 3]) for slave in self.model.supports.slaves()))
         return Report(
-            unknowns=3 * self._n_used - self._fixed - slaves,
-            total_load=self.ranks.sum(case.external[own].sum(axis=0)),
-            total_reaction=self.ranks.sum(reactions[own].sum(axis=0)),
+            unknowns=3 * self._n_used - self._fixed - len(self.model.supports.slaves()),
+            total_load=case.external.sum(axis=0),
+            total_reaction=reactions.sum(axis=0),
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
             notes=[*self.model.remarks(), *self.free.notes(case.moving)],
             skipped=self._skipped(case.moving),
-            formulation=self.model.chosen(self.kinds),
+            formulation=self.model.chosen(self.groups),
         )
 
     def _at_rest(self) -> Array:
@@ -374,17 +354,13 @@ class StaticAnalysis:
             u[self._used & ~moving[self.part]] = 0.0
         return u
 
-    def _count(self, nodes: Mask) -> int:
-        """Return how many of some nodes, a mask (n,), all ranks have."""
-        return int(self.ranks.sum(int((nodes & self.model.mesh.own_nodes).sum())))
-
     def _skipped(self, moving: Mask) -> list[str]:
         """Return what this solution did without, in words."""
         skipped = []
         if not moving.any():
             skipped.append("assembly and solution, as nothing moves")
         elif not moving.all():
-            count = self._count(~moving[self.part] & self._used)
+            count = int((~moving[self.part] & self._used).sum())
             skipped.append(
                 f"{int((~moving).sum())} of {len(moving)} parts ({count} nodes), as nothing moves them"
             )
@@ -392,8 +368,8 @@ class StaticAnalysis:
             skipped.append(f"{self._still} elements, as all their nodes are held")
         if self._fixed:
             skipped.append(f"{self._fixed} prescribed degrees of freedom")
-        if self._n_unused:
-            skipped.append(f"{self._n_unused} nodes without elements")
+        if unused := len(self._used) - self._n_used:
+            skipped.append(f"{unused} nodes without elements")
         if moving.any() and self.system:
             skipped += self.system.skipped
         return skipped

@@ -132,7 +132,6 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_model(command)
     _add_motion(command)
     _add_time(command)
-    command.set_defaults(ranks=None)  # with --engine petsc, those who run it
     how = command.add_argument_group("solver")
     how.add_argument("--modes", type=int, metavar="N", help=MODES)
     how.add_argument("--solver", choices=("auto", "dense", "direct", "amg"), help="auto chooses by size")

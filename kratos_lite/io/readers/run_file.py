@@ -17,7 +17,6 @@ from kratos_lite.io.readers.time import load_of, read_time
 from kratos_lite.io.readers.values import is_by_part, number_or_series, read_material
 from kratos_lite.io.settings import Settings, find_file, inside, shown
 from kratos_lite.io.writers.endings import check_series
-from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.loads import Load, TimeDependentLoad
 from kratos_lite.model.loads.body import BodyForce, Gravity
 from kratos_lite.model.loads.nodal import PointLoad
@@ -51,7 +50,6 @@ def read_run_file(
     strict: bool = True,
     allow_outside: bool = False,
     initial_displacement: bool = True,
-    ranks: Alone = ALONE,
 ) -> Case:
     """Return the case of a run file of kratos_lite.
 
@@ -67,7 +65,6 @@ def read_run_file(
     settings : the file; all files that it names lie in its folder.
     strict, initial_displacement : as of `kratos_lite.read`, for its mesh.
     allow_outside : let it name files elsewhere.
-    ranks : that share the model.
 
     Raises
     ------
@@ -85,7 +82,7 @@ def read_run_file(
     time = problems.of(lambda: read_time(settings, folder, outside=allow_outside))
     problems.raise_if_any()
     given = sections["material"]
-    document = read_document(path, strict=strict, ranks=ranks)
+    document = read_document(path, strict=strict)
     by_file = not given.values or is_by_part(given)
     model = model_from(document, materials=by_file, initial_displacement=initial_displacement)
     problems.of(_choose_formulation, model, settings)
