@@ -83,7 +83,7 @@ class Model(Structure):
             as `Result.error` estimates it, in place of the energy norm.  Relative to its value, which must
             not be 0.
         engine : ``own``, or ``petsc`` for statics by PETSc, which must be installed; if not given, that
-            which takes the mesh: PETSc where several ranks share it.
+            of one process.
         petsc : options of PETSc, which win over what is chosen: ``"-ksp_type cg -pc_type hypre"``.
 
         Returns

@@ -29,7 +29,7 @@ class PartResult(Result):
 
     Attributes
     ----------
-    partition : how the parts hang together.
+    partition : how the parts meet.
     """
 
     partition: Partition
@@ -41,20 +41,20 @@ class PartResult(Result):
         -------
         Labels and values.
         """
-        ranks, report = self.partition.ranks, self.report
+        partition, report = self.partition, self.report
         here = element_counts(self.mesh, self.groups, report.formulation)
         counts: dict[str, int] = {}
-        for some in ranks.gather(here):
+        for some in partition.gather(here):
             for name, count in some.items():
                 counts[name] = counts.get(name, 0) + count
-        length, node, u = max(ranks.gather(self.largest_displacement()), key=lambda found: found[0])
-        mises, element, center = max(ranks.gather(self.largest_von_mises()), key=lambda found: found[0])
+        length, node, u = max(partition.gather(self.largest_displacement()), key=lambda found: found[0])
+        mises, element, center = max(partition.gather(self.largest_von_mises()), key=lambda found: found[0])
         return [
-            ("nodes", str(self.partition.offsets[-1])),
+            ("nodes", str(partition.offsets[-1])),
             ("elements", ", ".join(f"{count} {name}" for name, count in counts.items())),
             *report.load_rows(),
             ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
-            ("strain energy", f"{ranks.sum(self.energy()):.6e} J"),
+            ("strain energy", f"{partition.sum(self.energy()):.6e} J"),
             (
                 "largest von Mises",
                 f"{mises:.6e} Pa (at a Gauss point) in element {element} around {vector(center)} m",
@@ -71,15 +71,15 @@ def solve_part(
     progress: Progress | None = None,
     petsc: str | None = None,
 ) -> PartResult:
-    """Solve a model of which each rank has a part; all ranks call it.
+    """Solve a model of which each process has a part; all of them call it.
 
     Each element is checked; of the whole it is checked that supports leave no rigid-body mode free, and that
     the solution is in equilibrium.
 
     Parameters
     ----------
-    model : of the part of this rank: its mesh, with what supports and loads it has.
-    partition : how the parts hang together.
+    model : of the part of this process: its mesh, with what supports and loads it has.
+    partition : how the parts meet.
     solver, tolerance, progress, petsc : as for `Model.solve`.
 
     Returns
@@ -94,9 +94,9 @@ def solve_part(
     SolveError
         If the accuracy asked for cannot be reached.
     """
-    ranks, mesh = partition.ranks, model.mesh
-    phase = Phases(progress if ranks.rank == 0 else None)
-    with ranks.agree_on_errors():
+    mesh, own = model.mesh, partition.own
+    phase = Phases(progress if partition.rank == 0 else None)
+    with partition.agree_on_errors():
         check_arguments(solver, tolerance)
         with phase("check"):
             groups, warnings = _checked(model)
@@ -107,8 +107,8 @@ def solve_part(
     values = np.asarray(partition.fetch(model.supports.values))
     external = np.asarray(partition.add(forces))
     loads = external if initial is None else external - partition.add(initial)
-    with ranks.agree_on_errors():
-        _check_supports(partition, mesh.points, held & partition.own[:, None])
+    with partition.agree_on_errors():
+        _check_supports(partition, mesh.points, held & own[:, None])
     with phase("assemble"):
         system = PartSystem(mesh.points, groups, partition, held, solver, tolerance, petsc, phase.progress)
     try:
@@ -119,19 +119,22 @@ def solve_part(
     with phase("verify"):
         inner = np.asarray(partition.add(stress_load(model, groups, u)))
         reactions = np.where(held, inner - external, 0.0)
-        total = partition.own[:, None] * (external + reactions - inner)
-        size = ranks.sum(float(np.abs(partition.own[:, None] * np.stack([external, reactions])).sum()))
-        off = ranks.sum(float(np.abs(total).sum())) / size if size else 0.0
+        total = own[:, None] * (external + reactions - inner)
+        size = partition.sum(float(np.abs(own[:, None] * np.stack([external, reactions])).sum()))
+        off = partition.sum(float(np.abs(total).sum())) / size if size else 0.0
         judge(solution, u, (off, 0.0))
-    own = partition.own
+    found = [text for some in partition.gather(warnings) for text in some]
     report = Report(
         unknowns=system.unknowns,
-        total_load=ranks.sum(external[own].sum(axis=0)),
-        total_reaction=ranks.sum(reactions[own].sum(axis=0)),
+        total_load=partition.sum(external[own].sum(axis=0)),
+        total_reaction=partition.sum(reactions[own].sum(axis=0)),
         **quality(solution, (off, 0.0)),
         seconds=phase.seconds,
-        warnings=[*dict.fromkeys(text for some in ranks.gather(warnings) for text in some), *system.warnings],
-        notes=list(dict.fromkeys(text for some in ranks.gather(model.remarks()) for text in some)),
+        warnings=[
+            *dict.fromkeys(text for some in partition.gather(warnings) for text in some),
+            *system.warnings,
+        ],
+        notes=list(dict.fromkeys(text for some in partition.gather(model.remarks()) for text in some)),
         skipped=system.skipped,
         formulation=model.chosen(groups),
     )
@@ -171,13 +174,13 @@ def _acts_on_nodes(load: Load) -> bool:
 
 
 def _check_supports(partition: Partition, points: Array, held: Mask) -> None:
-    """Raise ModelError where supports of own nodes, on all ranks, leave rigid-body modes free."""
-    ranks, own = partition.ranks, partition.own
-    center = ranks.sum(points[own].sum(axis=0)) / max(int(partition.offsets[-1]), 1)
+    """Raise ModelError where supports of all parts leave rigid-body modes free."""
+    own = partition.own
+    center = partition.sum(points[own].sum(axis=0)) / max(int(partition.offsets[-1]), 1)
     X = points - center
-    size = ranks.max(float(np.abs(X).max(initial=0.0))) or 1.0
+    size = partition.max(float(np.abs(X).max(initial=0.0))) or 1.0
     R = rigid_modes(X / size, np.zeros(3))[held.ravel()]
-    values = np.linalg.eigvalsh(ranks.sum(R.T @ R))
+    values = np.linalg.eigvalsh(partition.sum(R.T @ R))
     if values[0] <= FREE * max(values[-1], 1.0):
         free = int((values <= FREE * max(values[-1], 1.0)).sum())
         raise ModelError(f"the supports leave {free} rigid-body modes free. Fix more nodes or components")

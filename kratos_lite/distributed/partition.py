@@ -31,6 +31,7 @@ class Partition:
 
     Attributes
     ----------
+    rank, size, sum, max, gather, agree_on_errors : those of the ranks.
     owner : (n,) int, rank that owns each node.
     own : (n,) bool, whether this one does.
     number : (n,) int, number of each node among those of all ranks, from 0, ascending by owner.
@@ -42,7 +43,9 @@ class Partition:
     """
 
     def __init__(self, ranks: Alone, mesh: Mesh) -> None:
-        self.ranks = ranks
+        self.ranks, self.rank, self.size = ranks, ranks.rank, ranks.size
+        self.sum, self.max, self.gather = ranks.sum, ranks.max, ranks.gather
+        self.agree_on_errors = ranks.agree_on_errors
         for block in mesh.blocks:
             self._check_once(block.ids)
         order = np.argsort(mesh.node_ids, kind="stable")

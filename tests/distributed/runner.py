@@ -17,4 +17,4 @@ if __name__ == "__main__":
     import pytest
 
     files = [str(path) for path in (*sorted(HERE.glob("ranks_*.py")), HERE / "test_cut.py")]
-    sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "--noconftest", *files, *sys.argv[1:]]))
+    sys.exit(pytest.main(["-p", "no:cacheprovider", "--noconftest", *files, *sys.argv[1:]]))

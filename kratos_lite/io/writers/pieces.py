@@ -16,6 +16,7 @@ from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.part_analysis import PartResult
 from kratos_lite.atomic import replacing
 from kratos_lite.distributed.communicator import ALONE, Alone
+from kratos_lite.distributed.partition import Partition
 from kratos_lite.io.formats.vtu import HEAD, checked, described, escaped, writer_of
 from kratos_lite.io.writers.endings import piece_of
 from kratos_lite.typing import Numbers
@@ -32,19 +33,19 @@ def write_pieces(path: str | Path, result: Result, mode: str = "binary") -> None
     Nodes between parts stand in several pieces, with the same values.  All files are written, or none.
     """
     path, (points, cells) = Path(path), fields(result)
-    ranks: Alone = ALONE
+    parts: Alone | Partition = ALONE
     if isinstance(result, PartResult):
-        ranks = result.partition.ranks
+        parts = result.partition
         smooth = {name: values for name, values in points.items() if np.asarray(values).dtype.kind == "f"}
-        points["PARTITION_INDEX"] = result.partition.owner
-        points |= {name: result.partition.average(np.asarray(values)) for name, values in smooth.items()}
+        points |= {name: parts.average(np.asarray(values)) for name, values in smooth.items()}
+        points["PARTITION_INDEX"] = parts.owner
     data = points, cells
     with ExitStack() as files:  # all are written before one takes its place
-        with ranks.agree_on_errors():
-            if ranks.rank == 0:
-                names = [piece_of(path, number).name for number in range(ranks.size)]
+        with parts.agree_on_errors():
+            if parts.rank == 0:
+                names = [piece_of(path, number).name for number in range(parts.size)]
                 files.enter_context(replacing(path)).write_text(_index(data, names), encoding="utf-8")
-            piece = piece_of(path, ranks.rank)
+            piece = piece_of(path, parts.rank)
             write = writer_of(piece, result.mesh, *data, mode)
             with open(files.enter_context(replacing(piece)), "r+b") as file:
                 write(file)
