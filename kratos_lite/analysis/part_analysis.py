@@ -130,10 +130,7 @@ def solve_part(
         total_reaction=partition.sum(reactions[own].sum(axis=0)),
         **quality(solution, (off, 0.0)),
         seconds=phase.seconds,
-        warnings=[
-            *dict.fromkeys(text for some in partition.gather(warnings) for text in some),
-            *system.warnings,
-        ],
+        warnings=[*dict.fromkeys(found), *system.warnings],
         notes=list(dict.fromkeys(text for some in partition.gather(model.remarks()) for text in some)),
         skipped=system.skipped,
         formulation=model.chosen(groups),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import logging
+import os
 import pickle
 import sys
 import traceback
@@ -11,7 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from signal import SIG_IGN, SIGINT, signal
-from time import perf_counter, sleep
+from threading import Timer
+from time import sleep
 from typing import Any, TypeVar
 
 import numpy as np
@@ -228,19 +231,6 @@ class Ranks(Alone):
         for rank in range(1, self.size):
             self.comm.send(None, dest=rank)
 
-    def meet(self) -> None:
-        """Wait until all ranks are here; end all if one of them does not come."""
-        request, start = self.comm.Ibarrier(), perf_counter()
-        while not request.Test():
-            sleep(PAUSE)
-            if perf_counter() - start > LIMIT:
-                self.abort(
-                    InputError(
-                        f"after {LIMIT:g} s not all of the {self.size} ranks have begun: one has ended early "
-                        "or was started with other words"
-                    )
-                )
-
 
 def world(launched: int = 1) -> Alone:
     """Return the ranks that mpirun has started, or the single process.
@@ -284,7 +274,8 @@ def start(words: Sequence[str] = (), launched: int = 1) -> Alone:
         return _STARTED[0]
     ranks = world(launched)
     if isinstance(ranks, Ranks):
-        ranks.meet()
+        with _limited():
+            ranks.comm.Barrier()
         try:
             _check(ranks, list(words))
         except InputError:
@@ -335,14 +326,42 @@ def _check(ranks: Ranks, words: list[str]) -> None:
 
 
 def _mpi() -> Any:
-    """Return mpi4py's MPI; InputError where it is absent."""
+    """Return mpi4py's MPI, initialized; InputError where it is absent."""
     try:
+        import mpi4py
+
+        if "mpi4py.MPI" not in sys.modules:  # its own initialization would let no other thread run
+            mpi4py.rc.initialize, mpi4py.rc.finalize = False, True
         from mpi4py import MPI
     except ImportError as error:
         raise InputError(
             f"several ranks need mpi4py, which does not load ({error}); install {INSTALL}"
         ) from None
+    if not MPI.Is_initialized():
+        with _limited():
+            ctypes.CDLL(MPI.__file__).MPI_Init(None, None)
     return MPI
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """End this process, and so all ranks, where the others do not come: one may have ended early."""
+
+    def end() -> None:
+        if sys.__stderr__ is not None:
+            sys.__stderr__.write(
+                f"error: after {LIMIT:g} s not all ranks have begun; one may have ended early\n"
+            )
+            sys.__stderr__.flush()
+        os._exit(2)
+
+    timer = Timer(LIMIT, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _starts(counts: Any) -> Any:
