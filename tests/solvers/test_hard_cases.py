@@ -119,7 +119,7 @@ def test_plates_of_several_layers_of_quadratic_elements(element):
     assert solver.solve(gravity(b), 1e-8, 0.0, None)[1] <= 32
 
 
-VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 28), "15N": (14, 38), "20N": (20, 60)}
+VERY_THIN = {"8N": (40, 20), "E8N": (30, 26), "10N": (14, 32), "15N": (14, 38), "20N": (20, 60)}
 """Cells along an edge of a plate 1:1000, and iterations that it may take with a clamped rim."""
 
 
