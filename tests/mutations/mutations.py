@@ -182,8 +182,8 @@ MUTATIONS = [
     ),
     Mutation(
         "model/checks.py",
-        "force = float(np.abs(ranks.sum(total.sum(axis=0))).max() / size)",
-        "force = 0 * float(np.abs(ranks.sum(total.sum(axis=0))).max() / size)",
+        "force = float(np.abs(total.sum(axis=0)).max() / size)",
+        "force = 0 * float(np.abs(total.sum(axis=0)).max() / size)",
         SIGNS,
     ),
     # ---- transients
