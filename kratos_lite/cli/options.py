@@ -20,20 +20,20 @@ MODEL = (
     ".mdpa, any file of an .elem set or its stem, ProjectParameters.json or its folder, or any mesh that "
     "meshio reads"
 )
-BODY = "a .json file with a body, or a .py script with body, dt and steps"
+SCRIPT = "a .py script with a case, or with body, dt and steps"
 EXAMPLES = {
     "solve": """kratos-lite solve cube.mdpa -o cube.vtu
   kratos-lite solve examples/cantilever --json result.json
   kratos-lite solve wheel.mdpa --fix hub:xyz --rotation z:30 --picture wheel.png
   kratos-lite solve bridge.mdpa --modes 10 -o modes.pvd --picture modes.png
   kratos-lite solve tower.mdpa --fix z-:xyz --traction z+:1e4,0,0 --time 1e-3:500:10 -o swing.pvd
-  kratos-lite solve examples/bodies/tumbling_box.json -o out/box.pvd -o out/box.csv --picture out/box.png
-  kratos-lite solve box.json --steps 500 -o second.csv --restart half.npz
+  kratos-lite solve examples/bodies/thrown_box.py -o out/box.pvd -o out/box.csv --picture out/box.png
+  kratos-lite solve box.py --steps 500 -o second.csv --restart half.npz
   mpirun -n 4 kratos-lite solve bridge.mdpa --engine petsc -o bridge.pvtu
   kratos-lite solve part.msh --material E=210e9,nu=0.3,density=7850 \\
       --fix bottom:xyz --gravity 0,0,-9.81 --traction top:0,0,-1e5 --picture part.png""",
-    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.json",
-    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/tumbling_box.json\n"
+    "info": "kratos-lite info beam.mdpa\n  kratos-lite info examples/bodies/pendulum.py",
+    "check": "kratos-lite check beam.mdpa\n  kratos-lite check examples/bodies/thrown_box.py\n"
     "  kratos-lite check part.msh --material E=210e9,nu=0.3 --fix bottom:xyz --pressure top:1e5\n"
     "  mpirun -n 4 kratos-lite check bridge.mdpa --engine petsc\n"
     "  kratos-lite check my_element.py",
@@ -83,14 +83,14 @@ def build_parser() -> Parser:
     commands = parser.add_subparsers(prog="kratos-lite", dest="command", required=True, metavar="COMMAND")
     _add_solve(commands)
     info = _add(commands, "info", "describe a file without solving it")
-    info.add_argument("input", help=f"{MODEL}; or {BODY}")
+    info.add_argument("input", help=f"{MODEL}; or {SCRIPT}")
     check = _add(
         commands,
         "check",
         "report what keeps a file from being solved, by the words of solve, without solving it; or every "
         "problem of the elements and materials in a Python file",
     )
-    check.add_argument("input", help=f"{MODEL}; {BODY}; or a .py file that defines elements or materials")
+    check.add_argument("input", help=f"{MODEL}; {SCRIPT}; or a .py file that defines elements or materials")
     _add_case(check)
     convert = _add(commands, "convert", "convert a model file to another format")
     convert.add_argument("input", help=MODEL)
@@ -122,7 +122,7 @@ def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
 
 def _add_solve(commands: Any) -> None:
     solve = _add(commands, "solve", "solve what a file describes, at rest or in time, and print a summary")
-    solve.add_argument("input", help=f"{MODEL}; or {BODY}")
+    solve.add_argument("input", help=f"{MODEL}; or {SCRIPT}")
     _add_case(solve)
 
 

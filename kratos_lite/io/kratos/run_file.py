@@ -14,12 +14,12 @@ from kratos_lite.io.formats.document import Document
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of
+from kratos_lite.io.kratos.motion import add_motion
 from kratos_lite.io.kratos.processes import PROCESSES, Action, actions_of, run
 from kratos_lite.io.kratos.time_dependent import ProcessesInTime
 from kratos_lite.io.kratos.time_integration import DYNAMIC, DYNAMIC_KEYS, time_integration_of
 from kratos_lite.io.kratos.to_model import check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
-from kratos_lite.io.readers.motion import add_motion
 from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh.subdomain import ALONE, Alone
@@ -45,8 +45,7 @@ OUTPUTS = ("save_restart_process", "timer_process", "print_info_in_file_process"
 
 
 def read_kratos_project(
-    settings: Settings,
-    folder: Path,
+    path: Path,
     allow_outside: bool = False,
     *,
     initial_displacement: bool = True,
@@ -56,9 +55,8 @@ def read_kratos_project(
 
     Parameters
     ----------
-    settings : the run file.
-    folder : its folder.
-    allow_outside : let it name files outside the folder.
+    path : the run file.
+    allow_outside : let it name files outside its folder.
     initial_displacement : as of `kratos_lite.read`; what moves starts from it.
     ranks : that share the model.
 
@@ -67,6 +65,14 @@ def read_kratos_project(
     InputError, ModelError
         With the place of what is wrong, or of what is not a linear solid.
     """
+    settings, folder = read_settings(path), path.parent
+    if "properties" in settings:
+        raise settings.error("properties", "this is a materials file; read the run file that names it")
+    if not {"solver_settings", "problem_data"} & settings.values.keys():
+        text = (
+            "this is no run file of Kratos, which has 'solver_settings'; write a Python script with a 'case'"
+        )
+        raise settings.error("", text)
     solver = settings.section("solver_settings", required=True)
     times = times_of(settings.section("problem_data", required=True), solver)
     dynamic = solver.text("solver_type") in DYNAMIC

@@ -224,7 +224,7 @@ BAD_MATERIALS = {
     ),
     "no nu": (
         bad_material(variables={"YOUNG_MODULUS": 1e9}),
-        "part Structure.Body: Isotropic3D needs POISSON_RATIO",
+        "part Structure.Body: Isotropic3D needs nu (POISSON_RATIO)",
     ),
     "nu of a fluid": (
         bad_material(variables={"YOUNG_MODULUS": 1e9, "POISSON_RATIO": 0.5}),
