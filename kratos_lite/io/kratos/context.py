@@ -42,7 +42,7 @@ def interval_of(settings: Settings) -> Interval:
         end = FOREVER if value[1] == "End" else value[1]
         if is_number(end):
             return Interval(float(value[0]), float(end))
-    raise settings.error("interval", f'interval must be [number, number or "End"]; got {shown(value)}')
+    raise settings.error("interval", f'must be [number, number or "End"]; got {shown(value)}')
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def times_of(problem: Settings, solver: Settings) -> list[float]:
     stepping.expect(not table, "time_step_table", "time_step_table is not supported; give time_step")
     step = stepping.number("time_step")
     time, end = problem.number("start_time"), problem.number("end_time")
-    stepping.expect(step > 0, "time_step", f"time_step must be > 0 s; got {step:g}")
+    stepping.expect(step > 0, "time_step", f"must be > 0 s; got {step:g}")
     text = f"no step is solved: end_time {end:g} must be > start_time {time:g}"
     problem.expect(time < end, "end_time", text)
     text = f"time_step {step:g} s makes more than {MAX_STEPS} steps; enlarge it"

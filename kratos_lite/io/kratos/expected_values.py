@@ -104,7 +104,7 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
         if one is None:
             continue
         fits = is_number(one) or isinstance(one, str)
-        settings.expect(fits, "value", f"value must be a number or an expression; got {shown(one)}")
+        settings.expect(fits, "value", f"must be a number or an expression; got {shown(one)}")
         if span.begin <= time < span.end:
             expected = partial(_from_expression, str(one), time, moved, 0.5 * 10.0**-rank)
             yield NodeComparison(what, name + suffix, rows, expected)

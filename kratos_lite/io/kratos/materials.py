@@ -90,7 +90,7 @@ def _number(variables: Settings, key: str) -> Any:
     if key.rsplit(".", 1)[-1] in ELASTIC | {"DENSITY"}:
         return variables.number(key)
     fits = all(map(is_number, value)) if isinstance(value, list) else is_number(value)
-    text = f"{key} must be a number or a list of numbers; got {shown(value)}"
+    text = f"must be a number or a list of numbers; got {shown(value)}"
     variables.expect(fits or key not in USED, key, text)
     return value
 

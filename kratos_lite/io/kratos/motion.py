@@ -6,7 +6,6 @@ from typing import Any
 
 from kratos_lite.ale import Rotation, Translation
 from kratos_lite.analysis.model import Model
-from kratos_lite.io.json_file import Object
 from kratos_lite.io.settings import Settings, is_number, shown
 from kratos_lite.time_series import TimeSeries
 
@@ -30,7 +29,7 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     section = settings.section("ale")
     section.check_keys(KEYS)
     if len(section.values) != 1:
-        raise section.error("", "ale: one of 'rotation' and 'translation' is needed")
+        raise section.error("", "one of 'rotation' and 'translation' is needed")
     (kind,) = section.values
     inner = section.section(kind)
     inner.check_keys(KEYS[kind])
@@ -49,7 +48,7 @@ def _value(section: Settings, key: str, time: float | None) -> Any:
         return section.text(key) if is_word else section.vector(key)
     if key in ("skew", "stiffening"):
         return section.flag(key)
-    if not isinstance(section.values[key], Object):
+    if not isinstance(section.values[key], dict):
         return section.vector(key) if key in CENTER else section.number(key)
     series = _series(section, key)
     values = series if time is None else [one(time) for one in series]
@@ -65,7 +64,7 @@ def _series(section: Settings, key: str) -> list[TimeSeries]:
         return [section.placed(key, TimeSeries, times, table.numbers("values"))]
     rows = table.get("values")
     if not (isinstance(rows, list) and rows and all(map(_is_vector, rows))):
-        raise table.error("values", f"{table.name('values')} must be a list of [x, y, z]; got {shown(rows)}")
+        raise table.error("values", f"must be a list of [x, y, z]; got {shown(rows)}")
     return [section.placed(key, TimeSeries, times, list(column)) for column in zip(*rows, strict=True)]
 
 

@@ -88,7 +88,7 @@ class Action:
 
 def _value(settings: Settings, value: Any, key: str) -> Value:
     is_formula = isinstance(value, str)
-    expected = f"{key} must be a number or an expression in x, y, z, t; got {shown(value)}"
+    expected = f"must be a number or an expression in x, y, z, t; got {shown(value)}"
     settings.expect(is_formula or is_number(value), key, expected)
     return value if is_formula else float(value)
 
@@ -96,7 +96,7 @@ def _value(settings: Settings, value: Any, key: str) -> Value:
 def _three(settings: Settings, key: str) -> list[Any]:
     value = settings.get(key)
     fits = isinstance(value, list) and len(value) == 3
-    settings.expect(fits, key, f"{key} must be a list of three entries; got {shown(value)}")
+    settings.expect(fits, key, f"must be a list of three entries; got {shown(value)}")
     return list(value)
 
 
@@ -202,7 +202,7 @@ def _fixed(settings: Settings, process: Process) -> list[bool]:
     flags = value if by_axis and isinstance(value, list) else [value] * 3
     fits = len(flags) == 3 and all(isinstance(flag, bool) for flag in flags)
     words = "true, false or a list of three of them" if by_axis else "true or false"
-    settings.expect(fits, "constrained", f"constrained must be {words}; got {shown(value)}")
+    settings.expect(fits, "constrained", f"must be {words}; got {shown(value)}")
     return flags
 
 

@@ -129,8 +129,8 @@ def _check_solver(solver: Settings) -> list[str]:
     )
     solver.expect(kind in ("Static", "static", *DYNAMIC), "solver_type", text + "for frequencies")
     size = solver.integer("domain_size")
-    solver.expect(size == 3, "domain_size", f"domain_size must be 3; got {size}")
-    text = f"analysis_type must be 'linear' or 'non_linear'; got {analysis!r}"
+    solver.expect(size == 3, "domain_size", f"must be 3; got {size}")
+    text = f"must be 'linear' or 'non_linear'; got {analysis!r}"
     solver.expect(analysis in ("linear", "non_linear"), "analysis_type", text)
     for key in OTHER_PHYSICS:
         text = f"{key} is not supported; kratos_lite solves for displacements of all elements"
@@ -188,7 +188,7 @@ def _read_processes(
     """Return what the processes do and check; all that are unknown are reported together."""
     actions: list[Action] = []
     checks: list[Comparison] = []
-    problems = Problems(settings.source)
+    problems = Problems()
     for section in (settings.section("processes"), settings.section("output_processes")):
         # Kratos keeps the lists in alphabetical order; later processes replace earlier values.
         for key in sorted(section.values):
@@ -204,7 +204,6 @@ def _read_processes(
                 else:
                     known = [*PROCESSES, *COMPARISONS]
                     text = f"unknown process {module!r}.{nearest(module, known)} Known are {', '.join(known)}"
-                    places = entry.values.places
-                    problems.add(text, *(places.get("python_module") or places["name"]))
+                    problems.add(str(entry.error("", text)))
     problems.raise_if_any()
     return actions, checks
