@@ -47,24 +47,14 @@ def interval_of(settings: Settings) -> Interval:
 
 @dataclass(frozen=True, eq=False)
 class RunContext:
-    """The mesh and the time steps that processes and checks refer to.
+    """The mesh and the time steps that processes and checks refer to."""
 
-    Attributes
-    ----------
-    mesh : the mesh.
-    root : name of the model part that holds everything.
-    folder : folder of the run file.
-    times : start time and the time of every step, s.
-    moved : Kratos would move the nodes with the displacement.
-    outside : files outside the folder may be named.
-    """
-
-    mesh: Mesh
-    root: str
-    folder: Path
-    times: Sequence[float] = (0.0, 1.0)
-    moved: bool = True
-    outside: bool = False
+    mesh: Mesh  # the mesh.
+    root: str  # name of the model part that holds everything.
+    folder: Path  # folder of the run file.
+    times: Sequence[float] = (0.0, 1.0)  # start time and the time of every step, s.
+    moved: bool = True  # Kratos would move the nodes with the displacement.
+    outside: bool = False  # files outside the folder may be named.
 
     def part(self, settings: Settings, key: str = "model_part_name") -> Part:
         """Return the part that a key names; the root's name may stand before it, or alone for all."""

@@ -33,19 +33,12 @@ FILE_KEYS = (
 
 @dataclass(frozen=True, eq=False)
 class NodeComparison:
-    """Compares a component on nodes with the values that `expected` gives.
+    """Compares a component on nodes with the values that `expected` gives."""
 
-    Attributes
-    ----------
-    what : name of the check.
-    component : such as ``DISPLACEMENT_X``.
-    rows : (m,) int, node rows.
-    expected : called with the result and rows; returns expected values and allowed differences of these.
-    """
-
-    what: str
-    component: str
-    rows: Ints
+    what: str  # name of the check.
+    component: str  # such as ``DISPLACEMENT_X``.
+    rows: Ints  # (m,) int, node rows.
+    # called with the result and rows; returns expected values and allowed differences of these.
     expected: Callable[[Result, Ints], tuple[Array, Array]]
 
     def __call__(self, result: Result) -> str:

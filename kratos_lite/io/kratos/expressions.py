@@ -45,22 +45,8 @@ _CONSTANTS = {"pi": np.pi, "e": np.e}
 
 
 def evaluate(text: str, variables: Mapping[str, ArrayLike], python: bool = False) -> Array:
-    """Return the value of an expression, broadcast over the variables.
+    """Return the value of an expression, broadcast over its variables; ValueError where it is none.
 
-    Parameters
-    ----------
-    text : numbers, ``+ - * / % ^ **``, brackets, ``a if b < c else d``, ``pi``, ``e``, and sin cos tan
-        asin acos atan atan2 sinh cosh tanh exp sqrt log log10 ln floor ceil abs pow min max.
-    variables : values by name, such as ``x``, ``y``, ``z``, ``t``.
-    python : read the text as Python does, not as Kratos does.
-
-    Raises
-    ------
-    ValueError
-        If the text is anything else, or a value is not finite.
-
-    Examples
-    --------
     >>> evaluate("0.5*x^2 + t", {"x": [1.0, 2.0], "t": 1.0})
     array([1.5, 3. ])
     """

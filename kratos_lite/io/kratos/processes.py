@@ -35,28 +35,17 @@ NORMALS = ("automatic_inwards_normal", "automatic_outwards_normal")
 
 @dataclass(eq=False)
 class Action:
-    """One component that a process sets, fixes or both.
+    """One component that a process sets, fixes or both."""
 
-    Attributes
-    ----------
-    settings : its parameters, for messages.
-    rows : node or condition rows.
-    component : scalar variable, such as ``DISPLACEMENT_X``.
-    factors : the value is their product, each a number or an expression; empty to leave it as it is.
-    interval : when it acts.
-    steps : in which steps that is; step 0 is the start, before the first solution.
-    on_conditions : set conditions, not nodes.
-    fixed : hold the component in the steps in which it acts.
-    """
-
-    settings: Settings
-    rows: Ints
-    component: str
+    settings: Settings  # its parameters, for messages.
+    rows: Ints  # node or condition rows.
+    component: str  # scalar variable, such as ``DISPLACEMENT_X``.
+    # the value is their product, each a number or an expression; empty to leave it as it is.
     factors: tuple[Value, ...]
-    interval: Interval
-    steps: list[int]
-    on_conditions: bool = False
-    fixed: bool = False
+    interval: Interval  # when it acts.
+    steps: list[int]  # in which steps that is; step 0 is the start, before the first solution.
+    on_conditions: bool = False  # set conditions, not nodes.
+    fixed: bool = False  # hold the component in the steps in which it acts.
 
     def mentions(self, names: str) -> bool:
         """Return whether an expression uses one of these names of one letter."""
@@ -128,20 +117,13 @@ def _kept(settings: Settings) -> list[Factors]:
 
 @dataclass(frozen=True)
 class Process:
-    """A kind of process: what it sets, and of what.
+    """A kind of process: what it sets, and of what."""
 
-    Attributes
-    ----------
-    factors : the factors of each component from the parameters; None leaves the component alone.
-    keys : parameters of its own.
-    on_conditions : it acts on conditions, and fixes nothing.
-    is_vector : it sets three components.
-    """
-
+    # the factors of each component from the parameters; None leaves the component alone.
     factors: Callable[[Settings], list[Factors]]
-    keys: tuple[str, ...] = ("value",)
-    on_conditions: bool = False
-    is_vector: bool = True
+    keys: tuple[str, ...] = ("value",)  # parameters of its own.
+    on_conditions: bool = False  # it acts on conditions, and fixes nothing.
+    is_vector: bool = True  # it sets three components.
 
 
 DIRECTION = ("modulus", "direction")

@@ -51,20 +51,7 @@ def read_kratos_project(
     initial_displacement: bool = True,
     ranks: Alone = ALONE,
 ) -> Case:
-    """Return what a Kratos run file says.
-
-    Parameters
-    ----------
-    path : the run file.
-    allow_outside : let it name files outside its folder.
-    initial_displacement : as of `kratos_lite.read`; what moves starts from it.
-    ranks : that share the model.
-
-    Raises
-    ------
-    InputError, ModelError
-        With the place of what is wrong, or of what is not a linear solid.
-    """
+    """Return the case of a Kratos run file; errors name what is wrong, or no linear solid."""
     settings, folder = read_settings(path), path.parent
     if "properties" in settings:
         raise settings.error("properties", "this is a materials file; read the run file that names it")

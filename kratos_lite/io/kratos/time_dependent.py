@@ -26,17 +26,7 @@ HELD = ("VELOCITY", "ACCELERATION")
 
 
 class ProcessesInTime:
-    """The processes of a run file as supports, loads and initial state of a transient.
-
-    Parameters
-    ----------
-    actions : what the processes do.
-    context : mesh and times.
-
-    Attributes
-    ----------
-    displacement, velocity : (n, 3) at the start, or None at rest; known after `prepare`.
-    """
+    """The processes of a run file as supports, loads and initial state of a transient."""
 
     def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
         self.context = context
@@ -48,13 +38,7 @@ class ProcessesInTime:
         self._moving: list[tuple[Ints, str, Callable[[float], float]]] = []
 
     def prepare(self, values: Variables) -> None:
-        """Bring values and supports to what stays in time, and keep what changes for `finish`.
-
-        Raises
-        ------
-        InputError
-            A support begins or ends within the run, or velocities or accelerations are prescribed.
-        """
+        """Bring values and supports to what stays in time, and keep what changes for `finish`."""
         self._check(values)
         self._begin(values)
         base = values.copy()

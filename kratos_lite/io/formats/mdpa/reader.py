@@ -22,21 +22,8 @@ from kratos_lite.typing import Ints
 
 
 def read_mdpa(path: str | Path, *, strict: bool = True) -> Document:
-    r"""Return everything that an `.mdpa` file says; blocks may stand in any order.
+    r"""Return all that an `.mdpa` file says; `strict` wants rows on lines of their own, unlike Kratos.
 
-    Parameters
-    ----------
-    path : the file, also gzipped.
-    strict : refuse a node that shares its line with another one and rows that run over line ends.
-        With False line ends carry no meaning at all, as in Kratos.
-
-    Raises
-    ------
-    InputError
-        Up to 20 problems with file, line, column, what was expected and the cure.
-
-    Examples
-    --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
     >>> _ = path.write_text("Begin Nodes\n 7 0.0 0.5 1.0D+00 // top\nEnd Nodes\n")
     >>> document = read_mdpa(path)

@@ -97,13 +97,7 @@ class Source(TextSource):
 
 
 def scan(source: Source) -> Frame:
-    """Return the root of the tree of blocks.
-
-    Raises
-    ------
-    InputError
-        Blocks are not closed, closed by another name, not allowed where they stand, or nested too deep.
-    """
+    """Return the root of the tree of blocks."""
     root = Frame("", 0)
     stack, cursor = [root], 0
     for offset in statements(source.data):
