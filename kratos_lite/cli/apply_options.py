@@ -91,14 +91,14 @@ def share(text: str, what: str) -> float:
     >>> share("2.5%", "--error"), share("0.01", "--error")
     (0.025, 0.01)
     """
-    given = text.strip()
+    word = text.strip()
     try:
-        found = number(given.removesuffix("%"), what) / (100 if given.endswith("%") else 1)
+        fraction = number(word.removesuffix("%"), what) / (100 if word.endswith("%") else 1)
     except InputError:
-        found = 0.0
-    if not 0 < found < 1:
+        fraction = 0.0
+    if not 0 < fraction < 1:
         raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
-    return found
+    return fraction
 
 
 def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
@@ -126,14 +126,14 @@ def _set_outputs(outputs: Outputs, options: Namespace) -> None:
     outputs.results, outputs.mode = options.output or outputs.results, options.vtu
 
 
-def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
+def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:
     """Return the time integration that the options and a file ask for."""
-    time = given
+    time = of_file
     if options.time is not None:
         step, steps, every = _steps(options.time)
         time = (
-            replace(given, step=step, steps=steps, every=every, place="")
-            if given
+            replace(of_file, step=step, steps=steps, every=every, place="")
+            if of_file
             else TimeIntegration(step, steps, every)
         )
     if time is None:

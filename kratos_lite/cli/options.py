@@ -76,13 +76,13 @@ def with_values(words: Sequence[str]) -> list[str]:
     >>> with_values(["solve", "a.mdpa", "--petsc", "-ksp_view"])
     ['solve', 'a.mdpa', '--petsc=-ksp_view']
     """
-    found: list[str] = []
+    joined: list[str] = []
     for word in words:
-        if found[-1:] == ["--petsc"]:
-            found[-1] = f"--petsc={word}"
+        if joined[-1:] == ["--petsc"]:
+            joined[-1] = f"--petsc={word}"
         else:
-            found.append(word)
-    return found
+            joined.append(word)
+    return joined
 
 
 def build_parser() -> Parser:
@@ -202,12 +202,12 @@ def _add_outputs(command: argparse.ArgumentParser) -> None:
 
 
 def _add_model(command: argparse.ArgumentParser) -> None:
-    given = command.add_argument_group(
+    model = command.add_argument_group(
         "model (adds to what the file says; PART is a part of the mesh or a side x- x+ y- y+ z- z+)"
     )
     fix = "prescribe displacements in m along the axes named, 0 if no value is given"
     _add_options(
-        given,
+        model,
         ("--material", "[PART:][LAW:]E=…,nu=…", "constants in SI units; replaces the materials of the file"),
         ("--fix", "PART:xyz[=VALUE]", fix),
         ("--gravity", "X,Y,Z", "acceleration in m/s²"),
@@ -218,7 +218,7 @@ def _add_model(command: argparse.ArgumentParser) -> None:
         default=[],
     )
     _add_options(
-        given,
+        model,
         ("--formulation", "WORD", FORMULATION),
         (
             "--ignore-initial-displacement",

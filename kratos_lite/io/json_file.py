@@ -85,12 +85,12 @@ def _check_depth(value: Any) -> None:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    values = dict(pairs)
+    if len(values) < len(pairs):
         keys = [key for key, _ in pairs]
-        twice = next(key for key in found if keys.count(key) > 1)
+        twice = next(key for key in values if keys.count(key) > 1)
         raise _NoJsonError(f"duplicate key {twice!r}; keep one")
-    return found
+    return values
 
 
 def _integer(word: str) -> int:

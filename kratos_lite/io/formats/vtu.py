@@ -146,7 +146,7 @@ def write_pvd(path: str | Path, steps: Iterable[tuple[float, str]]) -> None:
 
 def checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
     """Return arrays of (rows, …) little-endian numbers of one of the types of the file."""
-    found = []
+    arrays = []
     for name, values in data.items():
         array = np.asarray(values)
         if array.ndim == 0 or len(array) != rows:
@@ -155,8 +155,8 @@ def checked(data: Mapping[str, Numbers], rows: int, place: str) -> Named:
             raise InputError(f"{name}: expected real or whole numbers; got {array.dtype}")
         small = array.dtype.kind == "b" or array.dtype == np.int32
         kind = "<f8" if array.dtype.kind == "f" else "<i4" if small else "<i8"
-        found.append((name, array.astype(kind, copy=False)))
-    return found
+        arrays.append((name, array.astype(kind, copy=False)))
+    return arrays
 
 
 def _header(groups: dict[str, Named], n_points: int, n_cells: int, mode: str, places: Iterator[str]) -> str:

@@ -34,8 +34,8 @@ def add_motion(model: Model, settings: Settings, time: float | None = None) -> N
     inner = section.section(kind)
     inner.check_keys(KEYS[kind])
     inner.get("rate")
-    given = {key: _value(inner, key, time) for key in inner.values}
-    motion = inner.placed("", Rotation if kind == "rotation" else Translation, **given)
+    arguments = {key: _value(inner, key, time) for key in inner.values}
+    motion = inner.placed("", Rotation if kind == "rotation" else Translation, **arguments)
     section.placed(kind, model.add, motion)
 
 

@@ -148,11 +148,11 @@ def actions_of(entry: Settings, module: str, context: RunContext) -> list[Action
     name, part = _variable(settings, process), context.part(settings)
     rows, interval = part.conditions if process.on_conditions else part.nodes, interval_of(settings)
     names = [f"{name}_{axis}" for axis in "XYZ"] if process.is_vector else [name]
-    found = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
+    components = zip(names, process.factors(settings), _fixed(settings, process), strict=False)
     steps = [step for step, time in enumerate(context.times) if time in interval]
     later = [step for step in steps if step]
     actions = []
-    for component, factors, fix in found:
+    for component, factors, fix in components:
         if factors or (fix and factors is not None):
             acting = steps if factors and not process.on_conditions else later
             conditions = process.on_conditions

@@ -61,8 +61,8 @@ def width_of_first_line(source: Source, span: Span) -> int:
 def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:
     """Return the rows if each stands plain on a line of its own, else None."""
     text = kernels("text")
-    found = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
-    return Rows(*found) if found else None
+    columns = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
+    return Rows(*columns) if columns else None
 
 
 def _exact(source: Source, span: Span, layout: Layout) -> Rows:
