@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, nearest
+from kratos_lite.errors import InputError, MaterialError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
@@ -19,10 +19,12 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Traction
+from kratos_lite.tabular import names_of
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
     from kratos_lite.ale import Motion
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
@@ -94,14 +96,14 @@ def share(text: str, what: str) -> float:
     >>> share("2.5%", "--error"), share("0.01", "--error")
     (0.025, 0.01)
     """
-    given = text.strip()
+    word = text.strip()
     try:
-        found = number(given.removesuffix("%"), what) / (100 if given.endswith("%") else 1)
+        fraction = number(word.removesuffix("%"), what) / (100 if word.endswith("%") else 1)
     except InputError:
-        found = 0.0
-    if not 0 < found < 1:
+        fraction = 0.0
+    if not 0 < fraction < 1:
         raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
-    return found
+    return fraction
 
 
 def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
@@ -141,14 +143,14 @@ def _set_outputs(outputs: Outputs, options: Namespace) -> None:
     outputs.results, outputs.mode = options.output or outputs.results, options.vtu
 
 
-def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
+def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:
     """Return the time integration that the options and a file ask for."""
-    time = given
+    time = of_file
     if options.time is not None:
         step, steps, every = _steps(options.time)
         time = (
-            replace(given, step=step, steps=steps, every=every, place="")
-            if given
+            replace(of_file, step=step, steps=steps, every=every, place="")
+            if of_file
             else TimeIntegration(step, steps, every)
         )
     if time is None:
@@ -161,10 +163,7 @@ def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration 
     if options.steps is not None:
         changes["steps"] = whole_number(options.steps, "--steps")
     if options.integrator:
-        from kratos_lite.io.readers.time import integrator_of  # it brings the readers of JSON
-
-        name, _, words = options.integrator.partition(":")
-        changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
+        changes["integrator"] = _integrator(options.integrator)
     if options.rayleigh:
         changes["rayleigh"] = _rayleigh(options.rayleigh)
     if options.lumped:
@@ -185,6 +184,26 @@ def _steps(text: str) -> tuple[float, int, int]:
         raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
     steps, every = (int(count) for count in (*counts, "1")[:2])
     return number(step, "--time"), steps, every
+
+
+def _integrator(text: str) -> ModelIntegrator:
+    """Return the integrator of ``NAME[:NUMBERS]``.
+
+    >>> str(_integrator("hht:-0.1"))
+    'hht(-0.1)'
+    """
+    from kratos_lite.analysis.integrators import INTEGRATORS  # a quick start of statics
+
+    name, _, words = text.partition(":")
+    numbers = _numbers(words, "--integrator")
+    if name not in INTEGRATORS:
+        hint = nearest(name, INTEGRATORS)
+        raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
+    make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
+    counts = sorted({0, len(names_of(INTEGRATORS[name]))})
+    if len(numbers) not in counts:
+        raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
+    return make(*numbers)
 
 
 def _numbers(text: str, option: str) -> list[float]:
@@ -253,21 +272,20 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
         else:
             laws = ", ".join(MATERIALS)
             raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
-    kind: Any = MATERIALS[law]
-    known = list(kind.variables)
+    kind = MATERIALS[law]
     values: dict[str, float] = {}
     for pair in constants.split(","):
-        key, equals, value = pair.partition("=")
-        field = {v: k for k, v in kind.variables.items()}.get(key.strip(), key.strip())
-        if not equals or field not in known:
-            raise InputError(f"{option}: constants of {law} are {', '.join(known)}; got {pair!r}")
-        if field in values:
-            raise InputError(f"{option}: {field} is given twice")
-        values[field] = number(value, option)
-    missing = [k for k in known if k not in values and k != "density"]
-    if missing:
-        raise InputError(f"{option}: {law} also needs {', '.join(missing)}")
-    return part, kind(**values)
+        key, equals, value = (word.strip() for word in pair.partition("="))
+        variable = kind.variables.get(key, key)
+        if not equals or variable not in kind.variables.values():
+            raise InputError(f"{option}: constants of {law} are {', '.join(kind.variables)}; got {pair!r}")
+        if variable in values:
+            raise InputError(f"{option}: {key} is given twice")
+        values[variable] = number(value, option)
+    try:
+        return part, kind.from_variables(values)
+    except MaterialError as error:
+        raise InputError(f"{option}: {error}") from None
 
 
 def _where(model: Model, part: str | None) -> str | int | None:

@@ -156,7 +156,7 @@ def _check(options: Namespace) -> int:
 
     path = Path(options.input)
     if path.suffix == ".py":
-        from kratos_lite.io.readers.script import is_script
+        from kratos_lite.io.script import is_script
 
         if not is_script(path):
             refuse(options, OF_MODELS, f"is for models; {path} defines elements and materials")

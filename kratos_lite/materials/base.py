@@ -223,7 +223,7 @@ class LinearMaterial:
         """
         given = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {name for name in names_of(cls) if name != "density"}
-        missing = [cls.variables.get(field, field) for field in sorted(needed - given.keys())]
+        missing = [f"{field} ({cls.variables.get(field, field)})" for field in sorted(needed - given.keys())]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
         return cls(**given)

@@ -33,19 +33,12 @@ FILE_KEYS = (
 
 @dataclass(frozen=True, eq=False)
 class NodeComparison:
-    """Compares a component on nodes with the values that `expected` gives.
+    """Compares a component on nodes with the values that `expected` gives."""
 
-    Attributes
-    ----------
-    what : name of the check.
-    component : such as ``DISPLACEMENT_X``.
-    rows : (m,) int, node rows.
-    expected : called with the result and rows; returns expected values and allowed differences of these.
-    """
-
-    what: str
-    component: str
-    rows: Ints
+    what: str  # name of the check.
+    component: str  # such as ``DISPLACEMENT_X``.
+    rows: Ints  # (m,) int, node rows.
+    # called with the result and rows; returns expected values and allowed differences of these.
     expected: Callable[[Result, Ints], tuple[Array, Array]]
 
     def __call__(self, result: Result) -> str:
@@ -98,7 +91,7 @@ def node_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
         if one is None:
             continue
         fits = is_number(one) or isinstance(one, str)
-        settings.expect(fits, "value", f"value must be a number or an expression; got {shown(one)}")
+        settings.expect(fits, "value", f"must be a number or an expression; got {shown(one)}")
         if span.begin <= time < span.end:
             expected = partial(_from_expression, str(one), time, moved, 0.5 * 10.0**-rank)
             yield NodeComparison(what, name + suffix, rows, expected)

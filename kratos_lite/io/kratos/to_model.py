@@ -28,20 +28,7 @@ def model_from(
     initial_displacement: bool = True,
     processes: Callable[[Variables], None] | None = None,
 ) -> Model:
-    """Return the model that a document describes.
-
-    Parameters
-    ----------
-    document : what was read.
-    materials : take the materials from the Properties; False leaves them to the caller.
-    initial_displacement : elements are free of stress at the DISPLACEMENT of nodes that are not fixed.
-    processes : called with the values of the document to change them, as a run file does.
-
-    Raises
-    ------
-    InputError
-        With the place in the file of each unknown element and each impossible material.
-    """
+    """Return the model that a document describes; `processes` may change the values, as a run file does."""
     check_elements(document)
     _check_variables(document)
     model = Model(document.mesh)

@@ -80,13 +80,7 @@ class Fields(dict[str, Array]):
 
 
 class Variables:
-    """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones.
-
-    Attributes
-    ----------
-    nodal, conditional : the values.
-    fixed : component → which nodes hold it.
-    """
+    """Values of variables on the nodes and conditions of a mesh; later values replace earlier ones."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
