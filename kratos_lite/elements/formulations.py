@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.kinematic_linear import ELEMENTS, UNNAMED, KinematicLinear
 from kratos_lite.errors import InputError, nearest
 from kratos_lite.shapes import Shape
@@ -24,13 +25,8 @@ def formulations_of(shape: type[Shape]) -> dict[str, type[KinematicLinear]]:
     {'standard': 'KinematicLinear3D8N', 'enhanced': 'EnhancedStrain3D8N', 'b_bar': 'BBar3D8N'}
     """
     alike = [element for element in ELEMENTS.values(f"3D{len(shape.nodes)}N") if element.shape is shape]
-    alike.sort(key=lambda element: (element.formulation, not is_of_library(element)))
+    alike.sort(key=lambda element: (element.formulation, not is_builtin(element)))
     return {element.formulation: element for element in reversed(alike)}
-
-
-def is_of_library(element: type[KinematicLinear]) -> bool:
-    """Return whether an element class is one of the library; those of users are never replaced."""
-    return element.__module__.startswith("kratos_lite.elements.")
 
 
 def is_unnamed(name: str) -> bool:
@@ -60,7 +56,7 @@ def element_of(
         If the name is unknown, or its shape has no such formulation.
     """
     element = ELEMENTS[name]
-    if not is_of_library(element):
+    if not is_builtin(element):
         return element
     if formulation is None:
         if not is_unnamed(name):

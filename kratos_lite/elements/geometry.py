@@ -7,12 +7,11 @@ leading axes of X first, then those of the points, then its own.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from kratos_lite.elements import arguments
-from kratos_lite.elements.overridden_steps import run_step
 from kratos_lite.elements.tables import cofactors, determinant, tabulate
 from kratos_lite.errors import InputError, MeshError
 from kratos_lite.quadrature import Rule
@@ -25,9 +24,6 @@ from kratos_lite.validation import short
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-GEOMETRY = ("__init__", "N", "dN", "J", "detJ", "dNdX", "dV", "_jacobian", "_gauss")
-"""What an element class may redefine so that its geometry is not that of the tables of shape and rule."""
-
 
 class PlacedCell(Tabular):
     """Geometry of a cell: shape × rule at the places X of its nodes; see `KinematicLinear`."""
@@ -35,7 +31,6 @@ class PlacedCell(Tabular):
     shape: ClassVar[type[Shape]]
     nodes: ClassVar[Array]
     rule: Rule
-    batched: ClassVar[bool] = True
 
     def __init__(self, X: ArrayLike, rule: Rule | None = None) -> None:
         name = type(self).__name__
@@ -203,23 +198,15 @@ class PlacedCell(Tabular):
 
     def _N(self, rule: Rule) -> Array:
         """Return N (g, n) at the points of a rule."""
-        if same_methods(type(self), PlacedCell, "N"):
-            return tabulate(self.shape, rule)[0]
-        return np.array([self.N(xi) for xi in rule.points])
+        return tabulate(self.shape, rule)[0]
 
     def _volumes(self, rule: Rule) -> Array:
         """Return γ det J (..., g) at the points of a rule."""
-        if same_methods(type(self), PlacedCell, "dN", "J", "detJ"):
-            return determinant(self._jacobian(tabulate(self.shape, rule)[1])) * rule.weights
-        det = [run_step(self, "detJ", (), xi) for xi in rule.points]
-        return np.stack(det, axis=-1) * rule.weights
+        return determinant(self._jacobian(tabulate(self.shape, rule)[1])) * rule.weights
 
     @cached_property
     def _gauss(self) -> tuple[Array, Array]:
         """Return weights γ det J (..., g) and gradients dN_a/dX_i as (..., g, 3, n)."""
-        if not same_methods(type(self), PlacedCell, "dN", "J", "detJ", "dNdX"):
-            gradients = [run_step(self, "dNdX", self.nodes.shape, xi) for xi in self.rule.points]
-            return self._volumes(self.rule), np.swapaxes(np.stack(gradients, axis=-3), -1, -2)
         _, dN = tabulate(self.shape, self.rule)
         J = self._jacobian(dN)
         inverse = cofactors(J)
@@ -294,13 +281,3 @@ def _table(shape: type[Shape], name: str, xi: Array, tail: tuple[int, ...]) -> A
 def _at_point(shape: type[Shape], name: str, xi: bytes) -> Array:
     """Return N or dN at one point: one element after the other asks for the same ones."""
     return np.asarray(getattr(shape, name)(np.frombuffer(xi)))
-
-
-def same_methods(cls: type[Any], base: type[Any], *methods: str) -> bool:
-    """Return whether a class has these methods from a base."""
-    return all(_plain(getattr(cls, name)) is _plain(getattr(base, name)) for name in methods)
-
-
-def _plain(method: Any) -> Any:
-    """Return the function of a class method, which is bound anew each time."""
-    return getattr(method, "__func__", method)

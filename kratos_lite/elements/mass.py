@@ -17,7 +17,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     has_rules,
 )
-from kratos_lite.elements.geometry import GEOMETRY, PlacedCell, same_methods
+from kratos_lite.elements.geometry import PlacedCell
 from kratos_lite.elements.tables import lumped
 from kratos_lite.errors import InputError
 from kratos_lite.quadrature import Rule
@@ -26,15 +26,11 @@ from kratos_lite.typing import Array, Mask
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-MASS = (*GEOMETRY, "_N", "_volumes", "mass_rules", "_integrate", "scalar_mass")
-"""What an element class may redefine so that its mass is not that of its shape and geometry."""
-
 
 class CellMass(PlacedCell):
     """Volume, body forces and mass of a cell, by rules that are exact for its shape and geometry."""
 
     mass_rule: ClassVar[Rule | None] = None
-    batched: ClassVar[bool] = True
 
     @classmethod
     def mass_rules(cls, kinds: Geometries, factors: int, flow: bool = False) -> list[tuple[Mask, Rule]]:
@@ -82,8 +78,6 @@ class CellMass(PlacedCell):
         -------
         (...) float, m³
         """
-        if not same_methods(type(self), PlacedCell, "dV", "_gauss"):
-            return np.asarray(self.dV.sum(axis=-1))
         return self._integrate(lambda N, dV: dV.sum(axis=-1), factors=0)
 
     def body_force(self, b: ArrayLike) -> Array:
@@ -110,11 +104,8 @@ class CellMass(PlacedCell):
                 f"a body force b must have shape (3,), {(*self.X.shape[:-2], 3)} or {self.X.shape}; "
                 f"got {force.shape}"
             )
-        if same_methods(type(self), PlacedCell, "dV", "_gauss"):
-            share = self._integrate(lambda N, dV: dV @ N, factors=1)
-        else:
-            share = self.dV @ self._N(self.rule)
-        return share[..., :, None] * force[..., None, :]
+        volumes = self._integrate(lambda N, dV: dV @ N, factors=1)
+        return volumes[..., :, None] * force[..., None, :]
 
     def scalar_mass(self, density: ArrayLike = 1.0) -> Array:
         """Return the mass matrix of one axis, ∫ ρ N N^T dV, exact for every geometry of the cell.

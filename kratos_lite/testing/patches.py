@@ -6,7 +6,6 @@ import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.surface import area_vectors
 from kratos_lite.materials.isotropic3d import Isotropic3D
 from kratos_lite.mesh import Block, Mesh
@@ -104,8 +103,10 @@ def quadratic_patch(element: Element) -> Measured | str:
     """Check a random quadratic u under the body force that holds it in balance, on sheared cells."""
     if element.shape.degree < 2:
         return f"{element.shape.__name__} spans no quadratics"
-    if not element.inherits(*STRAIN):
-        return f"{element.__name__} has a strain of its own, which need not be exact for quadratics"
+    if element.custom or not element.has_standard_strain():
+        return (
+            f"{element.__name__} has a B or local system of its own, which need not be exact for quadratics"
+        )
     if why := unbuildable(element.shape):
         return why
     points, nodes = patch(element.shape, (2, 2, 2))
@@ -178,13 +179,13 @@ def bend(element: Element, bricks: tuple[int, int, int]) -> tuple[float, float, 
 def bending(element: Element) -> Measured | str:
     """Check pure bending: exact for quadratic shapes, too stiff but converging for linear ones.
 
-    Elements with a strain of their own need only converge.
+    Elements with a B or local system of their own need only converge.
     """
     if why := unbuildable(element.shape):
         return why
     wide = 2 if element.spurious_modes else 1  # one brick wide, they are free
     coarse, of_u, of_stress = bend(element, (2, wide, 1))
-    own = not element.inherits(*STRAIN)
+    own = bool(element.custom) or not element.has_standard_strain()
     if element.shape.degree >= 2 and not own:
         text = f"pure bending of two bricks: u is off by {of_u:.3g}, the stress by {of_stress:.3g}"
         return Measured(np.maximum(of_u, of_stress), 1e-12, text)

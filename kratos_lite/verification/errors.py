@@ -60,7 +60,7 @@ def _integrals(points: Array, field: fields.Field, group: ElementGroup, chunk: s
     X, dV = N @ points[nodes], placed.dV
     exact, C = field(X), group.material.C
     strain = voigt.symmetric_gradient(fields.gradient(field, X))
-    if group.element.inherits("strain_at"):
+    if group.element.has_standard_strain():
         off = placed.strain(u[nodes]) - strain
     else:  # the modes of an element are those of its own rule
         off = group.at(points, chunk).strain_at(rule.points, u[nodes], C) - strain

@@ -176,6 +176,9 @@ CASES: Case = {
     ("KinematicLinear.strain_at", "xi"): (lambda v: element("strain_at", v, U), VECTOR),
     ("KinematicLinear.strain_at", "u"): (lambda v: element("strain_at", VECTOR, v), U),
     ("EnhancedStrain3D8N.strain_at", "C"): (lambda v: enhanced("strain_at", VECTOR, U, v), ROCK.C),
+    ("EnhancedStrain3D8N.B", "C"): (lambda v: enhanced("B", VECTOR, v), ROCK.C),
+    ("KinematicLinear.local_system", "C"): (lambda v: element("local_system", v, U), ROCK.C),
+    ("KinematicLinear.local_system", "u"): (lambda v: element("local_system", ROCK.C, v), U),
     ("BBar3D10N.kept", "C"): (lambda v: kl.BBar3D10N(kl.BBar3D10N.nodes).kept(v), ROCK.C),
     ("KinematicLinear.body_force", "b"): (lambda v: element("body_force", v), VECTOR),
     ("KinematicLinear.internal_load", "stress"): (lambda v: element("internal_load", v), np.ones((8, 6))),
@@ -369,7 +372,7 @@ def test_every_argument_that_takes_arrays_is_tried():
 ELSEWHERE = {
     *((owner, name) for owner in ("Motion", "AlongDirection") for name in ("direction", "points")),
     *(("Motion", name) for name in ("rate", "acceleration", "part")),
-    *((name, "C") for name in ("B_at_gauss_points", "internal_load", "strain")),
+    *((name, "C") for name in ("internal_load", "strain")),
     *((name, "xi") for name in ("N", "dN")),
     *(("plot", name) for name in ("clim", "displacement", "modes", "points", "values")),
     *(("animate", name) for name in ("clim", "modes", "values")),
