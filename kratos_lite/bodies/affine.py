@@ -143,9 +143,4 @@ class AffineBody(Body):
 
     @abstractmethod
     def spin(self) -> Array:
-        """Return the angular momentum about the mass center.
-
-        Returns
-        -------
-        (..., 3) float, kg m²/s.
-        """
+        """Return the angular momentum (..., 3) in kg m²/s about the mass center."""

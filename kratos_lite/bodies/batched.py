@@ -16,28 +16,7 @@ from kratos_lite.model.mass_properties import MassProperties
 
 
 def together(bodies: Sequence[Body]) -> Body:
-    """Return bodies of one kind as one object; q and u of each become rows of those of the whole.
-
-    Parameters
-    ----------
-    bodies : single rigid, pseudo-rigid bodies or obstacles of one kind, integrator, damping and time, without
-        constraints and with constant loads.
-
-    Raises
-    ------
-    InputError, ModelError
-        If they differ, or one has what only a single body can have.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> bodies = [kl.RigidBody(kl.box(), kl.Isotropic3D(1e9, 0.3, 1000.0)) for _ in range(3)]
-    >>> bodies[1].set_velocity((1, 0, 0))
-    >>> whole = together(bodies)
-    >>> whole.q[1, 9] = 7.0
-    >>> float(bodies[1].mass_center()[0])
-    7.0
-    """
+    """Return bodies of one kind as one object; q and u of each become rows of those of the whole."""
     if not isinstance(bodies, Sequence):
         raise InputError(
             f"a body or a sequence of bodies is needed; got {type(bodies).__name__}; of a model: transient()"

@@ -120,13 +120,7 @@ class FiniteElementBody(Deformable):
         return self.q.reshape(-1, 3)
 
     def position(self, X: ArrayLike, q: Array | None = None) -> Array:
-        """Return x = X + Σ N_a q_a of points X (m, 3) or (3,) in m.
-
-        Raises
-        ------
-        MeshError
-            If a point lies outside the undeformed body.
-        """
+        """Return x = X + Σ N_a q_a of points X (m, 3) or (3,) in m."""
         q = (self.q if q is None else q).reshape(-1, 3)
         return self.points + q if X is self.points else points_of(X) + self._interpolated(X, q)
 

@@ -158,12 +158,7 @@ class RigidBody(AffineBody):
         return np.concatenate([spin, self.mass[..., None] * v[..., 3:]], axis=-1)
 
     def step_constants(self) -> tuple[Array, Array, Array]:
-        """Return what steps take.
-
-        Returns
-        -------
-        Inertia, its inverse and mass.
-        """
+        """Return what steps take: inertia, its inverse and mass."""
         return self.mass_properties.inertia, self._inverse, self.mass_properties.mass
 
     def mass_solver(self) -> Solve:

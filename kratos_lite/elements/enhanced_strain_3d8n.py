@@ -86,15 +86,7 @@ class EnhancedStrain3D8N(KinematicLinear):
         return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, share=0.0)
 
     def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
-        """Return the operator of the enhanced strain at points, B - G D⁻¹ L; see `KinematicLinear.B`.
-
-        Raises
-        ------
-        InputError
-            If `C` is not given, or the rule has too few points for the modes.
-        MaterialError
-            If `C` is not positive definite.
-        """
+        """Return the operator of the enhanced strain at points, B - G D⁻¹ L; see `KinematicLinear.B`."""
         B, points = super().B(xi), arguments.points(xi)
         amplitudes = self._amplitudes(C, self._modes(self.rule.points))
         enhanced = self._modes(points.reshape(-1, 3)) @ amplitudes[..., None, :, :]

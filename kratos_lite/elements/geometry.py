@@ -46,41 +46,13 @@ class PlacedCell(Tabular):
 
     @classmethod
     def N(cls, xi: ArrayLike) -> Array:
-        """Return the shape functions at points.
-
-        Parameters
-        ----------
-        xi : (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n) float
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the shape functions (..., n) at points xi (..., 3)."""
         xi = arguments.points(xi)
         return _table(cls.shape, "N", xi, (len(cls.nodes),))
 
     @classmethod
     def dN(cls, xi: ArrayLike) -> Array:
-        """Return the derivatives dN_a/dxi_j at points.
-
-        Parameters
-        ----------
-        xi : (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n, 3) float
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the derivatives dN_a/dxi_j (..., n, 3) at points xi (..., 3)."""
         xi = arguments.points(xi)
         return _table(cls.shape, "dN", xi, cls.nodes.shape)
 
@@ -91,105 +63,31 @@ class PlacedCell(Tabular):
         return np.moveaxis(flat.reshape(*self.X.shape[:-2], 3, g, 3), -2, -3)
 
     def determinants(self, dN: Array) -> Array:
-        """Return det J for tabulated derivatives.
-
-        Parameters
-        ----------
-        dN : (g, n, 3) float, derivatives of the shape functions at the points of a rule.
-
-        Returns
-        -------
-        (..., g) float, m³
-
-        Raises
-        ------
-        InputError
-            If `dN` is not made of real numbers (g, n, 3).
-        """
+        """Return det J (..., g) in m³ of derivatives dN (g, n, 3) tabulated at points."""
         dN = arguments.real(dN, "derivatives dN", self.nodes.shape)
         if dN.ndim != 3:
             raise InputError(f"derivatives dN must have shape (g, {len(self.nodes)}, 3); got {dN.shape}")
         return determinant(self._jacobian(dN))
 
     def J(self, xi: ArrayLike) -> Array:
-        """Return the Jacobian dX_i/dxi_j at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., 3, 3) float, m
-            Axes of the elements, axes of the points, 3, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the Jacobian dX_i/dxi_j (..., 3, 3) in m at points xi (..., 3)."""
         xi = arguments.points(xi)
         dN = self.dN(xi).reshape(-1, *self.nodes.shape)
         return self._jacobian(dN).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3, 3)
 
     def detJ(self, xi: ArrayLike) -> Array:
-        """Return det J at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (...) float, m³
-            Axes of the elements, axes of the points.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return det J (...) in m³ at points xi (..., 3)."""
         return determinant(self.J(xi))
 
     def dNdX(self, xi: ArrayLike) -> Array:
-        """Return the gradients dN_a/dX_i at points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., n, 3) float, 1/m
-            Axes of the elements, axes of the points, n, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the gradients dN_a/dX_i (..., n, 3) in 1/m at points xi (..., 3)."""
         J = self.J(xi)
         inverse = cofactors(J)
         det = (J[..., :, 0] * inverse[..., 0, :]).sum(axis=-1)
         return self.dN(xi) @ (inverse / det[..., None, None])
 
     def position(self, xi: ArrayLike) -> Array:
-        """Return the places X(xi) of points.
-
-        Parameters
-        ----------
-        xi : (3,) or (..., 3) float, points in reference coordinates.
-
-        Returns
-        -------
-        (..., 3) float, m
-            Axes of the elements, axes of the points, 3.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
-        """
+        """Return the places X(xi) (..., 3) in m of points xi (..., 3)."""
         xi = arguments.points(xi)
         N = self.N(xi).reshape(-1, len(self.nodes))
         return (N @ self.X).reshape(*self.X.shape[:-2], *xi.shape[:-1], 3)
@@ -223,12 +121,7 @@ class PlacedCell(Tabular):
         return self._gauss[0]
 
     def gauss_points(self) -> Array:
-        """Return the places X of the Gauss points.
-
-        Returns
-        -------
-        (..., g, 3) float, m
-        """
+        """Return the places X (..., g, 3) in m of the Gauss points."""
         return self._N(self.rule) @ self.X
 
     @cached_property
@@ -240,21 +133,7 @@ class PlacedCell(Tabular):
         return bool((change <= 8 * np.finfo(float).eps * size).all())
 
     def table(self) -> list[tuple[str, str]]:
-        """Return the rows of a summary: shape, rule and nodes.
-
-        Returns
-        -------
-        Labels and values.
-
-        Examples
-        --------
-        >>> from kratos_lite import KinematicLinear3D8N
-        >>> print(KinematicLinear3D8N(0.5 * KinematicLinear3D8N.nodes))
-        shape   Hexahedron8
-        nodes   8
-        rule    Gauss-Legendre 2x2x2: 8 points, degree 3
-        volume  1 m³
-        """
+        """Return the rows of a summary: shape, rule, nodes and volume."""
         count, rule = int(np.prod(self.X.shape[:-2])), self.rule
         volume = self._volumes(rule).sum()
         return [

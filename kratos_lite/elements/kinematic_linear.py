@@ -45,11 +45,7 @@ UNNAMED = "Element3D"
 
 
 def same_names(name: str) -> list[str]:
-    """Return the names in files that mean the element class of a name.
-
-    >>> same_names("KinematicLinear3D8N")[:2], same_names("BBar3D8N")
-    (['SmallDisplacementElement3D8N', 'TotalLagrangian3D8N'], [])
-    """
+    """Return the names in files that mean the element class of a name."""
     suffix = name.removeprefix("KinematicLinear")
     return [] if suffix == name else [prefix + suffix for prefix in SAME_ELEMENT]
 
@@ -105,12 +101,7 @@ class KinematicLinear(CellMass):
 
     @classmethod
     def has_standard_strain(cls) -> bool:
-        """Return whether the strain is that of the displacement gradient, which is quicker than B u.
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether the strain is that of the displacement gradient, which is quicker than B u."""
         return cls.B is KinematicLinear.B
 
     @classmethod
@@ -144,11 +135,6 @@ class KinematicLinear(CellMass):
         -------
         (..., 6, 3n) float, 1/m
             Axes of the elements, axes of the points, 6, 3n.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points.
         """
         at_gauss = xi is self.rule.points
         return stiffness.strain_rows(self._gauss[1] if at_gauss else np.swapaxes(self.dNdX(xi), -1, -2))
@@ -169,11 +155,6 @@ class KinematicLinear(CellMass):
         Returns
         -------
         (..., g, 6) float
-
-        Raises
-        ------
-        InputError
-            If `u` is not made of nodal displacements.
         """
         u = arguments.nodal(u, self.X)
         if self.has_standard_strain():
@@ -194,11 +175,6 @@ class KinematicLinear(CellMass):
         -------
         (..., 6) float
             Axes of the elements, axes of the points, 6.
-
-        Raises
-        ------
-        InputError
-            If `xi` are not points or `u` is not made of nodal displacements.
         """
         xi, u = arguments.points(xi), arguments.nodal(u, self.X)
         strain = (self._operator(C, xi.reshape(-1, 3)) @ u.reshape(*u.shape[:-2], 1, -1, 1))[..., 0]
@@ -217,11 +193,6 @@ class KinematicLinear(CellMass):
         Returns
         -------
         (..., g, 6) float, Pa
-
-        Raises
-        ------
-        InputError
-            If `C` is not an elasticity matrix or `u` is not made of nodal displacements.
         """
         C = arguments.elasticity(C, self.X)
         return self.strain(u, C) @ np.swapaxes(C[..., None, :, :] if C.ndim > 2 else C, -1, -2)
@@ -237,11 +208,6 @@ class KinematicLinear(CellMass):
         Returns
         -------
         (..., n, 3) float, N
-
-        Raises
-        ------
-        InputError
-            If `stress` is not made of stresses at the Gauss points.
         """
         stress = arguments.at_gauss(stress, self.X, len(self.rule))
         if self.has_standard_strain():
@@ -261,11 +227,6 @@ class KinematicLinear(CellMass):
         Returns
         -------
         (..., 3n, 3n) float, N/m
-
-        Raises
-        ------
-        InputError
-            If `C` is not an elasticity matrix, or a local system is not linear in u or not symmetric.
         """
         return stiffness.by_dof(self.stiffness_by_axis(C))
 

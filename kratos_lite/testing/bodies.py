@@ -26,27 +26,7 @@ TURN = exp([0.4, -1.1, 0.7])
 
 
 def check_body(kind: type[Body]) -> list[Finding]:
-    """Check a kind of body on a box: mass, momenta, forces, and its load of deformation if it has any.
-
-    Parameters
-    ----------
-    kind : a class that is made of a mesh and a material.
-
-    Returns
-    -------
-    list of Finding
-
-    Raises
-    ------
-    InputError
-        If it is no class of bodies.
-
-    Examples
-    --------
-    >>> from kratos_lite import PseudoRigidBody
-    >>> all(finding.passed for finding in check_body(PseudoRigidBody))
-    True
-    """
+    """Check a kind of body on a box: mass, momenta, forces, and its internal forces if it deforms."""
     if not (isinstance(kind, type) and issubclass(kind, Body)):
         raise InputError(f"check a class of bodies, such as RigidBody; got {kind!r}")
 

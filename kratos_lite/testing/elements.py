@@ -150,10 +150,7 @@ def symmetry(element: Element) -> Measured:
 
 
 def rank(element: Element) -> Measured:
-    """Check that K has no eigenvalue that is zero or less (below 1e-9 of the largest) but the six rigid ones.
-
-    A class may state `spurious_modes` of an element alone; eight bricks of it have none.
-    """
+    """Check that K has no eigenvalue ≤ 1e-9 of the largest but the six rigid and the stated spurious ones."""
     cells = (element(X) for X in (element.shape.nodes, distorted(element)))
     counts = [_zeros(cell.stiffness(C_ISOTROPIC)) for cell in cells]
     spurious = element.spurious_modes

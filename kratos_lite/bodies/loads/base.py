@@ -32,32 +32,18 @@ def no_potential(q: Array) -> Array:
 
 @dataclass(eq=False)
 class AppliedLoad:
-    """A load as it acts on one body.
-
-    Attributes
-    ----------
-    generalized : the generalized force for the amplitude 1.
-    acceleration : (3,) m/s² if the load is gravity, alike everywhere.
-    spatial, convected : generalized force (..., dofs) fixed in space, or in a rigid body, if that is all.
-    tangent : its derivative with respect to q, of single deformable bodies; None where it does not depend on
-        q, or where a function of the user does not tell.
-    potential_energy : of a conservative load for the amplitude 1, (...) in J.
-    follows_velocity : whether it may depend on the velocity.
-    amplitude : function of the time in s.
-    steady : whether the amplitude never changes.
-    ends : point of the body and anchor in space of a spring, for pictures.
-    """
+    """A load as it acts on one body, of the generalized force for the amplitude 1."""
 
     generalized: Generalized
-    acceleration: Array | None = None
-    spatial: Array | None = None
-    convected: Array | None = None
-    tangent: Tangent | None = None
-    potential_energy: Callable[[Array], Array] = no_potential
+    acceleration: Array | None = None  # (3,) m/s² of gravity
+    spatial: Array | None = None  # (..., dofs), if it is fixed in space
+    convected: Array | None = None  # (..., dofs), if it is fixed in a rigid body
+    tangent: Tangent | None = None  # derivative by q of single deformable bodies
+    potential_energy: Callable[[Array], Array] = no_potential  # (...) J
     follows_velocity: bool = False
-    amplitude: Callable[[float], float] = lambda time: 1.0
-    steady: bool = True
-    ends: tuple[Array, Array] | None = None
+    amplitude: Callable[[float], float] = lambda time: 1.0  # of the time in s
+    steady: bool = True  # the amplitude never changes
+    ends: tuple[Array, Array] | None = None  # of a spring, for pictures
 
     @classmethod
     def constant(cls, mass: Array, acceleration: Array, spatial: Array, convected: Array) -> AppliedLoad:
