@@ -20,16 +20,15 @@ def public_things():
 
 
 @lru_cache
-def with_inherited_members():
-    """Return the classes of which the reference shows inherited members: those with a ``+``."""
+def signs():
+    """Return the signs of classes in the reference: ``+`` shows inherited members, ``-`` none."""
     pages = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")
-    return set(re.findall(r"^(\w+) \+$", "\n".join(page.read_text() for page in pages), re.MULTILINE))
+    return dict(re.findall(r"^(\w+) ([+-])$", "\n".join(page.read_text() for page in pages), re.MULTILINE))
 
 
 def members(cls):
     """Yield the public methods and getters of a class that the reference shows."""
-    inherited = cls.__name__ in with_inherited_members()
-    for base in cls.__mro__ if inherited else [cls]:
+    for base in {"+": cls.__mro__, "-": ()}.get(signs().get(cls.__name__), [cls]):
         if not base.__module__.startswith("kratos_lite"):
             continue
         for name, member in vars(base).items():

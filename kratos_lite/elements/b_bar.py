@@ -41,17 +41,7 @@ class BBar(KinematicLinear):
 
     @classmethod
     def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
-        """Return the polynomials of the dilatation for kernels; see `KinematicLinear.strain_tables`.
-
-        Parameters
-        ----------
-        rule : quadrature rule.
-        C : (6, 6) float, Pa; for `kept`.
-
-        Returns
-        -------
-        StrainTables
-        """
+        """Return the polynomials of the dilatation for kernels; see `KinematicLinear.strain_tables`."""
         center = cls._center()
         functions = np.zeros((len(rule), len(cls.nodes) if cls.dilatation else 0))
         if cls.dilatation:
@@ -69,16 +59,7 @@ class BBar(KinematicLinear):
         return B
 
     def kept(self, C: ArrayLike | None) -> Array:
-        """Return the share of the dilatation beyond its projection that stays in the strain: none.
-
-        Parameters
-        ----------
-        C : (6, 6) or (..., 6, 6) float, Pa.
-
-        Returns
-        -------
-        () or (...) float, 0 … 1
-        """
+        """Return the fraction (...) of the dilatation beyond its projection that stays in the strain."""
         return np.zeros(())
 
     def _projected(self, xi: Array) -> Array:

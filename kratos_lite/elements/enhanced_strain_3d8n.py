@@ -64,29 +64,14 @@ class EnhancedStrain3D8N(KinematicLinear):
 
     @classmethod
     def strain_tables(cls, rule: Rule, C: Array) -> StrainTables:
-        """Return the monomials of the modes for kernels; see `KinematicLinear.strain_tables`.
-
-        Parameters
-        ----------
-        rule : quadrature rule.
-        C : (6, 6) float, Pa.
-
-        Returns
-        -------
-        StrainTables
-
-        Raises
-        ------
-        InputError, MaterialError
-            As by `B`.
-        """
+        """Return the monomials of the modes for kernels; see `KinematicLinear.strain_tables`."""
         _check_rule(rule)
         if not np.linalg.eigvalsh(C).min() > 0:
             raise _not_definite(cls, C)
         return StrainTables(cls.dN(np.zeros(3)), _monomials(rule.points), C, share=0.0)
 
     def B(self, xi: ArrayLike, C: ArrayLike | None = None) -> Array:
-        """Return the operator of the enhanced strain at points, B - G D⁻¹ L; see `KinematicLinear.B`."""
+        """Return B - G D⁻¹ L; InputError without C or with few points, MaterialError if C is not definite."""
         B, points = super().B(xi), arguments.points(xi)
         amplitudes = self._amplitudes(C, self._modes(self.rule.points))
         enhanced = self._modes(points.reshape(-1, 3)) @ amplitudes[..., None, :, :]
