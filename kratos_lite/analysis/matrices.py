@@ -84,7 +84,7 @@ class LocalSystem(NamedTuple):
     Attributes
     ----------
     K : (3k, 3k) in N/m, stiffness.
-    r : (3k,) in N, external less internal load.
+    r : (3k,) in N, external less internal force vector.
     M : (3k, 3k) in kg, consistent mass.
     dofs : (3k,) int, degrees of freedom among those of the model, 3·node + axis.
     """

@@ -310,7 +310,7 @@ class StressAt(Quantity):
         group = self._around(result)
         placed, C = group.at(result.mesh.points), group.material.C
         stress = np.broadcast_to(C[component] / placed.dV.sum(), (*placed.dV.shape, 6))
-        add_nodal(load, group.nodes, placed.internal_load(stress, C))
+        add_nodal(load, group.nodes, placed.internal_force(stress, C))
         return load
 
     def local(self, result: Solved) -> Array:

@@ -1,4 +1,4 @@
-"""Large displacements: internal load, stiffness, energy and highest frequency of groups of elements.
+"""Large displacements: internal forces, stiffness, energy and highest frequency of groups of elements.
 
 Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where C is that of the material and
 S0 the prestress of a group; the formulas are in `elements.total_lagrangian`.  It holds for large
@@ -87,7 +87,7 @@ def internal_load(
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
-            add_nodal(total, group.nodes[chunk], lagrange.internal_load(element, at))
+            add_nodal(total, group.nodes[chunk], lagrange.internal_force(element, at))
     return total
 
 

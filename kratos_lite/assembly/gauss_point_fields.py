@@ -137,12 +137,12 @@ def _internal_forces(element: KinematicLinear, group: ElementGroup, u: Array, ch
     """Return the internal forces (m, k, 3) in N of a chunk, with those of the prestress."""
     C, displacements = group.material.C, u[group.nodes[chunk]]
     if "local_system" not in element.custom:
-        return element.internal_load(value_at(element, group, u, chunk), C)
+        return element.internal_force(value_at(element, group, u, chunk), C)
     forces = custom.system(element, C, displacements)[1]
     if group.prestress is None:
         return forces
     stress = np.broadcast_to(group.initial_stress(chunk), (len(forces), len(group.rule), 6))
-    return forces + element.internal_load(stress, C)
+    return forces + element.internal_force(stress, C)
 
 
 def totals(points: Array, groups: Sequence[ElementGroup], u: Array) -> tuple[float, float, int]:

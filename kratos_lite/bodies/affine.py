@@ -117,8 +117,8 @@ class AffineBody(Body):
         out[..., -3:] = v
         return out
 
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
-        """Return A times the vector; see `Body.convected`."""
+    def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
+        """Return A times the vector; see `FreeBody.push_forward`."""
         return np.asarray(self.matrix_of(q) @ vector)
 
     def mass_center(self) -> Array:

@@ -10,12 +10,12 @@ from kratos_lite.bodies.body import Body
 from kratos_lite.bodies.free_body import Clock
 from kratos_lite.bodies.loads import AppliedLoad
 from kratos_lite.bodies.pseudo_rigid import PseudoRigidBody
-from kratos_lite.bodies.rigid import Obstacle, RigidBody
+from kratos_lite.bodies.rigid import FixedBody, RigidBody
 from kratos_lite.errors import InputError, ModelError
 from kratos_lite.model.mass_properties import MassProperties
 
 
-def together(bodies: Sequence[Body]) -> Body:
+def batch(bodies: Sequence[Body]) -> Body:
     """Return bodies of one kind as one object; q and u of each become rows of those of the whole."""
     if not isinstance(bodies, Sequence):
         raise InputError(
@@ -36,7 +36,7 @@ def together(bodies: Sequence[Body]) -> Body:
         whole.C = np.stack([body.C for body in members if isinstance(body, PseudoRigidBody)])
     else:
         assert isinstance(first, RigidBody)
-        kind = Obstacle if isinstance(first, Obstacle) else RigidBody
+        kind = FixedBody if isinstance(first, FixedBody) else RigidBody
         whole = kind.__new__(kind)
         RigidBody.__init__(
             whole, mass_properties=mass_properties, integrator=first.integrator, tolerance=first.tolerance
@@ -84,6 +84,6 @@ def _loads(members: Sequence[Body]) -> list[AppliedLoad]:
     if not any(body.loads for body in members):
         return []
     loads = [body.constant_loads() for body in members]
-    acceleration, spatial, convected = (np.array(parts) for parts in zip(*loads, strict=True))
+    acceleration, spatial, follower = (np.array(parts) for parts in zip(*loads, strict=True))
     mass = np.array([body.mass for body in members])
-    return [AppliedLoad.constant(mass, acceleration, spatial, convected)]
+    return [AppliedLoad.constant(mass, acceleration, spatial, follower)]

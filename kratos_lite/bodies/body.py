@@ -96,8 +96,8 @@ class Body(FreeBody):
 
     # ---- deformation -----------------------------------------------------------------------------
 
-    def internal_load(self, q: Array | None = None) -> Array:
-        """Return the generalized internal load: what deformation resists with.
+    def internal_force(self, q: Array | None = None) -> Array:
+        """Return the generalized internal force vector: what deformation resists with.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Body(FreeBody):
         return np.zeros(self.q.shape[:-1])
 
     def stiffness(self, q: Array | None = None) -> Any:
-        """Return the tangent of `internal_load`.
+        """Return the tangent of `internal_force`.
 
         Parameters
         ----------
@@ -226,7 +226,7 @@ class Body(FreeBody):
         >>> import kratos_lite as kl
         >>> body = kl.RigidBody(kl.box(), kl.Isotropic3D(E=1e9, nu=0.3, density=1000.0))
         >>> body.add(kl.Force(body.center, (1.0, 0.0, 0.0)), amplitude=lambda t: 3.0 * t)
-        >>> body.external_load(time=2.0).tolist()
+        >>> body.external_force(time=2.0).tolist()
         [0.0, 0.0, 0.0, 6.0, 0.0, 0.0]
         """
         if isinstance(load, Constraint):
@@ -259,10 +259,10 @@ class Body(FreeBody):
         self.constraints.append(constraint)
         self.integrated_velocity = None
 
-    def external_load(
+    def external_force(
         self, q: Array | None = None, time: float | None = None, u: Array | None = None
     ) -> Array:
-        """Return the generalized external load.
+        """Return the generalized external force vector.
 
         Parameters
         ----------
@@ -284,16 +284,16 @@ class Body(FreeBody):
         if self._constant is not None and self._constant[0] == len(self.loads):
             return self._constant[1]
         lead = self.q.shape[:-1]
-        acceleration, spatial, convected = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
+        acceleration, spatial, follower = np.zeros((*lead, 3)), np.zeros_like(self.u), np.zeros_like(self.u)
         for load in self.loads:
             amplitude = load.amplitude(self.time)
             if load.acceleration is not None:
                 acceleration += amplitude * load.acceleration
             if load.spatial is not None:
                 spatial += amplitude * load.spatial
-            if load.convected is not None:
-                convected += amplitude * load.convected
-        self._constant = len(self.loads), (acceleration, spatial, convected)
+            if load.follower is not None:
+                follower += amplitude * load.follower
+        self._constant = len(self.loads), (acceleration, spatial, follower)
         return self._constant[1]
 
     # ---- energies --------------------------------------------------------------------------------

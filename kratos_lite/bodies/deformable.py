@@ -38,7 +38,7 @@ class Deformable(Body):
 
     @abstractmethod
     def solver(self, q: Array, c: float) -> Solve:
-        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal load.
+        """Return what solves (M + c K(q)) x = b, with the tangent K of the internal force vector.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Deformable(Body):
 
         Parameters
         ----------
-        residual : (dofs,), loads less internal load.
+        residual : (dofs,), external less internal force vector.
         entries : rows, dofs and values (k,) of H (c, dofs).
         gap : (c,) m.
         tangent : rows, dofs and values of A, the derivative of loads and reactions with respect to q.

@@ -234,7 +234,7 @@ class FreeBody(ABC):
         )
 
     @abstractmethod
-    def convected(self, vector: Array, X: Array, q: Array) -> Array:
+    def push_forward(self, vector: Array, X: Array, q: Array) -> Array:
         """Return where a vector points that is fixed in the body.
 
         Parameters

@@ -167,7 +167,7 @@ class PseudoRigidBody(AffineBody, Deformable):
 
     # ---- deformation ----------------------------------------------------------------------------
 
-    def internal_load(self, q: Array | None = None) -> Array:
+    def internal_force(self, q: Array | None = None) -> Array:
         """Return V P(F) row by row, and no force on the mass center, (..., 12)."""
         F = (self.q if q is None else q)[..., :9]
         out = np.zeros((*F.shape[:-1], 12))

@@ -28,7 +28,7 @@ MASS = "mass and body forces are exact for the shape; state a mass_rule to chang
 CURES = {
     **dict.fromkeys(("N", "dN"), "write it in the Shape of the element"),
     **dict.fromkeys(("J", "detJ", "dNdX", "dV", "strain", "strain_at"), STRAIN),
-    **dict.fromkeys(("internal_load", "stiffness", "stiffness_by_axis", "K", "r_int"), SYSTEM),
+    **dict.fromkeys(("internal_force", "stiffness", "stiffness_by_axis", "K", "r_int"), SYSTEM),
     **dict.fromkeys(("body_force", "r_ext", "mass", "scalar_mass", "lumped_mass", "volume"), MASS),
     "stress": "a stress of its own belongs to a material: write a LinearMaterial",
     "__init__": f"{STRAIN}; or {SYSTEM}",

@@ -197,7 +197,7 @@ class KinematicLinear(CellMass):
         C = arguments.elasticity(C, self.X)
         return self.strain(u, C) @ np.swapaxes(C[..., None, :, :] if C.ndim > 2 else C, -1, -2)
 
-    def internal_load(self, stress: ArrayLike, C: ArrayLike | None = None) -> Array:
+    def internal_force(self, stress: ArrayLike, C: ArrayLike | None = None) -> Array:
         """Return the internal force vector of stresses, r_int = Σ B^T σ γ det J.
 
         Parameters
@@ -274,4 +274,4 @@ class KinematicLinear(CellMass):
         r_int : (..., n, 3) float, N; K u
         """
         C = arguments.elasticity(C, self.X)
-        return stiffness.by_dof(self._stiffness(C)), self.internal_load(self.stress(C, u), C)
+        return stiffness.by_dof(self._stiffness(C)), self.internal_force(self.stress(C, u), C)

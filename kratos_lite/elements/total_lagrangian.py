@@ -5,7 +5,7 @@ second Piola–Kirchhoff stress is S = C:E + S0 and the first P = F S.  Rows of 
 Voigt order with engineering shear, as everywhere.
 
 Over a step from q to q + dq the energy-momentum form takes F at the middle and the mean of both
-stresses, so that the work of the internal load over dq is exactly the change of the strain energy.
+stresses, so that the work of the internal force vector over dq is exactly the change of the strain energy.
 
 Source: Simo & Tarnow, ZAMP 43 (1992) 757-792; Bonet & Wood, Nonlinear Continuum Mechanics (2008), ch. 9.
 """
@@ -66,7 +66,7 @@ def deformation(
     return Deformation(F + dF / 2, S, F + dF, 0.5, 0.5 + damping)
 
 
-def internal_load(element: KinematicLinear, at: Deformation) -> Array:
+def internal_force(element: KinematicLinear, at: Deformation) -> Array:
     """Return ∫ P grad N dV as (..., n, 3) in N."""
     dV, D = element._gauss
     S = voigt.tensor(at.S) * dV[..., None, None]

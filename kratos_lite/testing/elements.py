@@ -249,7 +249,7 @@ def offset(element: Element) -> Measured:
     return Measured(max(loss), 20, text)
 
 
-def internal_load(element: Element) -> Measured:
+def internal_force(element: Element) -> Measured:
     """Check that local_system gives K, and r_int = ∫ B^T σ(u) dV or its own, with r_int = K u."""
     X, C = distorted(element), anisotropic()
     u = np.random.default_rng(19).uniform(-1, 1, X.shape)
@@ -308,6 +308,6 @@ def lumped_mass(element: Element) -> Measured:
 
 SINGLE = (
     volume, strain_operator, stiffness, symmetry, rank, stretched, rigid_motions, frame_invariance,
-    numbering_invariance, length_scaling, offset, internal_load,
+    numbering_invariance, length_scaling, offset, internal_force,
 )  # fmt: skip
 MASS = (body_force, mass_total, consistent_mass, lumped_mass)

@@ -48,7 +48,7 @@ def test_B_at_all_gauss_points_is_that_of_the_points_of_the_rule():
         (lambda e: e.strain(np.zeros(24)), r"got \(24,\); reshape a flat array of 24 to \(8, 3\)"),
         (lambda e: e.strain(np.zeros((3, 8, 3))), r"does not fit: leading axes must be \(4,\)"),
         (lambda e: e.strain("u"), "displacements u must be made of real numbers; got 'u'"),
-        (lambda e: e.internal_load(np.zeros(6)), r"got \(6,\); there are 8 points of 6"),
+        (lambda e: e.internal_force(np.zeros(6)), r"got \(6,\); there are 8 points of 6"),
         (lambda e: e.body_force(-9.81), r"b must have shape \(..., 3\); got \(\); give its x, y"),
         (lambda e: e.body_force(np.zeros((5, 3))), r"\(3,\), \(4, 3\) or \(4, 8, 3\); got \(5, 3\)"),
         (lambda e: e.body_force(np.zeros((5, 8, 3))), r"does not fit"),

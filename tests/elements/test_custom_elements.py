@@ -283,7 +283,7 @@ def test_a_B_for_one_element_sees_its_own_element():
         ("_gauss", "give yours another name"),
         ("strain", "override B"),
         ("stress", "belongs to a material"),
-        ("internal_load", "override local_system"),
+        ("internal_force", "override local_system"),
         ("stiffness", "override local_system"),
         ("stiffness_by_axis", "override local_system"),
         ("K", "override local_system"),

@@ -181,7 +181,7 @@ CASES: Case = {
     ("KinematicLinear.local_system", "u"): (lambda v: element("local_system", ROCK.C, v), U),
     ("BBar3D10N.kept", "C"): (lambda v: kl.BBar3D10N(kl.BBar3D10N.nodes).kept(v), ROCK.C),
     ("KinematicLinear.body_force", "b"): (lambda v: element("body_force", v), VECTOR),
-    ("KinematicLinear.internal_load", "stress"): (lambda v: element("internal_load", v), np.ones((8, 6))),
+    ("KinematicLinear.internal_force", "stress"): (lambda v: element("internal_force", v), np.ones((8, 6))),
     ("KinematicLinear.strain", "u"): (lambda v: element("strain", v), U),
     ("KinematicLinear.stress", "u"): (lambda v: element("stress", ROCK.C, v), U),
     ("KinematicLinear.stress", "C"): (lambda v: element("stress", v, U), ROCK.C),
@@ -372,7 +372,7 @@ def test_every_argument_that_takes_arrays_is_tried():
 ELSEWHERE = {
     *((owner, name) for owner in ("Motion", "AlongDirection") for name in ("direction", "points")),
     *(("Motion", name) for name in ("rate", "acceleration", "part")),
-    *((name, "C") for name in ("internal_load", "strain")),
+    *((name, "C") for name in ("internal_force", "strain")),
     *((name, "xi") for name in ("N", "dN")),
     *(("plot", name) for name in ("clim", "displacement", "modes", "points", "values")),
     *(("animate", name) for name in ("clim", "modes", "values")),

@@ -736,9 +736,9 @@ def test_loads_that_are_wrong_are_found():
     broken = damaged(
         base,
         body_force=lambda self, b: base.body_force(self, b)[..., ::-1],
-        internal_load=lambda self, stress, C=None: -base.internal_load(self, stress, C),
+        internal_force=lambda self, stress, C=None: -base.internal_force(self, stress, C),
     )
-    assert {"body force", "internal load"} <= set(failed(check_element(broken)))
+    assert {"body force", "internal force"} <= set(failed(check_element(broken)))
 
 
 def test_an_exception_in_an_element_is_a_finding():

@@ -109,7 +109,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def load(self, q: Array) -> Array:
-        """Return the internal load (3n,) in N."""
+        """Return the internal force vector (3n,) in N."""
 
     @abstractmethod
     def energy(self, q: Array) -> float:

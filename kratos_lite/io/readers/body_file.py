@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.bodies import BODIES, Body, Obstacle, RigidBody
+from kratos_lite.bodies import BODIES, Body, FixedBody, RigidBody
 from kratos_lite.bodies.rotations import exp
 from kratos_lite.bodies.validation import Material
 from kratos_lite.errors import Problems
@@ -189,7 +189,7 @@ def _body(settings: Settings, mesh: Mesh | None, material: Material | None) -> B
         given["mass_properties"] = section.placed("mass_properties", _mass_properties, inner, mesh, material)
     elif mesh is None:
         raise settings.error("mesh", "key 'mesh' is missing: it is the shape of the body")
-    if material is None and "mass_properties" not in given and not issubclass(kind, Obstacle):
+    if material is None and "mass_properties" not in given and not issubclass(kind, FixedBody):
         raise settings.error(
             "material", 'key \'material\' is missing, and the mesh has none: {"E": …, "nu": …, "density": …}'
         )

@@ -48,7 +48,7 @@ def last(states):
         ("rigid", kl.RigidBody),
         ("pseudo-rigid", kl.PseudoRigidBody),
         ("finite-element", kl.FiniteElementBody),
-        ("obstacle", kl.Obstacle),
+        ("fixed", kl.FixedBody),
     ],
 )
 def test_one_word_is_the_kind(scene, word, kind):
@@ -91,7 +91,7 @@ POINT, CORNER = [0.2, 0.3, 0.5], [0.4, 0.6, 1.0]
 LOADS = {
     "gravity": ({"acceleration": [0, 0, -10]}, kl.Gravity((0, 0, -10))),
     "force": ({"point": CORNER, "force": [1, 2, 3]}, kl.Force(CORNER, (1, 2, 3))),
-    "torque": ({"torque": [1, 2, 3], "frame": "convected"}, kl.Torque((1, 2, 3), "convected")),
+    "torque": ({"torque": [1, 2, 3], "frame": "follower"}, kl.Torque((1, 2, 3), "follower")),
     "traction": ({"on": "z+", "traction": [5, 0, 0]}, kl.Traction("z+", (5, 0, 0))),
     "pressure": ({"on": "x-", "pressure": 7.0}, kl.Pressure("x-", 7.0)),
     "follower_pressure": ({"on": "x-", "pressure": 7.0}, kl.FollowerPressure("x-", 7.0)),
@@ -114,8 +114,8 @@ def test_every_load_is_that_of_python(scene, name, amplitude):
         load,
         amplitude=1.0 if amplitude is None else 3.0 if amplitude == 3.0 else kl.TimeSeries([0, 1], [0, 2]),
     )
-    found = body.external_load(time=0.25)
-    np.testing.assert_array_equal(found, twin.external_load(time=0.25))
+    found = body.external_force(time=0.25)
+    np.testing.assert_array_equal(found, twin.external_force(time=0.25))
     assert np.abs(found).max() > 0
 
 
@@ -236,7 +236,7 @@ MISTAKES = [
     ({"loads": [{"type": "gravity"}]}, r"loads\[0\]: a gravity also needs acceleration"),
     ({"loads": [{"type": "force", "point": [9, 9, 9], "force": [1, 0, 0]}]}, r"loads\[0\]\.type: .*outside"),
     ({"loads": [{"type": "pressure", "on": "top", "pressure": 1}]}, "there is no part 'top'"),
-    ({"loads": [{"type": "torque", "torque": [1, 0, 0], "frame": "body"}]}, "'spatial' or 'convected'"),
+    ({"loads": [{"type": "torque", "torque": [1, 0, 0], "frame": "body"}]}, "'spatial' or 'follower'"),
     (
         {"loads": [{"type": "gravity", "acceleration": [0, 0, 1], "amplitude": "x"}]},
         r'must be a number or \{"times": \[…\], "values": \[…\]\}',
