@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.exact_rules import (
     AFFINE,
     CURVED,
@@ -18,7 +19,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import NON_LOCKING, element_of, is_of_library
+from kratos_lite.elements.formulations import NON_LOCKING, element_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -35,12 +36,9 @@ CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
 
 
-def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
-    """Return the kernels of a name, or None where they do not stand for these methods of an element class.
-
-    A class that overrides one that they stand for is computed by its own, in NumPy.
-    """
-    return kernels(name) if element.has_kernels(*methods) else None
+def compiled(name: str, element: type[KinematicLinear] | None = None) -> Any:
+    """Return the kernels of a name, or None if a method of a user does their part for an element class."""
+    return kernels(name) if element is None or not element.custom else None
 
 
 def floats(values: Any) -> Array:
@@ -75,7 +73,7 @@ class ElementGroup:
     @property
     def is_proven(self) -> bool:
         """Whether class and rule are those of the library, which leave no hourglass modes in a mesh."""
-        return self.rule is self.element.rule and is_of_library(self.element)
+        return self.rule is self.element.rule and is_builtin(self.element)
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
@@ -220,7 +218,7 @@ def element_groups_of(
 
 def _rule_of(element: type[KinematicLinear], given: Rule | int | None) -> Rule:
     """Return the rule of an element, or one that replaces it, if it fits."""
-    if given is None and is_of_library(element):
+    if given is None and is_builtin(element):
         return element.rule
     return _fitting(element, element.rule if given is None else given)
 

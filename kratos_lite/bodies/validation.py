@@ -24,15 +24,7 @@ Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 
 
 def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
-    """Return the elements of a mesh with their material, after checks of its geometry.
-
-    `unnamed` is the formulation of elements whose names say none.
-
-    Raises
-    ------
-    MeshError, ModelError, InputError
-        If the mesh is broken or inverted, or elements have no material.
-    """
+    """Return the elements of a mesh with their material; MeshError or ModelError if they are broken."""
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
     structure.check_geometry()
     groups = structure.element_groups(unnamed)

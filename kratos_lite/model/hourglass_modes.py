@@ -10,7 +10,6 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import ELEMENTS
-from kratos_lite.elements.overridden_steps import MECHANICS, brought
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
@@ -89,9 +88,9 @@ def _check_class(element: type[KinematicLinear]) -> str:
     if not modes:
         return ""
     if modes > stated:
-        steps = [step for step in brought(element, KinematicLinear) if step in MECHANICS]
         cures = [f"take a rule with more points{_rule_of_library(element)}"]
-        cures += [f"correct {', '.join(dict.fromkeys(steps))}, which the class overrides"] if steps else []
+        if element.custom:
+            cures.append(f"correct {' and '.join(sorted(element.custom))}, which the class overrides")
         raise ModelError(
             f"{name} has {_modes(modes)} with its {_points(element.rule)}: beside rigid-body motions, an "
             f"element deforms in {modes} ways without energy, so that results may be many times too large; "
