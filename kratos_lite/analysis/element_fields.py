@@ -169,12 +169,17 @@ class ElementFields:
         return self._recovery.nodal(self._strained)
 
     @cached_property
-    def elastic(self) -> ElementFields:
-        """The same without prestress: stresses that the strains make."""
+    def without_prestress(self) -> ElementFields:
+        """The same fields, with the stresses that the strains make."""
         if all(group.prestress is None for group in self.groups):
             return self
         groups = [replace(group, prestress=None) for group in self.groups]
         return ElementFields(self.mesh, groups, self._strained, kinds=self.kinds)
+
+    @property
+    def elastic(self) -> tuple[Array, Array]:
+        """Recovered strains and stresses (n, 6) in Pa without prestress."""
+        return self.strain("node"), self.without_prestress.stress("node")
 
     def stress_of_material(self, row: int) -> Array:
         """Return recovered stresses at the nodes of one material, which those of its neighbors do not change.
@@ -228,7 +233,7 @@ class ElementFields:
             return [field.function(t) for t in tensor] if isinstance(tensor, list) else field.function(tensor)
         place = choice(at, f"the place of the field {name}", field.where)
         if "gauss" not in field.where or place == "node":
-            return field.at(ResultValues(self))
+            return self.u if name == "displacement" else field.at(self)
         found = [GaussPoints(self.mesh.points, group, self.u, self._strained) for group in self.groups]
         if place == "gauss":
             return in_order(self.groups, [field.at(values) for values in found])
@@ -410,30 +415,3 @@ class ElementFields:
         In J.
         """
         return self._totals[0]
-
-
-class ResultValues:
-    """Values of a result at nodes, and of elements, which functions of fields read."""
-
-    def __init__(self, result: Any) -> None:
-        self._result = result
-
-    @property
-    def displacement(self) -> Array:
-        """Displacements (n, 3) in m."""
-        return np.asarray(self._result.u)
-
-    @property
-    def reactions(self) -> Array:
-        """Reactions (n, 3) in N."""
-        return np.asarray(self._result.reactions)
-
-    @property
-    def elastic(self) -> tuple[Array, Array]:
-        """Recovered strains and stresses in Pa without prestress, (n, 6)."""
-        return self._result.strain("node"), self._result.elastic.stress("node")
-
-    @property
-    def error(self) -> Array:
-        """Estimated error (m,) of elements in √J."""
-        return np.asarray(self._result.error().per_element)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
 
 from kratos_lite import voigt
 from kratos_lite.errors import KratosLiteError
@@ -88,6 +90,10 @@ def _strain_energy_density(at: Any) -> Array:
     return (strain * stress).sum(axis=-1) / 2
 
 
+def _error_of_elements(result: Any) -> Array:
+    return np.asarray(result.error().per_element)
+
+
 def _principal_strains(strain: Array) -> Array:
     return voigt.principal_values(strain * voigt.HALF_SHEAR)
 
@@ -121,7 +127,7 @@ FIELDS: dict[str, Field] = {
         "strain energy density", "STRAIN_ENERGY", "J/m³", "scalar", INTEGRATED, _strain_energy_density
     ),
     "error": Field(
-        "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, attrgetter("error"), log=True
+        "estimated error", "ENERGY_NORM_ERROR", "√J", "scalar", ELEMENTS, _error_of_elements, log=True
     ),
     "velocity": Field("velocity", "VELOCITY", "m/s", "vector", STATES, attrgetter("v")),
     "acceleration": Field("acceleration", "ACCELERATION", "m/s²", "vector", STATES, attrgetter("a")),
@@ -129,10 +135,12 @@ FIELDS: dict[str, Field] = {
 PLACE = Field("", "", "m", "vector", INTERPOLATED, attrgetter("points"))
 
 
-class Solution(Protocol):
-    """A result."""
+@runtime_checkable
+class Fields(Protocol):
+    """What a result offers."""
 
     mesh: Mesh
+    u: Array
 
     def field(self, name: str, at: str) -> Any:
         """Return a field at a place."""
@@ -143,7 +151,7 @@ def listed(place: str) -> dict[str, Field]:
     return {name: field for name, field in FIELDS.items() if field.listed and place in field.where}
 
 
-def fields(result: Solution) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
+def fields(result: Fields) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
     """Return point data and cell data of a result by Kratos's names, as files and viewers hold them."""
     points, cells = (
         {field.kratos: result.field(name, place) for name, field in listed(place).items() if field.kratos}
@@ -153,7 +161,7 @@ def fields(result: Solution) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
     return points, cells
 
 
-def nodal_columns(result: Solution) -> dict[str, Numbers]:
+def nodal_columns(result: Fields) -> dict[str, Numbers]:
     """Return ids, places and the fields of the nodes."""
     columns = {"node": result.mesh.node_ids, **PLACE.columns(result.mesh.points)}
     for name, field in listed("node").items():

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from kratos_lite.analysis.fields import FIELDS, PARTS
+from kratos_lite.analysis.fields import FIELDS, PARTS, Fields
 from kratos_lite.errors import InputError, nearest
-from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 from kratos_lite.view.scene import Values
 
@@ -27,17 +25,6 @@ NAMES = dict(_names())
 """Field and number of its part by each name; a vector itself is shown by its length."""
 MOTIONS = tuple(name for name, (field, _) in NAMES.items() if field == "displacement")
 """Those that need nothing but displacements."""
-
-
-@runtime_checkable
-class Fields(Protocol):
-    """What a result offers."""
-
-    mesh: Mesh
-    u: Array
-
-    def field(self, name: str, at: str) -> Any:
-        """Return a field at a place."""
 
 
 def nodal_values(result: Fields, name: str) -> Values:

@@ -72,7 +72,7 @@ class PointValues:
     def elastic(self) -> tuple[Array, Array]:
         """Strains and stresses (..., 6) in Pa without prestress, both recovered, or both of B u."""
         strain, stress = (
-            self._fields.elastic.at_located(self._located, stress=stress, recovered=self._recovered)
+            self._fields.without_prestress.at_located(self._located, stress=stress, recovered=self._recovered)
             for stress in (False, True)
         )
         return self._of_all_ranks(strain), self._of_all_ranks(stress)

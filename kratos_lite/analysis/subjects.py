@@ -8,7 +8,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from kratos_lite.analysis.named_values import MOTIONS, Fields, named_values, nodal_values
+from kratos_lite.analysis.fields import Fields
+from kratos_lite.analysis.named_values import MOTIONS, named_values, nodal_values
 from kratos_lite.analysis.state import State
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
