@@ -84,8 +84,8 @@ def project_velocity(body: Body, h: float) -> None:
         return
     columns = body.mass_solver()(H.T)
     u = body.u + columns @ (np.linalg.pinv(H @ columns, rcond=1e-12, hermitian=True) @ miss)
-    left = np.concatenate(wanted) - H @ u
-    if np.abs(left).max() > CLOSED * max(np.abs(miss).max(), np.abs(H @ np.abs(u)).max()):
+    residual = np.concatenate(wanted) - H @ u
+    if np.abs(residual).max() > CLOSED * max(np.abs(miss).max(), np.abs(H @ np.abs(u)).max()):
         raise SolveError("the constraints cannot be met at the start: they contradict each other")
     body.u = u
     after = float(body.kinetic_energy())

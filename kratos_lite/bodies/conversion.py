@@ -139,15 +139,19 @@ def _check_mass(body: Body, kind: type[Body]) -> None:
     assert body.mesh is not None
     assert body.material is not None
     own = mass_properties_of(body.mesh, body.material)
-    given = body.mass_properties
+    properties = body.mass_properties
     size = float(np.ptp(body.mesh.points, axis=0).max())
-    pairs = ((given.mass, own.mass, 1.0), (given.center, own.center, size), (given.euler, own.euler, size**2))
+    pairs = (
+        (properties.mass, own.mass, 1.0),
+        (properties.center, own.center, size),
+        (properties.euler, own.euler, size**2),
+    )
     for value, other, scale in pairs:
         if not np.allclose(value, other, rtol=0, atol=1e-9 * own.mass * scale):
             raise ModelError(
                 f"the mass of a {kind.kind} body follows from its mesh ({own.mass:g} kg), and the mass "
-                f"properties that were given to this {body.kind} body are others ({given.mass:g} kg); make "
-                "one of a mesh and a density that have them"
+                f"properties that were given to this {body.kind} body are others ({properties.mass:g} kg); "
+                "make one of a mesh and a density that have them"
             )
 
 

@@ -210,9 +210,9 @@ class LinearMaterial:
         MaterialError
             If a variable is missing or outside its bounds.
         """
-        given = {field: values[name] for field, name in cls.variables.items() if name in values}
+        constants = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {name for name in names_of(cls) if name != "density"}
-        missing = [cls.variables.get(field, field) for field in sorted(needed - given.keys())]
+        missing = [cls.variables.get(field, field) for field in sorted(needed - constants.keys())]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
-        return cls(**given)
+        return cls(**constants)

@@ -46,21 +46,21 @@ def check_element(element: Element) -> list[Finding]:
     >>> [finding.check for finding in findings if not finding.passed]
     ['mid edges', 'quadratic patch']
     """
-    found = run((definition,), element)
+    findings = run((definition,), element)
     if _wrong(element):
-        return found
+        return findings
     shape = check_functions(element.shape)
     rule, mass = (
         [replace(f, check=f"{name} {f.check}") for f in check_rule(element.shape.cell, r)] if r else []
         for name, r in (("rule", element.rule), ("mass rule", element.mass_rule))
     )
     causes = [f for f in shape if f.check in ("derivatives", "broadcasting", "kronecker")] + rule
-    found += shape + rule + mass
+    findings += shape + rule + mass
     if failures(causes):
-        return found + run_after(causes, SINGLE + MASS + patches.CHECKS, element)
+        return findings + run_after(causes, SINGLE + MASS + patches.CHECKS, element)
     if failures(mass):
-        return found + run(SINGLE + patches.CHECKS, element) + run_after(mass, MASS, element)
-    return found + run(SINGLE + MASS + patches.CHECKS, element)
+        return findings + run(SINGLE + patches.CHECKS, element) + run_after(mass, MASS, element)
+    return findings + run(SINGLE + MASS + patches.CHECKS, element)
 
 
 def definition(element: Element) -> Measured:
@@ -99,9 +99,9 @@ def volume(element: Element) -> Measured:
     """Check that the volume of a sheared cell is det A times that of the reference cell."""
     X, exact = affine(element)
     cell = element(X)
-    found = max(float(cell.volume()), float(cell.dV.sum()), key=lambda value: abs(value - exact))
-    text = f"volume of a sheared cell is {found:.15g}; exact is {exact:.15g}"
-    return Measured(abs(found / exact - 1), 1e-13, text)
+    value = max(float(cell.volume()), float(cell.dV.sum()), key=lambda value: abs(value - exact))
+    text = f"volume of a sheared cell is {value:.15g}; exact is {exact:.15g}"
+    return Measured(abs(value / exact - 1), 1e-13, text)
 
 
 def strain_operator(element: Element) -> Measured:
