@@ -38,7 +38,7 @@ from kratos_lite.validation import finite, number
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LEAK = 1e-2
-"""Share of the velocity that may pass through the boundary before a warning is given."""
+"""Fraction of the velocity that may pass through the boundary before a warning is given."""
 TOO_LEAKY = 0.2
 """Share from which a body is not one of revolution, or not straight, at all."""
 

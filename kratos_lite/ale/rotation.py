@@ -112,8 +112,8 @@ class Rotation(Motion):
             warnings.append("an anisotropic material is not axisymmetric unless its axes turn with the angle")
         moving = self.moving(structure.mesh)
         c = self.field(structure.mesh.points[moving])
-        is_held = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
-        if not self.stiffening and not is_held:
+        is_constrained = np.abs(c[structure.supports.fixed[moving]]).max(initial=0.0) > 1e-9 * np.abs(c).max()
+        if not self.stiffening and not is_constrained:
             warnings.append(
                 "nothing holds the rotation about the axis: in the linear theory a free rotor is unstable at "
                 "any rate; fix the hub, or take stiffening=True"

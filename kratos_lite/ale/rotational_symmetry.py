@@ -11,7 +11,7 @@ from kratos_lite.errors import ModelError
 HARMONICS = 12
 """Waves around the axis, or along the frame, that are looked for."""
 UNEVEN = 1e-2
-"""Share of a harmonic that is too much."""
+"""Fraction of a harmonic that is too much."""
 
 
 def check_materials(terms: MotionMatrices) -> None:

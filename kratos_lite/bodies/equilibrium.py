@@ -17,11 +17,11 @@ INCREMENTS = (1, 4, 16, 64)
 """Numbers of load increments that are tried one after the other."""
 NEWTON_MAX = 25
 CONVERGED = 1e-9
-"""Last Newton step, as a share of the displacement; the error left is its square."""
+"""Last Newton step, as a fraction of the displacement; the remaining error is its square."""
 ROUND_OFF = 4e-15
-"""Newton step, as a share of the size of the body, that is nothing but rounding."""
+"""Newton step, as a fraction of the size of the body, that is nothing but rounding."""
 UNBALANCED = 1e-8
-"""Share of the loads that may be left over."""
+"""Fraction of the loads that may remain."""
 
 
 def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
@@ -31,10 +31,10 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
 
     Parameters
     ----------
-    body : pseudo-rigid or finite-element, not modal, held by constraints or springs.  A `Callback` that
+    body : pseudo-rigid or finite-element, not modal, supported by constraints or springs.  A `Callback` that
         depends on the configuration counts as a load without a derivative, and must be weak beside the other
         stiffness.
-    progress : called with ``"equilibrium"`` and the share of the load, 0 … 1.
+    progress : called with ``"equilibrium"`` and the fraction of the load, 0 … 1.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
     ModelError
         A rigid or a modal body, or a constraint on velocities.
     SolveError
-        There is no equilibrium near by: the body is not held, or it buckles.
+        There is no equilibrium near by: the body is not supported, or it buckles.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def find_equilibrium(body: Body, *, progress: Progress | None = None) -> int:
         return iterations
     body.q = start
     raise SolveError(
-        f"no equilibrium was found: {failed}; is the body held by constraints "
+        f"no equilibrium was found: {failed}; is the body supported by constraints "
         "or springs, and are the loads not too large?"
     )
 
@@ -113,7 +113,7 @@ def _increment(body: Deformable, start: Array, fraction: float, progress: Progre
 
 
 def _gap(body: Deformable, q: Array) -> Array:
-    """Return by how much the constraints are missed in m."""
+    """Return by how much the constraints are violated in m."""
     gaps = [c.gaps(body, q, np.zeros_like(q), body.time, 2.0) for c in body.constraints]
     return np.concatenate([np.zeros(0), *gaps])
 

@@ -157,7 +157,7 @@ def _lacks_decorator(kind: type) -> bool:
 
 
 def _cure(error: BaseException, defined: dict[str, Any]) -> str:
-    """Return what to do about an error that a decorator left out has led to, or an empty text."""
+    """Return what to do about an error that a missing decorator has led to, or an empty text."""
     if not isinstance(error, TypeError):
         return ""
     if "non-frozen dataclass" in str(error):
