@@ -46,8 +46,6 @@ class MatrixFree:
     ...     assert np.abs(K @ rigid).max() < 1e-6 * K.norm()
     """
 
-    is_split = False
-
     def __init__(
         self,
         points: Array,

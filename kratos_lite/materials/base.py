@@ -212,7 +212,8 @@ class LinearMaterial:
         """
         constants = {field: values[name] for field, name in cls.variables.items() if name in values}
         needed = {name for name in names_of(cls) if name != "density"}
-        missing = [cls.variables.get(field, field) for field in sorted(needed - constants.keys())]
+        absent = sorted(needed - constants.keys())
+        missing = [f"{field} ({cls.variables.get(field, field)})" for field in absent]
         if missing:
             raise MaterialError(f"{cls.__name__} needs {', '.join(missing)}")
         return cls(**constants)
