@@ -26,7 +26,7 @@ from kratos_lite.model import checks
 from kratos_lite.model.equal import equal_loads
 from kratos_lite.model.loads import Load
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.constrained_system import among
+from kratos_lite.solvers.constrained_system import select
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
 from kratos_lite.validation import finite
@@ -248,7 +248,7 @@ class StaticAnalysis:
             model = self.model
             solved = moving if self.system is None else moving | self._solved
             parts = solved[self.part] & self._used
-            every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
+            every, groups = select(self.groups, parts), select(self.groups, parts & ~self._held)
             how = self.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
             system = system_of(model, groups, *how)  # which may be refused; the one before stays then
             self.release()

@@ -50,24 +50,14 @@ def floats(values: Any) -> Array:
 
 @dataclass(eq=False)
 class ElementGroup:
-    """Elements that share class, rule and material.
+    """Elements that share class, rule and material."""
 
-    Attributes
-    ----------
-    element : the element class.
-    rule : its quadrature rule.
-    material : its material.
-    nodes : (m, k) int, rows of the points.
-    rows : (m,) int, rows of the elements in the mesh.
-    prestress : (m, 6) float in Pa, or None.
-    """
-
-    element: type[KinematicLinear]
-    rule: Rule
-    material: LinearMaterial
-    nodes: Rows
-    rows: Ints
-    prestress: Array | None = None
+    element: type[KinematicLinear]  # the element class
+    rule: Rule  # its quadrature rule
+    material: LinearMaterial  # its material
+    nodes: Rows  # (m, k) int, rows of the points
+    rows: Ints  # (m,) int, rows of the elements in the mesh
+    prestress: Array | None = None  # (m, 6) float in Pa, or None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -126,14 +116,7 @@ class ElementGroup:
 
 
 def by_mass_rule(points: Array, group: ElementGroup, factors: int, flow: bool = False) -> list[ElementGroup]:
-    """Cut a group into parts whose rule is exact for a product of shape functions over their cells.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    group : the elements.
-    factors, flow : see `KinematicLinear.mass_rules`.
-    """
+    """Cut a group into parts whose rule is exact for a product of shape functions over their cells."""
     parts = group.element.mass_rules(geometries_of(points, group), factors, flow)
     return [replace(group.take(mask), rule=rule) for mask, rule in parts]
 
@@ -173,31 +156,7 @@ def element_groups_of(
     formulation: str | None = None,
     unnamed: str = NON_LOCKING,
 ) -> list[ElementGroup]:
-    """Return the elements of a mesh grouped by kind, rule and material.
-
-    Parameters
-    ----------
-    mesh : the elements.
-    materials : all materials.
-    material_of : (m,) number of the material of each element, -1 for none; the first for all if not given.
-    rules : rules or orders of integration 1 … 5 that replace those of the elements, by number.
-    rule_of : (m,) number of the rule of each element, -1 for its own; its own for all if not given.
-    prestress : (m, 6) Pa.
-    formulation, unnamed : see `elements.formulations.element_of`.
-
-    Raises
-    ------
-    ModelError, InputError
-        For elements without material, unknown kinds, and rules that do not fit; and if there are no elements.
-    MaterialError
-        For a material whose stress is not C strain.
-
-    Examples
-    --------
-    >>> from kratos_lite import Isotropic3D, box
-    >>> [len(group) for group in element_groups_of(box(cells=(2, 2, 2)), [Isotropic3D(E=1e9, nu=0.3)])]
-    [8]
-    """
+    """Return the elements of a mesh grouped by kind, rule and material."""
     m, found = mesh.n_elements, []
     if mesh.subdomain is not None and material_of is not None:
         _check_assigned(mesh, material_of)
@@ -275,13 +234,7 @@ def kinds_over_ranks(
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
-    """Return the one element of an id as a group of its own.
-
-    Raises
-    ------
-    MeshError
-        There is no such element, or several have this id.
-    """
+    """Return the one element of an id as a group of its own."""
     number = whole_number(id, "the id of an element", least=0, error=MeshError)
     rows = np.flatnonzero(mesh.element_ids == number)
     if len(rows) != 1:

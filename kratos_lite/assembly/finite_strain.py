@@ -62,26 +62,7 @@ def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
 def internal_load(
     points: Array, groups: Sequence[ElementGroup], q: Array, dq: Array | None = None, damping: float = 0.0
 ) -> Array:
-    """Return ∫ P grad N dV as nodal forces (n, 3) in N.
-
-    Parameters
-    ----------
-    points : (n, 3) in m, the reference positions.
-    q : (n, 3) in m, nodal displacements.
-    dq : (n, 3) in m; with it, the load of the step from q to q + dq in energy-momentum form:
-        its work on dq is the change of the strain energy, and what damping takes.
-    damping : η/h, stiffness-proportional damping over the step.
-
-    Examples
-    --------
-    A rotation needs no force.
-
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(element="KinematicLinear3D8N"), kl.Isotropic3D(E=1.0, nu=0.3))
-    >>> X, R = model.mesh.points, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    >>> float(np.abs(internal_load(X, model.element_groups(), X @ R.T - X)).max()) < 1e-15
-    True
-    """
+    """Return ∫ P grad N dV as nodal forces (n, 3) in N."""
     total = np.zeros_like(points)
     for group in groups:
         if module := _compiled(group):
@@ -116,10 +97,6 @@ def stiffness(
 
     Without dq it is the symmetric tangent by q.  With dq it is the derivative by dq, in general not
     symmetric; for dq → 0 without damping it is half the tangent.
-
-    Parameters
-    ----------
-    pattern : the sparsity of the nodes of the groups, in their order.
     """
     data = np.zeros((len(pattern.indices), 3, 3))
     for number, group in enumerate(groups):
@@ -181,18 +158,6 @@ def highest_frequency(
 ) -> float:
     """Return an upper bound of the largest angular frequency in 1/s: the largest of any element alone.
 
-    Parameters
-    ----------
-    q : (n, 3) in m, displacements whose tangent counts; without, the linear stiffness.
-    lumped : take the lumped mass of the elements in place of the consistent one.
-
-    Raises
-    ------
-    MaterialError
-        If a material has no density.
-
-    Notes
-    -----
     Source: Irons & Treharne, Proc. 3rd Conf. Matrix Methods in Struct. Mech., Wright-Patterson (1971).
     It takes one dense eigenproblem (3k, 3k) for each element, some 0.1 ms with eight nodes; without q,
     elements that are translations of each other take one together.

@@ -35,26 +35,7 @@ def inertia_matrices(
     names: str,
     velocity: Array = REST,
 ) -> dict[str, Array]:
-    """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s².
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the groups.
-    names : some of ``"MGH"``; the others are not computed.
-    velocity : (3, 4), A in 1/s and b in m/s of c = A X + b.
-
-    Examples
-    --------
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(cells=(2, 2, 2)), kl.Isotropic3D(E=210e6, nu=0.3, density=7620.0))
-    >>> groups = model.element_groups()
-    >>> pattern = Pattern(model.mesh.n_nodes, [group.nodes for group in groups])
-    >>> made = inertia_matrices(model.mesh.points, groups, pattern, "M")
-    >>> round(float(made["M"].sum()), 8)
-    7620.0
-    """
+    """Return matrices by name, each as data (nnz,) on the pattern: M in kg, G in kg/s, H in kg/s²."""
     data = {name: np.zeros(len(pattern.indices)) for name in names}
     points = floats(points)
     for number, group in enumerate(groups):

@@ -28,25 +28,7 @@ if TYPE_CHECKING:
 
 
 class MatrixFree:
-    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied.
-
-    Attributes
-    ----------
-    points : (n, 3) m.
-    groups : the elements.
-    assembled : makes the matrix, for what needs it.
-    product : what the kernels have prepared.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from kratos_lite import Isotropic3D, Model, box
-    >>> model = Model(box(element="KinematicLinear3D27N"), Isotropic3D(E=1e9, nu=0.3))
-    >>> rigid = np.tile([1.0, 0.0, 0.0], model.mesh.n_nodes)
-    >>> if all(map(MatrixFree.takes, model.element_groups())):  # never without kernels
-    ...     K = MatrixFree(model.mesh.points, model.element_groups())
-    ...     assert np.abs(K @ rigid).max() < 1e-6 * K.norm()
-    """
+    """The stiffness K (3n, 3n) in N/m of elements that the kernels know, which is only multiplied."""
 
     def __init__(
         self,
@@ -111,13 +93,6 @@ def factors(shape: type[Shape], rule: Rule) -> tuple[Ints, Array, Array, Array] 
 
     They do where the points are a grid of n along each axis, n = 2 or 3, and the shape functions have no
     higher degree than n - 1 in any coordinate.
-
-    Returns
-    -------
-    order : (g,) the points by z, y and x.
-    values : (n, n) Lagrange polynomials of n equidistant places, at the points on an axis.
-    slopes : (n, n) derivatives at these of the Lagrange polynomials of the points.
-    places : (g, k) shape functions at the grid of places.
     """
     n = round(len(rule.weights) ** (1 / 3))
     order: Ints = np.lexsort(np.round(rule.points, 12).T).astype(np.int64)

@@ -32,33 +32,16 @@ DECAY = 4
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Patches of some elements, numbered 0 … m - 1.
+    """Patches of some elements, numbered 0 … m - 1."""
 
-    Attributes
-    ----------
-    elements : those of each patch.
-    weights : of each of these, 1 for those that contain the node.
-    wide : (p,) whether a patch has a second layer, and can tell a polynomial of one degree more.
-    of : the patches whose mean counts at each node; none at nodes without elements.
-    """
-
-    elements: Lists
-    weights: Array
-    wide: Mask
-    of: Lists
+    elements: Lists  # those of each patch
+    weights: Array  # of each of these, 1 for those that contain the node
+    wide: Mask  # (p,) whether a patch has a second layer, and can tell a polynomial of one degree more
+    of: Lists  # the patches whose mean counts at each node; none at nodes without elements
 
 
 def patches(blocks: Sequence[Block], points: Array, outer: Mask, hanging: Ints, masters: Lists) -> Patches:
-    """Return the patches of blocks of elements.
-
-    Parameters
-    ----------
-    blocks : the elements, numbered through the blocks.
-    points : (n, 3) m.
-    outer : (n,) whether a node is a corner of a face on the surface.
-    hanging : nodes that others interpolate.
-    masters : those of each.
-    """
+    """Return the patches of blocks of elements."""
     corners = _corners(blocks)
     is_corner = np.zeros(len(outer), dtype=bool)
     is_corner[corners[corners >= 0]] = True

@@ -22,13 +22,7 @@ if TYPE_CHECKING:
 
 
 def at_located(groups: Sequence[ElementGroup], located: Located, u: Array, *, stress: bool = True) -> Array:
-    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points.
-
-    Raises
-    ------
-    InputError
-        An element class has a strain of its own, but no B-operator; or a stress of its own.
-    """
+    """Return stresses in Pa with prestress, or strains, (..., 6) of displacements u (n, 3) in m at points."""
     rows, xi = located.rows.ravel(), located.xi.reshape(-1, 3)
     out = np.zeros((len(rows), 6))
     for group in groups:

@@ -71,32 +71,19 @@ def integers(numbers: Numbers) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Values at points of elements.
+    """Values at points of elements."""
 
-    Attributes
-    ----------
-    places : (s, 3) m.
-    values : (s, 6).
-    offset : (m + 1,) first sample of each element.
-    """
-
-    places: Array
-    values: Array
-    offset: Ints
+    places: Array  # (s, 3) m
+    values: Array  # (s, 6)
+    offset: Ints  # (m + 1,) first sample of each element
 
 
 @dataclass(frozen=True, eq=False)
 class Polynomials:
-    """Fitted polynomials.
+    """Fitted polynomials."""
 
-    Attributes
-    ----------
-    frame : (p, 12) origin in m, and the rows of the map to local coordinates in 1/m.
-    terms : (p, t, 6) coefficients of the monomials in local coordinates, by degree.
-    """
-
-    frame: Array
-    terms: Array
+    frame: Array  # (p, 12) origin in m, and the rows of the map to local coordinates in 1/m
+    terms: Array  # (p, t, 6) coefficients of the monomials in local coordinates, by degree
 
     def at(self, places: Array, chosen: Lists) -> Array:
         """Return at each place (n, 3) the mean of some of the polynomials there, (n, 6)."""
@@ -107,16 +94,7 @@ class Polynomials:
         return self._mean(places[:, None], chosen)[:, 0]
 
     def residuals(self, places: Array, values: Array, E: Array, nodes: Ints, chosen: Lists) -> Array:
-        """Return what values in elements leave of the polynomials, extrapolated to the nodes, (m, k, 6).
-
-        Parameters
-        ----------
-        places : (m, s, 3) m in each element.
-        values : (m, s, 6) there.
-        E : (k, s) values at the nodes of an element from those at the places.
-        nodes : (m, k) of the elements.
-        chosen : the polynomials whose mean counts at each node.
-        """
+        """Return what values in elements leave of the polynomials, extrapolated to the nodes, (m, k, 6)."""
         if module := kernels("recovery"):
             tables = (floats(places), floats(values), floats(E), as_rows(nodes))
             return module.residuals(
@@ -137,16 +115,6 @@ class Polynomials:
 def fit(samples: Samples, patches: Lists, weights: Array, degree: Ints, means: Ints) -> Polynomials:
     """Return the polynomial of each patch.
 
-    Parameters
-    ----------
-    samples : values at points of all elements.
-    patches : the elements of each patch.
-    weights : of each of these.
-    degree : (p,) of the polynomials, 0 … 3.
-    means : (p,) 1 for patches that take the means of their elements as far as they tell.
-
-    Notes
-    -----
     A monomial that the points of a patch cannot tell from those before it is left out.  What means cannot
     tell, as across a single layer, is then fitted to what they leave of all samples.
     """

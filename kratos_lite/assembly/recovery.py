@@ -35,22 +35,13 @@ from kratos_lite.typing import Array, Ints, Numbers
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """Where the values of an element are taken, and what is fitted to them.
+    """Where the values of an element are taken, and what is fitted to them."""
 
-    Attributes
-    ----------
-    N : (s, k) shape functions at the samples.
-    from_gauss : (s, g) values there from those at the Gauss points; None where they are the Gauss points.
-    to_nodes : (k, s) share of the nodes in what polynomials leave of the samples; (k, 1) of their mean.
-    degree : of the polynomials.
-    means : whether means of elements are better than the samples, as far as they tell a polynomial.
-    """
-
-    N: Array
+    N: Array  # (s, k) shape functions at the samples
     from_gauss: Array | None
     to_nodes: Array
-    degree: int
-    means: bool
+    degree: int  # of the polynomials
+    means: bool  # whether means of elements are better than the samples, as far as they tell a polynomial
 
     @property
     def count(self) -> int:
@@ -86,20 +77,12 @@ def sampling(element: type[KinematicLinear], rule: Rule) -> Sampling:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Elements of one material, over which stresses are smooth.
+    """Elements of one material, over which stresses are smooth."""
 
-    Attributes
-    ----------
-    groups : its elements.
-    nodes : (k,) their nodes, ascending.
-    cells : the nodes of each group, numbered 0 … k - 1.
-    patches : of these.
-    """
-
-    groups: list[ElementGroup]
-    nodes: Ints
-    cells: list[Ints]
-    patches: Patches
+    groups: list[ElementGroup]  # its elements
+    nodes: Ints  # (k,) their nodes, ascending
+    cells: list[Ints]  # the nodes of each group, numbered 0 … k - 1
+    patches: Patches  # of these
 
     def at_nodes(self, points: Array, values: Sequence[Array]) -> Array:
         """Return values at the nodes (k, 6) from those at the Gauss points of the groups (m, g, 6)."""
@@ -195,13 +178,7 @@ def _patches(mesh: Mesh, groups: list[ElementGroup], outer: Ints) -> tuple[Ints,
 
 
 class Recovery:
-    """Recovered stresses and strains of a mesh, for any displacements.
-
-    Parameters
-    ----------
-    mesh : of n nodes.
-    groups : its elements.
-    """
+    """Recovered stresses and strains of a mesh, for any displacements."""
 
     def __init__(self, mesh: Mesh, groups: Sequence[ElementGroup]) -> None:
         self.points, self.groups = mesh.points, list(groups)

@@ -17,18 +17,7 @@ from kratos_lite.typing import Array, Ints, Rows
 
 
 class Pattern:
-    """Sparsity of the node graph in rows of node blocks.
-
-    Parameters
-    ----------
-    n_nodes : number of nodes.
-    connectivity : (m, k) node rows of each number of elements.
-
-    Attributes
-    ----------
-    indptr : (n + 1,) int32, where the row of each node starts; nodes without elements have empty rows.
-    indices : (nnz,) int32, sorted within a row: the nodes that share an element with it.
-    """
+    """Sparsity of the node graph in rows of node blocks."""
 
     def __init__(self, n_nodes: int, connectivity: Sequence[Rows]) -> None:
         self.n_nodes = n_nodes

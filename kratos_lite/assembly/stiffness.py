@@ -29,16 +29,7 @@ def assemble_stiffness(
     progress: Progress | None = None,
     skipped: set[str] | None = None,
 ) -> BlockMatrix:
-    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m.
-
-    Parameters
-    ----------
-    points : (n, 3) float, m.
-    groups : elements with these points.
-    pattern : the sparsity of their nodes, in the order of the groups.
-    progress : called with ``"assemble"`` and the share done, 0 … 1.
-    skipped : collects what made a part of the work unnecessary, in words for the report.
-    """
+    """Return the stiffness matrix as 3x3 blocks, (3n, 3n) in N/m."""
     data = np.zeros((len(pattern.indices), 3, 3))
     points = floats(points)
     done, total = 0, sum(len(group) for group in groups)
