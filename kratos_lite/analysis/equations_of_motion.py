@@ -10,7 +10,6 @@ import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.rotational_symmetry import check_materials
-from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
@@ -67,7 +66,6 @@ class EquationsOfMotion:
         massless: bool = False,
         progress: Progress | None = None,
     ) -> None:
-        check_whole(model.mesh, "what moves, modes and matrices")
         self.model, self._steady = model, steady
         self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)

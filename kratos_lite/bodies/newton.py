@@ -16,10 +16,7 @@ from kratos_lite.typing import Array, Ints
 
 
 def dense_step(K: Array, residual: Array, entries: Entries, gap: Array) -> tuple[Array, Array]:
-    """Return x (n,) and multipliers (c,) for a full matrix K (n, n), which may be singular.
-
-    Least squares: a body that loads do not move needs no support, and redundant supports share their load.
-    """
+    """Return x (n,) and multipliers (c,) for a full matrix K (n, n), which may be singular: least squares."""
     n, c = len(residual), len(gap)
     row, dof, value = entries
     A = np.zeros((n + c, n + c))

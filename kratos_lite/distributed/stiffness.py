@@ -17,9 +17,9 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.matrix_free import MatrixFree
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
+from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.ghosts import Ghosts
 from kratos_lite.distributed.multigrid import Level, Multigrid
-from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.native import kernels
 from kratos_lite.solvers.coarse_level import has_corners, has_middle_nodes, is_stretched, linear_level
 from kratos_lite.solvers.constrained_system import LARGEST_CONTRAST

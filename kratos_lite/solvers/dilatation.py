@@ -18,8 +18,6 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.solvers.pressure_means import PressureMeans, pressure_means
@@ -109,7 +107,7 @@ def has_dilatations(group: ElementGroup) -> bool:
     Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
     the modes take up the others.
     """
-    return group.element.has_kernels(*GEOMETRY, *MECHANICS) and group.strain_tables() is not None
+    return not group.element.custom and group.strain_tables() is not None
 
 
 @dataclass(eq=False)

@@ -39,15 +39,7 @@ FORMULATIONS: Registry[type[Formulation]] = Registry("formulation of a finite-el
 
 
 class Formulation(ABC):
-    """Internal load of nodal displacements q (3n,), and solutions with its tangent.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    groups : the elements.
-    mass : their mass.
-    modes : number of modes, of the modal formulation alone.
-    """
+    """Internal force vector of nodal displacements q (3n,), and solutions with its tangent."""
 
     name: ClassVar[str]
     aliases: ClassVar[tuple[str, ...]] = ()
@@ -114,7 +106,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def load(self, q: Array) -> Array:
-        """Return the internal load (3n,) in N."""
+        """Return the internal force vector (3n,) in N."""
 
     @abstractmethod
     def energy(self, q: Array) -> float:

@@ -18,11 +18,9 @@ from kratos_lite.typing import Array
 
 
 class Corotational(Formulation):
-    """Small strains seen from one rotation R of the body, that of its mean deformation gradient.
+    """Small strains seen from one rotation R of the body, that of its mean deformation gradient."""
 
-    f = R K0 R^T d with d = (Z + q) - R Z, Z = X less a point amid the body; K0 is constant, and so are the
-    factors of M + c K0.
-    """
+    # f = R K0 R^T d, d = (Z + q) - R Z, Z = X less a point amid the body; K0 and factors of M + c K0 stay.
 
     name = "corotational"
     aliases = ("BC",)
