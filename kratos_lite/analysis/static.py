@@ -198,7 +198,10 @@ class StaticAnalysis:
         if known is None or (moving & ~known.components).any():
             components = moving if known is None else moving | known.components
             nodes = components[state.component] & state.used
-            every, groups = select(state.groups, nodes), select(state.groups, nodes & ~self._dirichlet.at_rest)
+            every, groups = (
+                select(state.groups, nodes),
+                select(state.groups, nodes & ~self._dirichlet.at_rest),
+            )
             how = state.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
             system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
