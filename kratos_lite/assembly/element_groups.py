@@ -1,4 +1,4 @@
-"""Element groups: elements of one kind, rule and material, computed together, compiled or in NumPy."""
+"""Element groups: elements of one type, rule and material, computed together, compiled or in NumPy."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def compiled(name: str, element: type[KinematicLinear] | None = None) -> Any:
     return kernels(name) if element is None or not element.custom else None
 
 
-def floats(values: Any) -> Array:
+def as_double(values: Any) -> Array:
     """Return numbers as kernels take them."""
     return np.ascontiguousarray(values, dtype=float)
 
@@ -50,11 +50,11 @@ def floats(values: Any) -> Array:
 class ElementGroup:
     """Elements that share class, rule and material."""
 
-    element: type[KinematicLinear]  # the element class
-    rule: Rule  # its quadrature rule
-    material: LinearMaterial  # its material
-    nodes: Rows  # (m, k) int, rows of the points
-    rows: Ints  # (m,) int, rows of the elements in the mesh
+    element: type[KinematicLinear]
+    rule: Rule
+    material: LinearMaterial
+    nodes: Rows  # (m, k) int, indices of the points
+    rows: Ints  # (m,) int, indices of the elements in the mesh
     prestress: Array | None = None  # (m, 6) float in Pa, or None
 
     def __len__(self) -> int:
@@ -69,15 +69,16 @@ class ElementGroup:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
         rule = self.rule if rule is None else rule
         N, dN = tabulate(self.element.shape, rule)
-        return np.ascontiguousarray(self.nodes, dtype=np.int32), floats(N), floats(dN), floats(rule.weights)
+        nodes = np.ascontiguousarray(self.nodes, dtype=np.int32)
+        return nodes, as_double(N), as_double(dN), as_double(rule.weights)
 
-    def law(self) -> tuple[Array, Array | None]:
+    def kernel_arguments(self) -> tuple[Array, Array | None]:
         """Return C (6, 6) and the prestress, as kernels take them."""
-        return floats(self.material.C), None if self.prestress is None else floats(self.prestress)
+        return as_double(self.material.C), None if self.prestress is None else as_double(self.prestress)
 
     def strain_tables(self) -> StrainTables | None:
         """Return what the element adds to the strain of the displacements, as kernels take it."""
-        return self.element.strain_tables(self.rule, floats(self.material.C))
+        return self.element.strain_tables(self.rule, as_double(self.material.C))
 
     def at(self, points: Array, chunk: slice = slice(None)) -> KinematicLinear:
         """Return the elements of a chunk, placed at `points` (n, 3)."""
@@ -123,13 +124,15 @@ def geometries_of(points: Array, group: ElementGroup) -> Geometries:
     """Return AFFINE, STRAIGHT or CURVED of the elements of a group, (m,); see `geometries`."""
     shape, nodes = group.element.shape, group.tables()[0]
     if interpolated := getattr(kernels("gauss"), "interpolated", None):
-        found, points = np.full(len(nodes), CURVED, dtype=np.int8), floats(points)
+        kinds, points = np.full(len(nodes), CURVED, dtype=np.int8), as_double(points)
         for geometry in (AFFINE, STRAIGHT):
-            spanned, rest = interpolations(shape)[geometry], found == CURVED
-            if spanned and rest.any():
-                left = nodes if rest.all() else nodes[rest]
-                found[rest] = np.where(interpolated(points, left, *spanned, ROUNDING) > 0, geometry, CURVED)
-        return found
+            spanned, curved = interpolations(shape)[geometry], kinds == CURVED
+            if spanned and curved.any():
+                cells = nodes if curved.all() else nodes[curved]
+                kinds[curved] = np.where(
+                    interpolated(points, cells, *spanned, ROUNDING) > 0, geometry, CURVED
+                )
+        return kinds
     parts = [geometries(shape, points[nodes[chunk]]) for chunk in group.chunks()]
     return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
@@ -154,32 +157,35 @@ def element_groups_of(
     formulation: str | None = None,
     unnamed: str = NON_LOCKING,
 ) -> list[ElementGroup]:
-    """Return the elements of a mesh grouped by kind, rule and material."""
-    m, found = mesh.n_elements, []
+    """Return the elements of a mesh grouped by type, rule and material.
+
+    `material_of` and `rule_of` (m,) are numbers, -1 for no material and for the element's own rule.
+    """
+    m, groups = mesh.n_elements, []
     material_of = np.zeros(m, dtype=np.int64) if material_of is None else material_of
     rule_of = np.full(m, -1) if rule_of is None else rule_of
     for block, at in with_rows(mesh.blocks):
         if not len(block):
             continue
         element_class(mesh, block)
-        for material, rule, mine in _alike(mesh, block, material_of[at], rule_of[at]):
+        for material, rule, cells in _alike(mesh, block, material_of[at], rule_of[at]):
             materials[material].check_stress()
             element = element_of(block.name, formulation, materials[material].C, unnamed)
-            rows = at.start + mine
+            rows = at.start + cells
             chosen = _rule_of(element, rules[rule] if rules and rule >= 0 else None)
-            nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
+            nodes = block.nodes if len(cells) == len(block) else block.nodes[cells]
             stress = None if prestress is None else prestress[rows]
-            found.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
-    if mesh.whole and not found:
+            groups.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
+    if mesh.whole and not groups:
         raise ModelError("the model has no elements; nothing can be solved")
-    return found
+    return groups
 
 
-def _rule_of(element: type[KinematicLinear], given: Rule | int | None) -> Rule:
+def _rule_of(element: type[KinematicLinear], other: Rule | int | None) -> Rule:
     """Return the rule of an element, or one that replaces it, if it fits."""
-    if given is None and is_builtin(element):
+    if other is None and is_builtin(element):
         return element.rule
-    return _fitting(element, element.rule if given is None else given)
+    return _fitting(element, element.rule if other is None else other)
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
@@ -187,9 +193,9 @@ def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> Ele
     number = whole_number(id, "the id of an element", least=0, error=MeshError)
     rows = np.flatnonzero(mesh.element_ids == number)
     if len(rows) != 1:
-        found = f"{len(rows)} elements have" if len(rows) else "no element has"
+        count = f"{len(rows)} elements have" if len(rows) else "no element has"
         ids = mesh.element_ids
-        raise MeshError(f"{found} the id {number}; ids run from {ids.min()} to {ids.max()}")
+        raise MeshError(f"{count} the id {number}; ids run from {ids.min()} to {ids.max()}")
     return next(group.take(group.rows == rows[0]) for group in groups if (group.rows == rows[0]).any())
 
 
@@ -202,7 +208,7 @@ def _alike(mesh: Mesh, block: Block, material: Ints, rule: Ints) -> list[tuple[i
     code = material * (int(rule.max()) + 2) + rule
     order = np.argsort(code, kind="stable")
     alike = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
-    return [(int(material[mine[0]]), int(rule[mine[0]]), mine) for mine in alike]
+    return [(int(material[cells[0]]), int(rule[cells[0]]), cells) for cells in alike]
 
 
 def _without_material(mesh: Mesh, block: Block, cell: int) -> ModelError:

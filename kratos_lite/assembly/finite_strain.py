@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
-from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, compiled, floats
+from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, as_double, compiled
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
@@ -25,7 +25,7 @@ from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 
 SAME_SHAPE = 1e-10
-"""Elements whose edges differ by less than this share of their size have one frequency."""
+"""Elements whose edges differ by less than this fraction of their size have one frequency."""
 
 
 def check_elements(groups: Sequence[ElementGroup]) -> None:
@@ -48,12 +48,12 @@ def _compiled(group: ElementGroup) -> Any:
 def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
     """Return points, nodes, dN and weights of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    return floats(points), nodes, dN, weights
+    return as_double(points), nodes, dN, weights
 
 
 def _displaced(q: Array, dq: Array | None, damping: float) -> tuple[Any, ...]:
     """Return displacements, increment and damping, as kernels take them."""
-    return floats(q), None if dq is None else floats(dq), damping
+    return as_double(q), None if dq is None else as_double(dq), damping
 
 
 def internal_load(
@@ -64,7 +64,7 @@ def internal_load(
     for group in groups:
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *group.law())
+            total += module.internal_load(*_placed(points, group), *step, *group.kernel_arguments())
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
@@ -100,7 +100,7 @@ def stiffness(
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
             rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *group.law(), *rows, data)
+            module.add_stiffness(*_placed(points, group), *step, *group.kernel_arguments(), *rows, data)
             continue
 
         def tangent(chunk: slice, group: ElementGroup = group) -> Array:
@@ -117,7 +117,7 @@ def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> fl
     energy = 0.0
     for group in groups:
         if module := _compiled(group):
-            energy += module.totals(*_placed(points, group), floats(q), *group.law())[0]
+            energy += module.totals(*_placed(points, group), as_double(q), *group.kernel_arguments())[0]
             continue
         for chunk in group.chunks():
             element, displaced = group.at(points, chunk), q[group.nodes[chunk]]
@@ -174,9 +174,9 @@ def _distinct(points: Array, group: ElementGroup) -> ElementGroup:
     """Return a group of one element of each shape, whatever its place."""
     edges = points[group.nodes] - points[group.nodes[:, :1]]
     size = np.abs(edges).max()
-    rows = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
+    keys = np.rint(edges.reshape(len(edges), -1) / (SAME_SHAPE * size))
     chosen = np.zeros(len(group), dtype=bool)
-    chosen[np.unique(rows, axis=0, return_index=True)[1]] = True
+    chosen[np.unique(keys, axis=0, return_index=True)[1]] = True
     return group.take(chosen)
 
 

@@ -40,7 +40,7 @@ class Pattern:
 
     def _find(self, keys: Ints, nodes: Rows) -> Rows:
         m, k = nodes.shape
-        found = np.zeros((m, k, k), dtype=np.int32)
+        positions = np.zeros((m, k, k), dtype=np.int32)
         step = max(1, 1_000_000 // (k * k))
         for start in range(0, m, step):
             n = nodes[start : start + step].astype(np.int64)
@@ -48,8 +48,8 @@ class Pattern:
             place = np.searchsorted(keys, wanted)
             if (keys[np.minimum(place, len(keys) - 1)] != wanted).any():
                 raise AssertionError("the sparsity pattern misses a pair of nodes that share an element")
-            found[start : start + step] = place
-        return found
+            positions[start : start + step] = place
+        return positions
 
     def add(self, data: Array, number: int, window: slice, matrices: Array) -> None:
         """Add matrices of some elements of a number: (m, k, k, 3, 3) to (nnz, 3, 3), (m, k, k) to (nnz,)."""
