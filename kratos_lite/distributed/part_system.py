@@ -13,8 +13,8 @@ from kratos_lite.distributed.equations import Equations, Method
 from kratos_lite.distributed.partition import Partition
 from kratos_lite.distributed.petsc import parsed
 from kratos_lite.distributed.petsc_system import CURE, CURE_OF_FACTORS, PATIENCE
-from kratos_lite.distributed.preconditioner import choose
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
+from kratos_lite.distributed.preconditioner import plan_of
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.linear_solver import Solution
 from kratos_lite.typing import Array, Mask, Progress
@@ -55,8 +55,9 @@ class PartSystem:
         part = partition.equations(points, self._elastic, held)
         self._rows = part.own
         self.unknowns = ranks.sum(int((~held[part.own]).sum()))
-        nearly = ranks.any(any(bulk_over_shear(group.material.C) > NEAR_HALF for group in groups))
-        self.method, self.reason = choose(solver, self.unknowns, nearly, given)
+        ratio = ranks.max(max((bulk_over_shear(group.material.C) for group in groups), default=0.0))
+        plan = plan_of(solver, self.unknowns, ratio, given)
+        self.method, self.reason = plan.method, plan.reason
         self._equations = Equations(ranks, part, Method(self.method, given, False, PATIENCE), progress)
         self.skipped = self._equations.skipped
         self.warnings: list[str] = []

@@ -16,13 +16,14 @@ from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.cut import Cut, Part
 from kratos_lite.distributed.equations import Equations, Method
 from kratos_lite.distributed.petsc import parsed
-from kratos_lite.distributed.preconditioner import FALLBACK_LIMIT, choose
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
+from kratos_lite.distributed.preconditioner import plan_of
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.errors import SolveError
 from kratos_lite.solvers.constrained_system import renumber
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.iteration import MAX_ITERATIONS
 from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.plan import MUMPS_FALLBACK
 from kratos_lite.typing import Array, Ints, Progress
 
 PATIENCE = 5 * MAX_ITERATIONS
@@ -85,8 +86,9 @@ class PetscSystem:
         self._elastic = [replace(group, prestress=None) for group in self.groups]
         self._options = parsed(options)
         self.unknowns = len(self.reduced.free)
-        nearly = any(bulk_over_shear(group.material.C) > NEAR_HALF for group in groups)
-        self.method, self.reason = choose(solver, self.unknowns, nearly, self._options)
+        ratios = [bulk_over_shear(group.material.C) for group in groups]
+        plan = plan_of(solver, self.unknowns, max(ratios, default=0.0), self._options)
+        self.method, self.reason = plan.method, plan.reason
         self._key: int | None = None
 
     @cached_property
@@ -103,7 +105,7 @@ class PetscSystem:
         """Let all ranks make their equations."""
         if self._key is not None:
             return
-        most = MAX_ITERATIONS if self.unknowns <= FALLBACK_LIMIT else PATIENCE
+        most = MAX_ITERATIONS if self.unknowns <= MUMPS_FALLBACK else PATIENCE
         method = Method(self.method, self._options, self._cut.is_constrained, most)
         key = next(KEYS)
 
@@ -159,7 +161,7 @@ class PetscSystem:
         """Solve for b (3a,); a small system whose iteration fails is factorized, unless options are given."""
         x, name, iterations, error, failure, unused = self._solve(b, start, tolerance)
         reason = self.reason
-        if failure and self.method == "amg" and not self._options and self.unknowns <= FALLBACK_LIMIT:
+        if failure and self.method == "amg" and not self._options and self.unknowns <= MUMPS_FALLBACK:
             self.destroy()
             self.method, reason = "direct", failure
             x, name, iterations, error, failure, unused = self._solve(b, None, tolerance)
