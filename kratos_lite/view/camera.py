@@ -25,13 +25,7 @@ SLENDER = 3.0
 
 
 def rows_of(view: View | None, X: Array) -> Array:
-    """Return right, up and towards the viewer as rows (3, 3).
-
-    Parameters
-    ----------
-    view : a name, azimuth and elevation in degrees, or a direction; None chooses one for the body.
-    X : (n, 3) m, points of the body.
-    """
+    """Return right, up and towards the viewer as rows (3, 3); without a view, one for points (n, 3) m."""
     if view is None:
         return _rows(_side_of(np.ptp(X, axis=0)))
     if isinstance(view, str):

@@ -74,29 +74,11 @@ def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     return axes
 
 
-def new_log_plot(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone, both logarithmic."""
+def new_plot(size: tuple[float, float], scale: str = "linear") -> tuple[Any, Any]:
+    """Return a figure with axes for curves alone."""
     figure = empty(size)
-    from matplotlib.ticker import LogLocator
-
-    axes = figure.add_subplot(xscale="log", yscale="log")
+    axes = figure.add_subplot(xscale=scale, yscale=scale)
     axes.spines[["top", "right"]].set_visible(False)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_minor_formatter(lambda value, _: "")
-    return figure, axes
-
-
-def new_plot(size: tuple[float, float], *units: str) -> tuple[Any, Any]:
-    """Return a figure with axes for curves alone, numbers with prefixes of their units."""
-    figure = empty(size)
-    from matplotlib.ticker import EngFormatter
-
-    axes = figure.add_subplot()
-    axes.spines[["top", "right"]].set_visible(False)
-    for axis, unit in zip((axes.xaxis, axes.yaxis), units, strict=True):
-        axis.set_major_formatter(EngFormatter(unit) if unit else lambda value, _: f"{value:g}")
     return figure, axes
 
 

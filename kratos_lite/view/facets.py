@@ -54,18 +54,7 @@ def facets_of(
     most: int = MANY,
     window: tuple[Array, Array] | None = None,
 ) -> Facets:
-    """Return what is seen of the surface of a body.
-
-    Parameters
-    ----------
-    mesh : the undeformed body.
-    x : (n, 3) m, where its nodes are.
-    values : (n,) of nodes or (m,) of elements.
-    rows : of the camera.
-    plane : where the body is cut; the part towards the viewer is taken away.
-    most : facets to aim at.
-    window : what is shown, lower left and upper right in the picture; all if not given.
-    """
+    """Return what is seen of a body with nodes at x (n, 3) m in a window, in about `most` facets."""
     faces = [_inside(block, x, rows, window) for block in mesh.boundary]
     n, edged = fineness(sum(map(len, faces)), most)
     if values is None or len(values) != mesh.n_nodes:
@@ -108,7 +97,7 @@ def _of_block(
 ) -> tuple[Array, Array, Array, Array]:
     """Return corners, light, value and edges of the faces of one shape that face the viewer."""
     assert block.shape is not None
-    xi, corners = _grid(block.shape.cell, n)
+    xi, corners = grid(block.shape.cell, n)
     N = block.shape.N(xi)
     P = np.einsum("pa,mad->mpd", N, x[block.nodes])[:, corners].reshape(-1, 4, 3)
     normal = _normals(P)
@@ -118,7 +107,7 @@ def _of_block(
         _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front],
     )
     facing = front.reshape(len(block), len(corners)).any(axis=1)
-    N_rim = block.shape.N(_rim(block.shape, n))
+    N_rim = block.shape.N(rim(block.shape, n))
     E = np.einsum("spa,mad->mspd", N_rim, x[block.nodes[facing]]).reshape(-1, 2, 3)
     P = P[front]
     if plane is not None:
@@ -162,7 +151,7 @@ def _light(normal: Array) -> Array:
     return 0.86 + 0.14 * np.clip(normal @ LIGHT, 0, 1)
 
 
-def _grid(cell: str, n: int) -> tuple[Array, Ints]:
+def grid(cell: str, n: int) -> tuple[Array, Ints]:
     """Return grid points on a reference face, and the corners of its n² facets."""
     steps = np.linspace(0, 1, n + 1)
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -175,7 +164,7 @@ def _grid(cell: str, n: int) -> tuple[Array, Ints]:
     return grid, np.vstack([np.stack([a, b, d, d], -1)[lower], np.stack([b, c, d, d], -1)[upper]])
 
 
-def _rim(shape: type[Shape], n: int) -> Array:
+def rim(shape: type[Shape], n: int) -> Array:
     """Return the pieces of the edges of a reference face, (edges · n, 2, 2)."""
     t = np.linspace(0, 1, n + 1)[:, None]
     pieces = [(1 - t) * shape.nodes[a] + t * shape.nodes[b] for a, b in shape.edges]

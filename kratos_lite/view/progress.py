@@ -85,19 +85,12 @@ class Terminal:
 class Line:
     """The phase of some work, its share that is done and the seconds that it takes, once it takes long.
 
-    Parameters
-    ----------
-    write : takes the text, or an empty one at the end.
-    phase : at the start.
-    patience, every : seconds before the first text, and between two; without patience each phase is shown.
+    `write` takes each text, and an empty one at the end, after `patience` and then `every` so many seconds;
+    without patience each phase is shown.
     """
 
     def __init__(
-        self,
-        write: Callable[[str], None],
-        phase: str = "",
-        patience: float = PATIENCE,
-        every: float = EVERY,
+        self, write: Callable[[str], None], phase: str = "", patience: float = PATIENCE, every: float = EVERY
     ) -> None:
         from contextvars import copy_context  # rarely needed
         from threading import Event, RLock, Thread

@@ -15,24 +15,7 @@ from kratos_lite.view.canvas import new_figure
 
 
 def element_figure(shape: type[Shape], points: ArrayLike | None = None) -> Any:
-    """Return a figure of a reference cell with its node numbers (from 0), and Gauss points as crosses.
-
-    Parameters
-    ----------
-    shape : the cell.
-    points : (g, d) reference coordinates to mark.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        `points` has the wrong shape.
-    KratosLiteError
-        matplotlib is missing.
-    """
+    """Return a figure of a reference cell with its node numbers (from 0), and Gauss points (g, d)."""
     figure, axes = new_figure((5, 5))
     d = shape.nodes.shape[1]
     view = OBLIQUE if d == 3 else np.eye(3)
