@@ -57,9 +57,7 @@ class GaussPoints:
     def elastic(self) -> tuple[Array, Array]:
         """ε and the stress (m, g, 6) in Pa without prestress."""
         strain = self.strain
-        if self.group.element.inherits("stress"):
-            return strain, self.group.stress(strain)
-        return strain, self.stress - self.group.initial_stress(slice(None))
+        return strain, self.group.stress(strain)
 
     @property
     def displacement(self) -> Array:
@@ -93,7 +91,7 @@ class GaussPoints:
 
     def B(self) -> Array:
         """Return B (m, g, 6, 3k) in 1/m."""
-        return self.element._B(self.group.material.C)
+        return self.element._operator(self.group.material.C)
 
 
 def _stress_tensor(at: GaussPoints) -> Array:

@@ -7,10 +7,11 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.errors import InputError, nearest
+from kratos_lite.errors import InputError, MaterialError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.files import read_case
 from kratos_lite.materials import MATERIALS, LinearMaterial
@@ -18,10 +19,12 @@ from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.nodal import PointLoad
 from kratos_lite.model.loads.surface import Pressure, Traction
+from kratos_lite.tabular import names_of
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
     from kratos_lite.ale import Motion
+    from kratos_lite.analysis.integrators import ModelIntegrator
 
 OF_TIME = ("integrator", "rayleigh", "lumped", "restart", "state", "steps")
 """Options that need a time integration."""
@@ -44,6 +47,7 @@ OF_MODELS = (
     *("integrator", "rayleigh", "lumped"),
 )
 """Options that bodies do not have."""
+NO_STATICS = "does not go with --engine petsc, which solves statics; leave one out"
 OWNERS = {
     **dict.fromkeys(("center", "center_velocity", "center_acceleration", "stiffening"), ("rotation",)),
     "boundaries": ("translation",),
@@ -52,8 +56,11 @@ OWNERS = {
 """Options of a motion, and those that they belong to."""
 
 
-def case_of(options: Namespace) -> Case:
-    """Return the case of an input and the options of the command line, which win where there is one value."""
+def case_of(options: Namespace, part: int | None = None) -> Case:
+    """Return the case of an input and the options of the command line, which win where there is one value.
+
+    `part` is the number of the part file to read, of a mesh in parts.
+    """
     materials = [material(text) for text in options.material]
     everywhere = any(part is None for part, _ in materials)
     case = read_case(
@@ -61,7 +68,7 @@ def case_of(options: Namespace) -> Case:
         materials=not everywhere,
         strict=not options.lenient,
         initial_displacement=not options.ignore_initial_displacement,
-        comm=options.ranks,
+        part=part,
     )
     case.engine, case.petsc = options.engine or case.engine, options.petsc
     if case.is_of_model:
@@ -89,14 +96,14 @@ def share(text: str, what: str) -> float:
     >>> share("2.5%", "--error"), share("0.01", "--error")
     (0.025, 0.01)
     """
-    given = text.strip()
+    word = text.strip()
     try:
-        found = number(given.removesuffix("%"), what) / (100 if given.endswith("%") else 1)
+        fraction = number(word.removesuffix("%"), what) / (100 if word.endswith("%") else 1)
     except InputError:
-        found = 0.0
-    if not 0 < found < 1:
+        fraction = 0.0
+    if not 0 < fraction < 1:
         raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
-    return found
+    return fraction
 
 
 def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
@@ -104,6 +111,18 @@ def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
     for name in names:
         if getattr(options, name) not in (None, False, []):
             raise InputError(f"--{name.replace('_', '-')} {why}")
+
+
+def refuse_serial_options(options: Namespace) -> None:
+    """Raise InputError, before a file is read, for options that do not go with PETSc, or without PETSc."""
+    from kratos_lite.distributed.petsc import parsed, petsc
+
+    refuse(options, ("modes", "time", "restart", "state", *OF_TIME, "rotation", "translation"), NO_STATICS)
+    refuse(options, ("error",), "is for one process; leave it out, or --engine petsc")
+    if Path(options.input).suffix.lower() == ".py":
+        raise InputError(f"{options.input}: scripts are for one process; leave --engine petsc out")
+    parsed(options.petsc)
+    petsc()
 
 
 def _take_modes(case: Case, options: Namespace) -> None:
@@ -124,14 +143,14 @@ def _set_outputs(outputs: Outputs, options: Namespace) -> None:
     outputs.results, outputs.mode = options.output or outputs.results, options.vtu
 
 
-def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration | None:
+def _time(options: Namespace, of_file: TimeIntegration | None) -> TimeIntegration | None:
     """Return the time integration that the options and a file ask for."""
-    time = given
+    time = of_file
     if options.time is not None:
         step, steps, every = _steps(options.time)
         time = (
-            replace(given, step=step, steps=steps, every=every, place="")
-            if given
+            replace(of_file, step=step, steps=steps, every=every, place="")
+            if of_file
             else TimeIntegration(step, steps, every)
         )
     if time is None:
@@ -144,10 +163,7 @@ def _time(options: Namespace, given: TimeIntegration | None) -> TimeIntegration 
     if options.steps is not None:
         changes["steps"] = whole_number(options.steps, "--steps")
     if options.integrator:
-        from kratos_lite.io.readers.time import integrator_of  # it brings the readers of JSON
-
-        name, _, words = options.integrator.partition(":")
-        changes["integrator"] = integrator_of(name, _numbers(words, "--integrator"))
+        changes["integrator"] = _integrator(options.integrator)
     if options.rayleigh:
         changes["rayleigh"] = _rayleigh(options.rayleigh)
     if options.lumped:
@@ -168,6 +184,26 @@ def _steps(text: str) -> tuple[float, int, int]:
         raise InputError(f"--time: expected STEP:STEPS[:EVERY] such as 1e-3:200:10; got {text!r}")
     steps, every = (int(count) for count in (*counts, "1")[:2])
     return number(step, "--time"), steps, every
+
+
+def _integrator(text: str) -> ModelIntegrator:
+    """Return the integrator of ``NAME[:NUMBERS]``.
+
+    >>> str(_integrator("hht:-0.1"))
+    'hht(-0.1)'
+    """
+    from kratos_lite.analysis.integrators import INTEGRATORS  # a quick start of statics
+
+    name, _, words = text.partition(":")
+    numbers = _numbers(words, "--integrator")
+    if name not in INTEGRATORS:
+        hint = nearest(name, INTEGRATORS)
+        raise InputError(f"unknown integrator {name!r}.{hint} Known are {', '.join(INTEGRATORS)}")
+    make: Callable[..., ModelIntegrator] = INTEGRATORS[name]
+    counts = sorted({0, len(names_of(INTEGRATORS[name]))})
+    if len(numbers) not in counts:
+        raise InputError(f"{name} takes {' or '.join(map(str, counts))} numbers; got {len(numbers)}")
+    return make(*numbers)
 
 
 def _numbers(text: str, option: str) -> list[float]:
@@ -236,21 +272,20 @@ def material(text: str) -> tuple[str | None, LinearMaterial]:
         else:
             laws = ", ".join(MATERIALS)
             raise InputError(f"{option}: {name!r} is no material; have {laws}.{nearest(name, MATERIALS)}")
-    kind: Any = MATERIALS[law]
-    known = list(kind.variables)
+    kind = MATERIALS[law]
     values: dict[str, float] = {}
     for pair in constants.split(","):
-        key, equals, value = pair.partition("=")
-        field = {v: k for k, v in kind.variables.items()}.get(key.strip(), key.strip())
-        if not equals or field not in known:
-            raise InputError(f"{option}: constants of {law} are {', '.join(known)}; got {pair!r}")
-        if field in values:
-            raise InputError(f"{option}: {field} is given twice")
-        values[field] = number(value, option)
-    missing = [k for k in known if k not in values and k != "density"]
-    if missing:
-        raise InputError(f"{option}: {law} also needs {', '.join(missing)}")
-    return part, kind(**values)
+        key, equals, value = (word.strip() for word in pair.partition("="))
+        variable = kind.variables.get(key, key)
+        if not equals or variable not in kind.variables.values():
+            raise InputError(f"{option}: constants of {law} are {', '.join(kind.variables)}; got {pair!r}")
+        if variable in values:
+            raise InputError(f"{option}: {key} is given twice")
+        values[variable] = number(value, option)
+    try:
+        return part, kind.from_variables(values)
+    except MaterialError as error:
+        raise InputError(f"{option}: {error}") from None
 
 
 def _where(model: Model, part: str | None) -> str | int | None:

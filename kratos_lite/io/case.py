@@ -78,17 +78,7 @@ class TimeIntegration:
         flag(self.lumped, "lumped")
 
     def starting_from(self, supports: Supports, displacement: Array | None) -> TimeIntegration:
-        """Return the integration that starts from a displacement, unless it has a start of its own.
-
-        Parameters
-        ----------
-        supports : of the model, which hold what is prescribed.
-        displacement : (n, 3) m, or None.
-
-        Returns
-        -------
-        TimeIntegration
-        """
+        """Return the integration from an initial displacement (n, 3) in m, unless it has one of its own."""
         if displacement is None or self.displacement is not None:
             return self
         return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))

@@ -114,7 +114,7 @@ def _check_statics(case: Case) -> None:
 def prepare(case: Case, progress: Progress | None = None) -> tuple[Any, Iterator[Any]]:
     """Return the transient or body of a case in time and its states, checked; no step is taken yet."""
     if case.time is None:
-        raise ModelError("this case is not in time; give its file a section 'time'")
+        raise ModelError("this case is not in time; give it a kl.TimeIntegration")
     subject, states = runner_of(case).prepare(case, progress)
     return subject, states
 

@@ -26,17 +26,7 @@ HELD = ("VELOCITY", "ACCELERATION")
 
 
 class ProcessesInTime:
-    """The processes of a run file as supports, loads and initial state of a transient.
-
-    Parameters
-    ----------
-    actions : what the processes do.
-    context : mesh and times.
-
-    Attributes
-    ----------
-    displacement, velocity : (n, 3) at the start, or None at rest; known after `prepare`.
-    """
+    """The processes of a run file as supports, loads and initial state of a transient."""
 
     def __init__(self, actions: Sequence[Action], context: RunContext) -> None:
         self.context = context
@@ -48,13 +38,7 @@ class ProcessesInTime:
         self._moving: list[tuple[Ints, str, Callable[[float], float]]] = []
 
     def prepare(self, values: Variables) -> None:
-        """Bring values and supports to what stays in time, and keep what changes for `finish`.
-
-        Raises
-        ------
-        InputError
-            A support begins or ends within the run, or velocities or accelerations are prescribed.
-        """
+        """Bring values and supports to what stays in time, and keep what changes for `finish`."""
         self._check(values)
         self._begin(values)
         base = values.copy()
@@ -66,12 +50,12 @@ class ProcessesInTime:
             if action.component.startswith("DISPLACEMENT") and action.factors:
                 self._move(i, action, values)
         for group, load_of in ((GRAVITY, Variables.gravity), (SURFACE, Variables.condition_loads)):
-            mine = [action for action in self.actions if action.component in group]
-            if all(self._acts_always(action) and not action.mentions("t") for action in mine):
+            actions = [action for action in self.actions if action.component in group]
+            if all(self._acts_always(action) and not action.mentions("t") for action in actions):
                 continue
             values.note_idle(self.notes, group)
             values.drop(group)
-            self._later.append(TimeDependentLoad(_LoadInTime(self, mine, base.only(group), load_of)))
+            self._later.append(TimeDependentLoad(_LoadInTime(self, actions, base.only(group), load_of)))
         values.drop({f"{name}_{axis}" for name in HELD for axis in "XYZ"})
 
     def finish(self, model: Model) -> None:
@@ -130,8 +114,8 @@ class ProcessesInTime:
             if action.fixed and name.startswith("DISPLACEMENT"):
                 start.fix(name, action.rows)
         u, v = start.nodal.vector("DISPLACEMENT"), start.nodal.vector("VELOCITY")
-        held = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
-        if v[np.transpose(held)].any():
+        fixed = [start.fixed.get(f"DISPLACEMENT_{axis}", np.zeros(len(v), bool)) for axis in "XYZ"]
+        if v[np.transpose(fixed)].any():
             self.notes.append("VELOCITY of fixed nodes is left out; Kratos keeps it in the first step")
         self.displacement, self.velocity = u if u.any() else None, v if v.any() else None
 
@@ -174,25 +158,25 @@ class _LoadInTime:
     def __init__(
         self,
         processes: ProcessesInTime,
-        mine: list[Action],
+        actions: list[Action],
         base: Variables,
         load_of: Callable[[Variables], Load | None],
     ) -> None:
-        self.processes, self.mine, self.base, self.load_of = processes, mine, base, load_of
+        self.processes, self.actions, self.base, self.load_of = processes, actions, base, load_of
         self.last: tuple[object, Load | None] = (None, None)
 
     def __call__(self, time: float) -> Load | None:
         if not time > 0:
             return None
-        found = [
-            (when, i) for i, a in enumerate(self.mine) if (when := self.processes.at(a, time)) is not None
+        acting = [
+            (when, i) for i, a in enumerate(self.actions) if (when := self.processes.at(a, time)) is not None
         ]
-        found.sort()
-        key = [(i, when if self.mine[i].mentions("t") else None) for when, i in found]
+        acting.sort()
+        key = [(i, when if self.actions[i].mentions("t") else None) for when, i in acting]
         if key != self.last[0]:
             values = self.base.copy()
             points = places_of(values.mesh)
-            for when, i in found:
-                self.mine[i].put(values, points, when)
+            for when, i in acting:
+                self.actions[i].put(values, points, when)
             self.last = (key, self.load_of(values))
         return self.last[1]

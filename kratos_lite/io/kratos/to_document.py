@@ -36,8 +36,8 @@ def document_from(model: Model) -> Document:
         "a support that moves in time": bool(model.supports.motions),
         "a load that changes in time": any(isinstance(load, TimeDependentLoad) for load in model.loads),
     }
-    for what, given in unwritten.items():
-        if given:
+    for what, is_present in unwritten.items():
+        if is_present:
             raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
@@ -62,15 +62,15 @@ def _blocks(model: Model, numbers: Ints) -> list[Block]:
     if model.chosen():
         for group in groups:
             names[group.rows] = group.element.__name__
-    found = []
+    blocks = []
     for block, rows in with_rows(mesh.blocks):
-        mine = names[rows]
-        ends = [0, *(np.flatnonzero(mine[1:] != mine[:-1]) + 1).tolist(), len(mine)]
+        block_names = names[rows]
+        ends = [0, *(np.flatnonzero(block_names[1:] != block_names[:-1]) + 1).tolist(), len(block_names)]
         for first, last in pairwise(ends):
             if last > first:
                 part = replace(block, properties=numbers[rows], lines=None).take(np.arange(first, last))
-                found.append(replace(part, name=str(mine[first])))
-    return found
+                blocks.append(replace(part, name=str(block_names[first])))
+    return blocks
 
 
 def _split_loads(model: Model) -> tuple[Array, list[Any]]:
@@ -83,7 +83,7 @@ def _split_loads(model: Model) -> tuple[Array, list[Any]]:
 def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Properties]]:
     """Return the property id of each element, one per material and prestress, and the Properties."""
     numbers = np.zeros(model.mesh.n_elements, dtype=np.int64)
-    found: dict[int, Properties] = {}
+    properties: dict[int, Properties] = {}
     known: list[tuple[LinearMaterial, list[float]]] = []
     for group in model.element_groups():
         if group.rule is not group.element.rule:
@@ -95,8 +95,8 @@ def _properties(model: Model, gravity: Array) -> tuple[Ints, dict[int, Propertie
             known += [] if kind in known else [kind]
             number = known.index(kind) + 1
             numbers[group.rows[which.ravel() == i]] = number
-            found[number] = Properties(number, _values(group.material, gravity, stress))
-    return numbers, found
+            properties[number] = Properties(number, _values(group.material, gravity, stress))
+    return numbers, properties
 
 
 def _values(material: LinearMaterial, gravity: Array, prestress: Array) -> dict[str, Any]:
@@ -123,21 +123,21 @@ def _initial_displacement(model: Model) -> list[Data]:
     if u0[fixed].any():
         what = "an initial displacement of prescribed degrees of freedom"
         raise InputError(f"{what} cannot be written: their DISPLACEMENT in a file is what is prescribed")
-    found = []
+    data = []
     for axis, letter in enumerate("XYZ"):
         if len(rows := np.flatnonzero(u0[:, axis])):
             free, ids = np.zeros(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            found.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[rows, axis]))
-    return found
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, free, u0[rows, axis]))
+    return data
 
 
 def _fixed(model: Model) -> list[Data]:
-    found, supports = [], model.supports
+    data, supports = [], model.supports
     for axis, letter in enumerate("XYZ"):
         if len(rows := np.flatnonzero(supports.fixed[:, axis])):
-            held, ids = np.ones(len(rows), dtype=bool), model.mesh.node_ids[rows]
-            found.append(Data(f"DISPLACEMENT_{letter}", ids, held, supports.values[rows, axis]))
-    return found
+            fixed, ids = np.ones(len(rows), dtype=bool), model.mesh.node_ids[rows]
+            data.append(Data(f"DISPLACEMENT_{letter}", ids, fixed, supports.values[rows, axis]))
+    return data
 
 
 def _point_loads(mesh: Mesh, forces: Array, properties: int) -> tuple[list[Block], list[Data]]:

@@ -28,10 +28,10 @@ def prepare(case: Case, progress: Progress | None = None) -> tuple[TransientAnal
     time = case.time
     assert time is not None
     names = ("integrator", "rayleigh", "lumped", "displacement", "velocity")
-    given: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
-    transient = case.model.transient(**given)
+    settings: dict[str, Any] = {name: getattr(time, name) for name in names} | {"progress": progress}
+    transient = case.model.transient(**settings)
     if not time.balanced and not (time.displacement is None and time.velocity is None):
-        transient = TransientAnalysis(_held_at_first(transient), **given)
+        transient = TransientAnalysis(_held_at_first(transient), **settings)
     if time.restart is not None:
         restart(time.restart, transient)
 

@@ -149,15 +149,6 @@ def test_hints_name_solids_only_for_names_in_three_dimensions(load):
     assert "Did you mean" not in str(error.value)
 
 
-def test_gravity_of_a_run_file_on_top_of_that_of_the_mesh_is_noted(load, tmp_path):
-    load("GRAVITY_Z -9.81")
-    run = tmp_path / "run.json"
-    run.write_text('{"model": "cube.mdpa", "gravity": [0, 0, -9.81]}')
-    model = kl.read(run)
-    assert "gravity is added to the VOLUME_ACCELERATION of Properties 1 in the mesh file" in model.notes
-    np.testing.assert_allclose(total(model), [0, 0, -19620.0], atol=1e-9)
-
-
 def test_constraints_are_written_in_blocks_of_one_number_of_masters(tmp_path):
     u = "DISPLACEMENT_X"
     constraints = [

@@ -21,24 +21,24 @@ def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[C
     if len(frame.arguments) < 2:
         source.problem("expected 'Begin Constraints NAME SLAVE_VARIABLE [MASTER_VARIABLE …]'", frame.offset)
         return []
-    known = None if nodes is None else set(nodes.tolist())
+    node_ids = None if nodes is None else set(nodes.tolist())
 
     def read(at: int, end: int) -> tuple[Constraint, int]:
         constraint, after = _constraint(source, frame, (at, end))
         named = [node for node, _ in (constraint.slave, *constraint.masters)]
-        missing = [] if known is None else [node for node in named if node not in known]
+        missing = [] if node_ids is None else [node for node in named if node not in node_ids]
         if missing:
             raise ValueError(f"there is no node {missing[0]}")
         return constraint, after
 
-    found = list(source.each(frame.spans[0], "constraint", read))
-    if len({len(c.masters) for c in found}) > 1:
+    constraints = list(source.each(frame.spans[0], "constraint", read))
+    if len({len(c.masters) for c in constraints}) > 1:
         text = (
             "Kratos misreads a block of Constraints with different numbers of masters; "
             "kratos_lite reads it as written; give each number a block of its own"
         )
         source.note(text, frame.offset)
-    return found
+    return constraints
 
 
 def _constraint(source: Source, frame: Frame, span: tuple[int, int]) -> tuple[Constraint, int]:

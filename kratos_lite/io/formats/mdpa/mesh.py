@@ -28,8 +28,8 @@ def read_mesh(source: Source, frames: dict[str, list[Frame]], properties: Sequen
         source.problems.raise_if_any()
     blocks = read_blocks(source, frames["Elements"], mesh)
     conditions = read_blocks(source, frames["Conditions"], mesh)
-    for word, found in (("element", blocks), ("condition", conditions)):
-        _check_properties(source, found, word, properties)
+    for word, checked in (("element", blocks), ("condition", conditions)):
+        _check_properties(source, checked, word, properties)
     return mesh.replace(blocks=blocks, conditions=conditions)
 
 

@@ -24,24 +24,14 @@ Words = list[re.Match[bytes]]
 
 @dataclass(frozen=True)
 class Layout:
-    """What a row holds.
+    """What a row holds."""
 
-    Attributes
-    ----------
-    word : what a row describes, e.g. ``element``.
-    kinds : one letter a column: i id, p property id (may be 0), b true or false, r real.
-    counted : what stands after the first `head` columns, e.g. ``nodes``.
-    head : number of leading columns that are not counted in messages.
-    needs : who asks for the width, e.g. ``KinematicLinear3D8N needs 8``.
-    alone : each row stands on its own line, also where strict reading allows several.
-    """
-
-    word: str
-    kinds: str
-    counted: str = "values"
-    head: int = 1
-    needs: str = ""
-    alone: bool = False
+    word: str  # what a row describes, e.g. ``element``.
+    kinds: str  # one letter a column: i id, p property id (may be 0), b true or false, r real.
+    counted: str = "values"  # what stands after the first `head` columns, e.g. ``nodes``.
+    head: int = 1  # number of leading columns that are not counted in messages.
+    needs: str = ""  # who asks for the width, e.g. ``KinematicLinear3D8N needs 8``.
+    alone: bool = False  # each row stands on its own line, also where strict reading allows several.
 
 
 @dataclass(eq=False)
@@ -71,8 +61,8 @@ def width_of_first_line(source: Source, span: Span) -> int:
 def _compiled(source: Source, span: Span, layout: Layout) -> Rows | None:
     """Return the rows if each stands plain on a line of its own, else None."""
     text = kernels("text")
-    found = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
-    return Rows(*found) if found else None
+    columns = text.rows(source.data, *span, layout.kinds, source.line(span[0])) if text else None
+    return Rows(*columns) if columns else None
 
 
 def _exact(source: Source, span: Span, layout: Layout) -> Rows:

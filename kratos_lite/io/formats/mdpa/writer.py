@@ -27,31 +27,12 @@ Lines = Iterator[str]
 
 
 def write_mdpa(path: str | Path, document: Document) -> list[Note]:
-    """Write a document, as a whole or not at all; gzipped if the name ends with ``.gz``.
+    """Write a document for Kratos and kratos_lite, all or nothing; return notes on what Kratos does not know.
 
-    Numbers are written with the digits that give exactly the same number again.  ``KinematicLinear3D8N``,
-    ``TotalLagrangian3D8N``, ``Face3D4N`` and their kin get the names by which Kratos knows them, such as
-    ``SmallDisplacementElement3D8N`` and ``SurfaceLoadCondition3D4N``, ``BBar3D8N`` becomes
-    ``SmallDisplacementBbarElement3D8N``; ``EnhancedStrain3D8N`` and others that Kratos does not have are
-    written by their own names.  ``Element3D8N``, which names no formulation, becomes the plain element of
-    Kratos, whose ``Element3D8N`` is empty.  Elements keep theirs where a prestress
-    or the displacement of free nodes is their initial state, which the present elements of Kratos ignore.
-    A constraint between different variables is written as kratos_lite reads it; Kratos 10.4.4 takes the
-    variable of each master from the word before in the header, so it reads such a constraint differently.
+    Numbers are written with the digits that give exactly the same number again, elements and conditions by
+    the names of Kratos; elements keep theirs where a prestress or an initial displacement, which the present
+    elements of Kratos ignore, is their initial state.
 
-    Returns
-    -------
-    list of Note
-        Elements and conditions that are written though Kratos does not know them, and elements without a
-        formulation, which get the plain one.
-
-    Raises
-    ------
-    InputError
-        The document holds what the format cannot: a number that is not finite, a name with blanks.
-
-    Examples
-    --------
     >>> path = getfixture("tmp_path") / "one.mdpa"
     >>> _ = write_mdpa(path, Document(Mesh([[0.1, 0, 0]], node_ids=[7])))
     >>> print(path.read_text().strip())
