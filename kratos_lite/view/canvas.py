@@ -60,12 +60,6 @@ def without_frame(axes: Any) -> Any:
     return axes
 
 
-def new_figure(size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a figure that needs no screen, and axes without frame in which a metre is a metre."""
-    figure = empty(size)
-    return figure, without_frame(figure.add_subplot())
-
-
 def axes_for_curves(figure: Any, place: Any, size: Any) -> Any:
     """Return new axes for curves, with their lower left corner and size in inches."""
     axes = axes_in_inches(figure, place, size)

@@ -29,20 +29,12 @@ FINEST, SHADES = 40, 8
 
 @dataclass(eq=False)
 class Facets:
-    """What of a body is seen.
+    """What of a body is seen."""
 
-    Attributes
-    ----------
-    corners : (m, 4, 3) m, in their places; triangles repeat a corner.
-    light : (m,) brightness, 0 … 1.
-    values : (m,).
-    edges : (k, 2, 3) m, pieces of edges of elements.
-    """
-
-    corners: Array
-    light: Array
-    values: Array
-    edges: Array
+    corners: Array  # (m, 4, 3) m, in their places; triangles repeat a corner
+    light: Array  # (m,) brightness, 0 … 1
+    values: Array  # (m,)
+    edges: Array  # (k, 2, 3) m, pieces of edges of elements
 
 
 def facets_of(

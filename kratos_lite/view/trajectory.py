@@ -27,24 +27,14 @@ CURVES = (4.0, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A body along its path.
+    """A body along its path."""
 
-    Attributes
-    ----------
-    mesh : the elements.
-    positions : of the nodes, each (n, 3) in m, in the order of time.
-    marks : what holds the body in each position.
-    centers : (k, 3) m, path of the mass center.
-    times : (k,) s.
-    curves : (k,) energies in J by name.
-    """
-
-    mesh: Mesh
-    positions: Sequence[Array]
-    marks: Sequence[Marks]
-    centers: Array
-    times: Array
-    curves: Mapping[str, Array]
+    mesh: Mesh  # the elements
+    positions: Sequence[Array]  # of the nodes, each (n, 3) in m, in the order of time
+    marks: Sequence[Marks]  # what holds the body in each position
+    centers: Array  # (k, 3) m, path of the mass center
+    times: Array  # (k,) s
+    curves: Mapping[str, Array]  # (k,) energies in J by name
 
 
 def trajectory_figure(path: Path, view: View | None, title: str, size: tuple[float, float]) -> Any:
@@ -109,17 +99,7 @@ def _label_times(axes: Any, rows: Array, path: Path, near: float) -> None:
     feet, texts = [x[x[:, 1].argmin()] for x in ends], [f"{path.times[i]:.3g} s" for i in (0, -1)]
     if np.abs(ends[0] - ends[1]).max() < near:
         feet, texts = feet[1:], [" and ".join(dict.fromkeys(texts))]
+    style = {"textcoords": "offset points", "ha": "center", "va": "top", "size": 9, "zorder": 6}
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
     for foot, text in zip(feet, texts, strict=True):
-        axes.annotate(
-            text,
-            foot,
-            (0, -4),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            size=9,
-            bbox=box,
-            zorder=6,
-            annotation_clip=False,
-        )
+        axes.annotate(text, foot, (0, -4), bbox=box, annotation_clip=False, **style)
