@@ -79,8 +79,8 @@ class LineValues(PointValues):
     @property
     def linear(self) -> Array:
         """Membrane and bending stress σ_m + σ_b (1 - 2 x / t) together, (n, 6) in Pa."""
-        share = self.distance[:, None] / self.distance[-1]
-        return self.membrane + self.bending * (1 - 2 * share)
+        fraction = self.distance[:, None] / self.distance[-1]
+        return self.membrane + self.bending * (1 - 2 * fraction)
 
     @property
     def peak(self) -> Array:

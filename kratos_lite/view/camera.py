@@ -70,8 +70,8 @@ def _side_of(sides: Array) -> Array:
     x, y, z = sides
     across = max(min(x, y), z)
     slenderness = max(x, y) / across if across > 0 else np.inf
-    share = min(1.0, SLENDER / slenderness)
-    off, elevation = np.pi / 4 * share, np.arctan(1 / np.sqrt(2)) * (0.4 + 0.6 * share)
+    fraction = min(1.0, SLENDER / slenderness)
+    off, elevation = np.pi / 4 * fraction, np.arctan(1 / np.sqrt(2)) * (0.4 + 0.6 * fraction)
     azimuth = off - np.pi / 2 if x >= y else -off
     flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
     return np.append(flat, np.sin(elevation))

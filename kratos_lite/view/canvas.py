@@ -221,17 +221,13 @@ def polygons(axes: Any, corners: Array, colors: Array) -> Any:
     from matplotlib.collections import PolyCollection
 
     flat: Any = corners
-    return axes.add_collection(
-        PolyCollection(flat, facecolors=colors, edgecolors=colors, linewidths=0.45, zorder=2),
-        autolim=False,
-    )
+    style: Any = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.45, "zorder": 2}
+    return axes.add_collection(PolyCollection(flat, **style), autolim=False)
 
 
-def lines(axes: Any, ends: Array, color: str = "0.55", width: float = 0.8, zorder: float = 1) -> Any:
-    """Draw thin lines (m, 2, 2), by default behind everything else."""
+def lines(axes: Any, ends: Array) -> Any:
+    """Draw thin lines (m, 2, 2) behind everything else."""
     from matplotlib.collections import LineCollection
 
     pieces: Any = ends
-    return axes.add_collection(
-        LineCollection(pieces, colors=color, linewidths=width, zorder=zorder), autolim=False
-    )
+    return axes.add_collection(LineCollection(pieces, colors="0.55", linewidths=0.8, zorder=1), autolim=False)

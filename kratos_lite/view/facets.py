@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kratos_lite.mesh import Block, Mesh
+from kratos_lite.mesh import Block, Mesh, with_rows
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Numbers
 from kratos_lite.view.canvas import polygons
@@ -53,11 +53,10 @@ def facets_of(
         n = min(n, SHADES)  # as fine as shape and order in depth need
     parts = [_of_block(block, mesh, x, values, rows, plane, n) for block in faces]
     if plane is not None:
-        parts += [_of_cut(block, start, mesh, x, values, rows, plane) for block, start in _blocks(mesh)]
-    joined = Facets(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-    if not edged:
-        joined.edges = joined.edges[:0]
-    return joined
+        solids = [(b, at) for b, at in with_rows(mesh.blocks) if b.shape is not None and b.shape.faces]
+        parts += [_of_cut(block, at.start, mesh, x, values, rows, plane) for block, at in solids]
+    corners, light, value, edges = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Facets(corners, light, value, edges if edged else edges[:0])
 
 
 def _inside(block: Block, x: Array, rows: Array, window: tuple[Array, Array] | None) -> Block:
@@ -75,15 +74,6 @@ def fineness(count: int, most: int = MANY) -> tuple[int, bool]:
     return int(np.clip(np.sqrt(most / max(count, 1)), 1, FINEST)), count < MANY
 
 
-def _blocks(mesh: Mesh) -> list[tuple[Block, int]]:
-    starts = np.cumsum([0, *map(len, mesh.blocks)])
-    return [
-        (b, int(at))
-        for b, at in zip(mesh.blocks, starts, strict=False)
-        if b.shape is not None and b.shape.faces
-    ]
-
-
 def _of_block(
     block: Block, mesh: Mesh, x: Array, values: Array | None, rows: Array, plane: Plane | None, n: int
 ) -> tuple[Array, Array, Array, Array]:
@@ -94,10 +84,8 @@ def _of_block(
     P = np.einsum("pa,mad->mpd", N, x[block.nodes])[:, corners].reshape(-1, 4, 3)
     normal = _normals(P)
     front = normal @ rows[2] > EDGE_ON
-    light, value = (
-        _light(normal[front]),
-        _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front],
-    )
+    light = _light(normal[front])
+    value = _values(block.nodes, block.ids, mesh, values, N[corners].mean(axis=1))[front]
     facing = front.reshape(len(block), len(corners)).any(axis=1)
     N_rim = block.shape.N(rim(block.shape, n))
     E = np.einsum("spa,mad->mspd", N_rim, x[block.nodes[facing]]).reshape(-1, 2, 3)
@@ -208,8 +196,9 @@ def _sharp(mesh: Mesh) -> tuple[Ints, Array]:
             straight = len(block.shape.nodes) == block.shape.corners
             middles.append(X[:, list(edge)].mean(axis=1) if straight else X[:, number])
             normals.append(normal)
-    found = np.unique(np.vstack(pairs), axis=0, return_index=True, return_inverse=True, return_counts=True)
-    unique, first, which, counts = found
+    unique, first, which, counts = np.unique(
+        np.vstack(pairs), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
     mean = np.zeros((len(unique), 3))
     np.add.at(mean, which.ravel(), np.vstack(normals))
     # Two unit normals at an angle a add up to a length of 2 cos(a/2).

@@ -156,13 +156,13 @@ def _zoomed(scene: Scene, zoom: Any) -> tuple[Array, Array]:
     if isinstance(zoom, (float, int)):
         middle, half = (low + high) / 2, (high - low) / 2 / zoom
         return middle - half, middle + half
-    found = []
+    chosen_points = []
     for subject in scene.subjects:
         if isinstance(zoom, str):
             chosen = scene.place(subject)[subject.mesh.nodes(zoom)]
         else:
             chosen = box_corners(*np.asarray(zoom, dtype=float))
-        found.append(chosen @ scene.rows[:2].T)
-    low, high = window_of(np.concatenate(found))
+        chosen_points.append(chosen @ scene.rows[:2].T)
+    low, high = window_of(np.concatenate(chosen_points))
     margin = 0.05 * (high - low).max()
     return low - margin, high + margin
