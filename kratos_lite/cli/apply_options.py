@@ -73,7 +73,7 @@ def case_of(options: Namespace) -> Case:
         if options.tolerance is not None:
             case.tolerance = options.tolerance
         if options.error is not None:
-            case.error = share(options.error, "--error")
+            case.error = fraction_of(options.error, "--error")
     else:
         refuse(options, OF_MODELS, f"is for models; {options.input} describes a body")
     case.time = _time(options, case.time)
@@ -85,10 +85,10 @@ def case_of(options: Namespace) -> Case:
     return case
 
 
-def share(text: str, what: str) -> float:
-    """Return a share between 0 and 1, given as one or in percent.
+def fraction_of(text: str, what: str) -> float:
+    """Return a fraction between 0 and 1, of a number or of percents.
 
-    >>> share("2.5%", "--error"), share("0.01", "--error")
+    >>> fraction_of("2.5%", "--error"), fraction_of("0.01", "--error")
     (0.025, 0.01)
     """
     word = text.strip()
@@ -97,7 +97,7 @@ def share(text: str, what: str) -> float:
     except InputError:
         fraction = 0.0
     if not 0 < fraction < 1:
-        raise InputError(f"{what} must be a share between 0 and 1, such as 1% or 0.01; got {text!r}")
+        raise InputError(f"{what} must be a fraction between 0 and 1, such as 1% or 0.01; got {text!r}")
     return fraction
 
 

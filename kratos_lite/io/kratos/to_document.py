@@ -38,7 +38,7 @@ def document_from(model: Model) -> Document:
     }
     for what, is_present in unwritten.items():
         if is_present:
-            raise InputError(f"{what} cannot be written to a file of a model; leave it to the run file")
+            raise InputError(f"{what} cannot be written to a file of a model; leave it to a script")
     mesh, start = model.mesh, _initial_displacement(model)
     gravity, others = _split_loads(model)
     numbers, properties = _properties(model, gravity)
