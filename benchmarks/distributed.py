@@ -58,6 +58,7 @@ def jobs(kind: str, n: int) -> list[Row]:
         {"engine": "own", "ranks": 1, "cells": cube, "threads": 1},
         {"engine": "own", "ranks": 1, "cells": cube, "threads": MOST_RANKS},
         *({"engine": "petsc", "ranks": ranks, "cells": cube} for ranks in range(1, MOST_RANKS + 1)),
+        {"engine": "whole", "ranks": MOST_RANKS, "cells": cube},
         {"engine": "petsc", "ranks": MOST_RANKS, "cells": twice},
     ]
     if n**3 * (8 if kind == "27N" else 1) <= PLAIN_LIMIT:
@@ -127,7 +128,7 @@ def summary(answers: Sequence[Row]) -> Row:
 
 def text_file(kind: str, n: int) -> Row:
     """Return the size of an .mdpa file of the block, its places with all digits, and the unknowns."""
-    model = model_of({"engine": "own", "kind": kind, "cells": [n, n, n]}, None)
+    model, _ = model_of({"engine": "own", "kind": kind, "cells": [n, n, n]})
     shift = np.random.default_rng(0).uniform(0.0, 1e-6, model.mesh.points.shape)
     model = kl.Model(model.mesh.replace(points=model.mesh.points + shift), LAW)
     with tempfile.TemporaryDirectory(prefix="kratos_lite_bench_") as name:

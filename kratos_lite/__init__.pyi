@@ -19,6 +19,7 @@ from kratos_lite.analysis.matrices import LocalSystem as LocalSystem
 from kratos_lite.analysis.matrices import Matrices as Matrices
 from kratos_lite.analysis.modal import critical_rate as critical_rate
 from kratos_lite.analysis.model import Model as Model
+from kratos_lite.analysis.part_analysis import solve_part as solve_part
 from kratos_lite.analysis.plot import animate as animate
 from kratos_lite.analysis.plot import plot as plot
 from kratos_lite.analysis.point_values import PointValues as PointValues
@@ -36,10 +37,10 @@ from kratos_lite.bodies import Body as Body
 from kratos_lite.bodies import Callback as Callback
 from kratos_lite.bodies import FiniteElementBody as FiniteElementBody
 from kratos_lite.bodies import FixDirection as FixDirection
+from kratos_lite.bodies import FixedBody as FixedBody
 from kratos_lite.bodies import FixPoint as FixPoint
 from kratos_lite.bodies import FollowerPressure as FollowerPressure
 from kratos_lite.bodies import Force as Force
-from kratos_lite.bodies import Obstacle as Obstacle
 from kratos_lite.bodies import PrescribedAcceleration as PrescribedAcceleration
 from kratos_lite.bodies import PrescribedDisplacement as PrescribedDisplacement
 from kratos_lite.bodies import PrescribedVelocity as PrescribedVelocity
@@ -51,7 +52,6 @@ from kratos_lite.bodies import TimeSeries as TimeSeries
 from kratos_lite.bodies import Torque as Torque
 from kratos_lite.bodies import convert as convert
 from kratos_lite.bodies import find_equilibrium as find_equilibrium
-from kratos_lite.distributed.box import box as box
 from kratos_lite.elements import ELEMENTS as ELEMENTS
 from kratos_lite.elements import KinematicLinear as KinematicLinear
 from kratos_lite.elements.b_bar_3d8n import BBar3D8N as BBar3D8N
@@ -96,6 +96,7 @@ from kratos_lite.mesh import Block as Block
 from kratos_lite.mesh import Mesh as Mesh
 from kratos_lite.mesh import Part as Part
 from kratos_lite.mesh.generators import annulus as annulus
+from kratos_lite.mesh.generators import box as box
 from kratos_lite.model.loads import TimeDependentLoad as TimeDependentLoad
 from kratos_lite.model.loads.body import BodyForce as BodyForce
 from kratos_lite.model.loads.body import Gravity as Gravity

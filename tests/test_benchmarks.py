@@ -351,7 +351,7 @@ def test_page_of_scaling_has_efficiencies_goals_and_a_plan():
 @needs_mpi
 def test_engines_over_ranks_solve_the_same_block(capsys):
     found = distributed.run(None, None, [3], 1, 300.0)
-    assert [row.get("failed") for row in found["rows"]] == [None] * 14
+    assert [row.get("failed") for row in found["rows"]] == [None] * 16
     for row in found["rows"]:
         assert row.get("difference", 0.0) < 1e-8
         assert row["imports"] > 0

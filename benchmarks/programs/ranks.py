@@ -1,7 +1,8 @@
 """The clamped block over several ranks: ``mpirun -n P python -m benchmarks.programs.ranks job.json``.
 
-The job names the engine: ``own`` (one process), ``petsc``, or ``plain``: PETSc's GAMG with what its manual
-advises for elasticity, fed by an assembly in NumPy of all own rows, one batch of all elements and one sort.
+The job names the engine: ``own`` (one process), ``petsc`` (each rank makes its part of the mesh), ``whole``
+(rank 0 has the mesh, all ranks assemble and solve), or ``plain``: PETSc's GAMG with what its manual advises
+for elasticity, fed by an assembly in NumPy of all own rows, one batch of all elements and one sort.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any
 import numpy as np
 
 import kratos_lite as kl
+from kratos_lite.distributed.communicator import ALONE, world
+from kratos_lite.distributed.communicator import start as start_ranks
 from kratos_lite.typing import Array
 
 OPTIONS = {
@@ -36,23 +39,32 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-def model_of(job: dict[str, Any], comm: Any) -> kl.Model:
-    """Return the block, of which each rank makes its share."""
-    cells = tuple(job["cells"])
-    shared = {} if job["engine"] == "own" else {"comm": comm}
-    size = tuple(cells_here / cells[-1] for cells_here in cells)
-    model = kl.Model(kl.box(size, cells, element=f"KinematicLinear3D{job['kind']}", **shared), LAW)
+def model_of(job: dict[str, Any]) -> tuple[kl.Model, Any]:
+    """Return the block, or the part of it that this rank makes, and how the parts hang together."""
+    cells, partition = tuple(job["cells"]), None
+    given = tuple(here / cells[-1] for here in cells), cells, f"KinematicLinear3D{job['kind']}"
+    if job["engine"] in ("own", "whole"):
+        mesh = kl.box(*given)
+    else:
+        from kratos_lite.distributed.box import box
+
+        mesh, partition = box(*given)
+    model = kl.Model(mesh, LAW)
     model.fix("z-")
     model.add(kl.Gravity(GRAVITY))
-    return model
+    return model, partition
 
 
 # ---- our engines -----------------------------------------------------------------------------------
 
 
-def solved(model: kl.Model, job: dict[str, Any]) -> tuple[Array, Array, dict[str, Any]]:
+def solved(model: kl.Model, partition: Any, job: dict[str, Any]) -> tuple[Array, Array, dict[str, Any]]:
     """Return displacements and loads (n, 3), and what the report of our engine says."""
-    result = model.solve(engine=job["engine"], tolerance=job["tolerance"], petsc=job.get("petsc"))
+    how = {"tolerance": job["tolerance"], "petsc": job.get("petsc")}
+    if partition is None:
+        result = model.solve(engine="own" if job["engine"] == "own" else "petsc", **how)
+    else:
+        result = kl.solve_part(model, partition, **how)
     said = result.report
     found = {"phases": dict(said.seconds), "iterations": said.iterations, "solver": said.solver}
     if job.get("write"):
@@ -65,17 +77,17 @@ def solved(model: kl.Model, job: dict[str, Any]) -> tuple[Array, Array, dict[str
 # ---- PETSc fed by a plain assembly -----------------------------------------------------------------
 
 
-def plain(model: kl.Model, job: dict[str, Any]) -> tuple[Array, Array, dict[str, Any]]:
+def plain(model: kl.Model, partition: Any, job: dict[str, Any]) -> tuple[Array, Array, dict[str, Any]]:
     """Return displacements and loads (n, 3) of own nodes, and phases."""
     from petsc4py import PETSc
 
-    mesh = model.mesh
-    assert mesh.subdomain is not None
-    numbers, mine = mesh.subdomain.numbers, mesh.own_nodes
-    start = perf_counter()
-    K, f = assembled(mesh, mine, numbers)
-    n, n_all = int(mine.sum()), mesh.subdomain.n_all
-    fixed = np.repeat(mesh.points[:, 2] == 0.0, 3).reshape(-1, 3)
+    mesh, start = model.mesh, perf_counter()
+    part = partition.equations(mesh.points, model.element_groups(), np.zeros(mesh.points.shape, dtype=bool))
+    numbers, mine = part.number, np.zeros(len(part.points), dtype=bool)
+    mine[part.own] = True
+    n, n_all = len(part.own), int(partition.offsets[-1])
+    K, f = assembled(part, mine, numbers, n_all)
+    fixed = np.repeat(part.points[:, 2] == 0.0, 3).reshape(-1, 3)
     A = PETSc.Mat().createAIJ(
         size=((3 * n, 3 * n_all), (3 * n, 3 * n_all)), bsize=3, csr=(K.indptr, K.indices, K.data)
     )
@@ -83,7 +95,7 @@ def plain(model: kl.Model, job: dict[str, Any]) -> tuple[Array, Array, dict[str,
     b, x = A.createVecLeft(), A.createVecLeft()
     b.setArray(f[mine].ravel())
     place = A.createVecLeft()
-    place.setArray(mesh.points[mine].ravel())
+    place.setArray(part.points[mine].ravel())
     place.setBlockSize(3)
     held = (3 * numbers[mine][:, None] + np.arange(3))[fixed[mine]].astype(PETSc.IntType)
     A.zeroRowsColumns(held, diag=1.0, x=x, b=b)
@@ -102,18 +114,17 @@ def plain(model: kl.Model, job: dict[str, Any]) -> tuple[Array, Array, dict[str,
     set_up = perf_counter() - start
     ksp.solve(b, x)
     u = np.zeros(mesh.points.shape)
-    u[mine] = x.getArray().reshape(-1, 3)
+    u[part.own] = x.getArray().reshape(-1, 3)
     found = {"phases": {"assemble": assemble, "solve": perf_counter() - start}, "set_up": set_up}
-    return u, f, found | {"iterations": ksp.getIterationNumber(), "solver": "cg + gamg"}
+    return u, f[: mesh.n_nodes], found | {"iterations": ksp.getIterationNumber(), "solver": "cg + gamg"}
 
 
-def assembled(mesh: kl.Mesh, mine: Array, numbers: Array) -> tuple[Any, Array]:
+def assembled(part: Any, mine: Array, numbers: Array, n_all: int) -> tuple[Any, Array]:
     """Return the rows of K of own nodes with columns by global numbers, and the loads (n, 3)."""
     from scipy.sparse import coo_matrix
 
-    (block,) = mesh.blocks
-    element = kl.ELEMENTS[block.name]
-    nodes, X = block.nodes, mesh.points[block.nodes]
+    (group,) = part.groups
+    element, nodes, X = group.element, group.nodes, part.points[group.nodes]
     k = nodes.shape[1]
     K, volumes = np.zeros((len(nodes), 3 * k, 3 * k)), np.zeros((len(nodes), k))
     for place, weight in zip(element.rule.points, element.rule.weights, strict=True):
@@ -135,9 +146,9 @@ def assembled(mesh: kl.Mesh, mine: Array, numbers: Array) -> tuple[Any, Array]:
     at = np.broadcast_to(rows[:, :, None], K.shape).ravel()
     own = at >= 0
     columns = np.broadcast_to(dofs[:, None, :], K.shape).ravel()
-    shape = 3 * int(mine.sum()), 3 * int(mesh.subdomain.n_all)  # type: ignore[union-attr]
+    shape = 3 * int(mine.sum()), 3 * n_all
     whole = coo_matrix((K.ravel()[own], (at[own], columns[own])), shape=shape).tocsr()
-    f = np.zeros((mesh.n_nodes, 3))
+    f = np.zeros(part.points.shape)
     np.add.at(f, nodes, LAW.density * volumes[..., None] * np.array(GRAVITY))
     return whole, f
 
@@ -147,29 +158,46 @@ def assembled(mesh: kl.Mesh, mine: Array, numbers: Array) -> tuple[Any, Array]:
 
 def work(job: dict[str, Any]) -> None:
     """Do the job and write its answer from rank 0."""
-    from mpi4py import MPI
+    if job["engine"] == "own":
+        _answer(job, ALONE)
+        return
+    if job["engine"] == "whole":
+        import_what_is_needed(job)
+        _answer(job, start_ranks())
+    else:
+        _answer(job, world())
 
-    comm = MPI.COMM_WORLD
+
+def _answer(job: dict[str, Any], ranks: Any) -> None:
     import_what_is_needed(job)
-    before, start = peak(), perf_counter()
-    comm.Barrier()
-    model = model_of(job, comm)
-    mesh = perf_counter() - start
-    comm.Barrier()
+    all_ranks = job["engine"] != "whole"  # what rank 0 alone runs asks the others by a task
+    before = _peaks(ranks) if all_ranks else ranks.run(_peaks)
     start = perf_counter()
-    u, loads, found = (plain if job["engine"] == "plain" else solved)(model, job)
-    comm.Barrier()
+    model, partition = model_of(job)
+    mesh, start = perf_counter() - start, perf_counter()
+    u, loads, found = (plain if job["engine"] == "plain" else solved)(model, partition, job)
     seconds = perf_counter() - start - found.get("write", 0.0)
-    memory, imports = comm.gather(peak() - before), comm.gather(before)
-    own = model.mesh.own_nodes
-    work = comm.allreduce(float((loads * u)[own].sum()))
-    largest = comm.allreduce(np.abs(u[own]).max(initial=0.0), MPI.MAX)
-    unknowns = comm.allreduce(3 * int((own & (model.mesh.points[:, 2] > 0)).sum()))
-    answer = found | {"unknowns": unknowns, "mesh": mesh, "seconds": seconds, "work": work}
-    answer |= {"largest": float(largest), "ranks": comm.size}
-    if comm.rank == 0:
-        answer |= {"memory": memory, "imports": imports, "versions": versions()}
-        Path(job["answer"]).write_text(json.dumps(answer))
+    after = _peaks(ranks) if all_ranks else ranks.run(_peaks)
+    own = np.ones(model.mesh.n_nodes, dtype=bool) if partition is None else partition.own
+    values = {
+        "work": float((loads * u)[own].sum()),
+        "largest": float(np.abs(u[own]).max(initial=0.0)),
+        "unknowns": 3 * int((own & (model.mesh.points[:, 2] > 0)).sum()),
+        "mesh": mesh,
+        "seconds": seconds,
+    }
+    if all_ranks:
+        for name, total in (("work", ranks.sum), ("largest", ranks.max), ("unknowns", ranks.sum)):
+            values[name] = total(values[name])
+    if ranks.rank == 0:
+        memory = [int(b - a) for a, b in zip(before, after, strict=True)]
+        values |= {"memory": memory, "imports": before, "ranks": ranks.size, "versions": versions()}
+        Path(job["answer"]).write_text(json.dumps(found | values))
+
+
+def _peaks(ranks: Any) -> list[int]:
+    found: list[int] = ranks.gather(peak())
+    return found
 
 
 def import_what_is_needed(job: dict[str, Any]) -> None:

@@ -151,13 +151,6 @@ class Motion(Attachment):
         Returns
         -------
         (n,) bool.
-
-        Raises
-        ------
-        MeshError
-            There is no such part.
-        ModelError
-            The part shares nodes with elements at rest.
         """
         return moving_nodes(mesh, self.part)
 
@@ -189,12 +182,7 @@ class Motion(Attachment):
 
     @abstractmethod
     def wave_directions(self) -> Array:
-        """Return the directions of the waves that matter.
-
-        Returns
-        -------
-        (k, 3) unit vectors.
-        """
+        """Return the directions (k, 3) of the waves that matter."""
 
     @abstractmethod
     def critical_rate(self, wave_speed: float, points: Array) -> float:
@@ -296,11 +284,6 @@ class Motion(Attachment):
         Returns
         -------
         One sentence each.
-
-        Raises
-        ------
-        ModelError
-            The center moves, but constraints tie the body to what rests.
         """
         share = self.leak(structure.mesh)
         found = [f"{share:.1%} of the velocity passes {self.leak_cure}"] if share > LEAK else []

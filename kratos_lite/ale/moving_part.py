@@ -16,11 +16,7 @@ ALONG = 1e-6
 
 
 def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
-    """Return the nodes (n,) of the elements of a part, which shares none with other elements.
-
-    Where they shared a node, c·n ≠ 0 would let material flow into material at rest; with c·n = 0 the two
-    would slide along one another, but share their tangential displacement, which is friction without a law.
-    """
+    """Return the nodes (n,) of the elements of a part; ModelError if it shares one with other elements."""
     if part is None:
         return mesh.used_nodes()
     mine = np.zeros(mesh.n_elements, dtype=bool)
@@ -44,15 +40,7 @@ def moving_nodes(mesh: Mesh, part: WhereElements) -> Mask:
 def check_ties(
     structure: Structure, moving: Mask, field: Callable[[Array], Array], travels: bool
 ) -> list[str]:
-    """Return a warning if constraints join moving material to other material along its flow.
-
-    The force of a constraint on a node is parallel to the weights that it gives to the node's components.
-
-    Raises
-    ------
-    ModelError
-        The moving body travels, but is tied to what rests.
-    """
+    """Return a warning of ties of moving to other material along its flow; ModelError if it travels."""
     glued = []
     for constraint in structure.supports.constraints:
         dofs = np.array([constraint.slave, *constraint.masters])

@@ -15,11 +15,7 @@ UNEVEN = 1e-2
 
 
 def check_materials(terms: MotionMatrices) -> None:
-    """Raise ModelError if density or stiffness is not spread evenly about the axis, or along the frame.
-
-    For n = 1 … 12 the integrals of ρ r² e^{i n φ} must be those of the mean density, which are 0 but for the
-    quadrature of the mesh, and so those of measures of C.  One material alone is even where the boundary is.
-    """
+    """Raise ModelError if density or stiffness is not spread evenly about the axis, or along the frame."""
     if len({id(group.material) for group in terms.groups}) < 2:
         return
     volume, *found = _harmonics(terms)
@@ -34,10 +30,7 @@ def check_materials(terms: MotionMatrices) -> None:
 
 
 def _harmonics(terms: MotionMatrices) -> NDArray[np.complex128]:
-    """Return the integrals (5, 13) of 1, density and measures of C times r² e^{i n φ}, n = 0 … 12.
-
-    C is measured by two invariants, and where its axes do not turn by all of its components.
-    """
+    """Return the integrals (5, 13) of 1, density and measures of C times r² e^{i n φ}, n = 0 … 12."""
     found = np.zeros((5, HARMONICS + 1), dtype=complex)
     for group in terms.groups:
         C = group.material.C

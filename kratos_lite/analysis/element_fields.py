@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kratos_lite import voigt
-from kratos_lite.assembly.element_groups import ElementGroup, Kinds, group_of_element
+from kratos_lite.assembly.element_groups import ElementGroup, group_of_element
 from kratos_lite.assembly.gauss_point_fields import at_gauss, in_order, totals
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh
@@ -32,7 +32,6 @@ class ElementFields:
     groups : the elements with their materials.
     u : (n, 3) displacements in m.
     u0 : (n, 3) displacements in m without stress; none if not given.
-    kinds : of the elements of all ranks, where these share the mesh; `Structure.kinds` finds them.
     """
 
     def __init__(
@@ -41,13 +40,9 @@ class ElementFields:
         groups: Sequence[ElementGroup],
         u: Array,
         u0: Array | None = None,
-        kinds: Kinds | None = None,
     ) -> None:
         self.mesh = mesh
         self.groups = list(groups)
-        if kinds is None and mesh.subdomain is not None:
-            raise InputError("fields of a mesh that ranks share need kinds=model.kinds(groups)")
-        self.kinds = self.groups if kinds is None else kinds
         self.u = u
         u.setflags(write=False)  # strains and stresses are made of it later
         self._strained = u if u0 is None else u - u0
@@ -98,10 +93,6 @@ class ElementFields:
 
     @cached_property
     def _recovery(self) -> Recovery:
-        if self.mesh.ranks.size > 1:
-            from kratos_lite.distributed.recovery import SharedRecovery  # as for the recovery
-
-            return SharedRecovery(self.mesh, self.groups, self.kinds)
         from kratos_lite.assembly.recovery import Recovery  # a quick start for results
 
         return Recovery(self.mesh, self.groups)
@@ -111,8 +102,7 @@ class ElementFields:
         from kratos_lite.assembly.nodal_values import averages  # as for the recovery
 
         mesh = self.mesh
-        means, nodal = averages(mesh.points, self.groups, self._strained, mesh.n_elements, stress=stress)
-        return means, nodal if mesh.subdomain is None else mesh.subdomain.fetch(nodal)
+        return averages(mesh.points, self.groups, self._strained, mesh.n_elements, stress=stress)
 
     def strain(self, at: str = "gauss") -> Any:
         """Return strains in Voigt order xx yy zz xy yz zx, with engineering shear.
@@ -335,28 +325,14 @@ class ElementFields:
     @cached_property
     def _totals(self) -> tuple[float, float, int]:
         """Strain energy in J, largest von Mises stress at a Gauss point in Pa, row of its element."""
-        if self.mesh.subdomain is not None:
-            return self._totals_over_ranks()
         return totals(self.mesh.points, self.groups, self._strained)
-
-    def _totals_over_ranks(self) -> tuple[float, float, int]:
-        """Return the same of the own elements of all ranks; the row is -1 where another one has it."""
-        mesh, own = self.mesh, self.mesh.own_elements
-        groups = [group.take(own[group.rows]) for group in self.groups if own[group.rows].any()]
-        energy, largest, row = totals(mesh.points, groups, self._strained)
-        most = mesh.ranks.max(largest)
-        chosen = np.zeros(mesh.n_elements, dtype=bool)
-        chosen[[row] if largest == most and groups else []] = True
-        first = mesh.first_element(chosen)
-        return mesh.ranks.sum(energy), most, -1 if first is None else first
 
     def totals(self) -> tuple[float, float, int]:
         """Return what one pass over the elements gives.
 
         Returns
         -------
-        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element: of
-        those of all ranks, -1 where another one has it.
+        Strain energy in J, largest von Mises stress at a Gauss point in Pa, and the row of its element.
         """
         return self._totals
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from kratos_lite.ale import Motion, MotionMatrices
 from kratos_lite.ale.rotational_symmetry import check_materials
-from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.time_dependent_loads import AppliedLoads, PrescribedDisplacement
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.errors import InputError, ModelError
@@ -19,6 +18,7 @@ from kratos_lite.model.structure import Structure
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.linear_solver import LinearSolver
 from kratos_lite.solvers.mass import Mass
+from kratos_lite.solvers.plan import Plan, repeated
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import finite
 
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 Solve: TypeAlias = Callable[[Array, Array], Array]
 """Takes nodal forces and prescribed displacements (3a,), returns displacements (3a,)."""
-
-DIRECT_MAX = 30_000
-"""Up to this many unknowns matrices are factorized, as they are needed many times."""
 
 
 class EquationsOfMotion:
@@ -69,7 +66,6 @@ class EquationsOfMotion:
         massless: bool = False,
         progress: Progress | None = None,
     ) -> None:
-        check_whole(model.mesh, "what moves, modes and matrices")
         self.model, self._steady = model, steady
         self.step = 0.0
         self.rayleigh = _checked_rayleigh(rayleigh)
@@ -190,7 +186,7 @@ class EquationsOfMotion:
         cure = "let it turn about a principal axis through its center of mass"
         self.free_motions.check([load], moving=True, cure=cure)
         held = system.reduced.holding(self.free_motions.held[system.nodes])
-        equations = LinearSolver(self.K, held, system.points, "direct", "")
+        equations = LinearSolver(self.K, held, system.points, Plan("direct"))
         u0 = equations.solve(system.gather(load), 1e-12, system.progress, np.zeros_like(held.c)).x
         return self.terms.stiffening(u0.reshape(-1, 3))
 
@@ -279,9 +275,8 @@ class EquationsOfMotion:
 
     def _solver(self, A: BlockMatrix, symmetric: bool) -> Solve:
         reduced = self.system.reduced
-        iterate = symmetric and len(reduced.free) > DIRECT_MAX
-        method = "amg" if iterate else "direct"
-        equations = LinearSolver(A, reduced, self.system.points, method, "", symmetric=symmetric)
+        plan = repeated("auto", len(reduced.free), symmetric)
+        equations = LinearSolver(A, reduced, self.system.points, plan, symmetric=symmetric)
         return lambda f, prescribed: equations.solve(f, 1e-13, self.system.progress, prescribed).x
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, Kind, Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
 from kratos_lite.mesh import Mesh
-from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.locking import better_element
 from kratos_lite.typing import Array
 
@@ -54,7 +54,9 @@ WORST = 3
 """Least number of elements of that hundredth; meshes of less than twenty times as many have none."""
 
 
-def energy_error(recovered: Array, averaged: Array, energy: float, kinds: Kinds, mesh: Mesh) -> ErrorEstimate:
+def energy_error(
+    recovered: Array, averaged: Array, energy: float, groups: Sequence[ElementGroup], mesh: Mesh
+) -> ErrorEstimate:
     """Return the estimate of squared differences to recovered and to averaged stresses.
 
     Both underestimate the error near singular points and in coarse meshes; the recovered ones, polynomials of
@@ -63,30 +65,29 @@ def energy_error(recovered: Array, averaged: Array, energy: float, kinds: Kinds,
 
     Parameters
     ----------
-    recovered, averaged : (m,) squared energy norms of the differences in each element, J; of the elements of
-        other ranks 0.
+    recovered, averaged : (m,) squared energy norms of the differences in each element, J.
     energy : ‖u_h‖² of the solution in J, twice its strain energy.
-    kinds : of the elements, whose class and material may speak against trusting the estimate.
+    groups : the elements, whose class and material may speak against trusting the estimate.
     mesh : the elements.
     """
     squares = {"recovery": recovered, "averaging": averaged}
-    sums = {name: mesh.ranks.sum(float(values.sum())) for name, values in squares.items()}
+    sums = {name: float(values.sum()) for name, values in squares.items()}
     method = min(SAFETY, key=lambda name: SAFETY[name] ** 2 * sums[name])
     per_element = SAFETY[method] * np.sqrt(squares[method])
     absolute = SAFETY[method] * float(np.sqrt(sums[method]))
     size = energy + sums[method]
     relative = absolute / size**0.5 if size > 0 else 0.0
     is_coarse = sums["recovery"] > COARSE**2 * sums["averaging"]
-    warnings = _warnings(recovered, is_coarse, kinds, mesh) if relative > NEGLIGIBLE else []
-    if mesh.totals.counts["elements"] == 1 and energy > 0 and not warnings:
+    warnings = _warnings(recovered, is_coarse, groups, mesh) if relative > NEGLIGIBLE else []
+    if mesh.n_elements == 1 and energy > 0 and not warnings:
         warnings = ["one element has no neighbors that could show its error"]
     return ErrorEstimate(absolute, relative, per_element, method, warnings, SAFETY[method])
 
 
-def _warnings(recovered: Array, is_coarse: bool, kinds: Kinds, mesh: Mesh) -> list[str]:
+def _warnings(recovered: Array, is_coarse: bool, groups: Sequence[ElementGroup], mesh: Mesh) -> list[str]:
     """Return what speaks against trusting an estimate."""
-    warnings, count = [], mesh.totals.counts["elements"]
-    plain = sorted({kind.element.__name__: kind.element for kind in kinds if _locks(kind)}.items())
+    warnings, count = [], mesh.n_elements
+    plain = sorted({group.element.__name__: group.element for group in groups if _locks(group)}.items())
     locked = {name: better_element(element, "BBar") for name, element in plain}
     if locked:
         warnings.append(
@@ -100,9 +101,8 @@ def _warnings(recovered: Array, is_coarse: bool, kinds: Kinds, mesh: Mesh) -> li
         )
     if count < FEW:
         warnings.append(f"{count} elements are too few to estimate their error by one another")
-    elif in_few_elements(recovered, count, mesh.ranks):
-        most = mesh.first_element(recovered == mesh.ranks.max(float(recovered.max(initial=0.0))))
-        element = mesh.ranks.first(None if most is None else int(mesh.element_ids[most]))
+    elif in_few_elements(recovered, count):
+        element = mesh.element_ids[int(recovered.argmax())]
         warnings.append(
             f"a large share of the error lies in few elements, most in element {element}: near a re-entrant "
             "corner, the edge of a support or a concentrated load stresses have no limit"
@@ -110,19 +110,15 @@ def _warnings(recovered: Array, is_coarse: bool, kinds: Kinds, mesh: Mesh) -> li
     return warnings
 
 
-def in_few_elements(shares: Array, count: int, ranks: Alone = ALONE) -> bool:
+def in_few_elements(shares: Array, count: int) -> bool:
     """Return whether the hundredth of `count` elements with the largest shares holds much of their sum."""
     if count < 20 * WORST:
         return False
     few = max(WORST, count // 100)
-    largest = np.concatenate(
-        ranks.gather(shares if len(shares) <= few else np.partition(shares, -few)[-few:])
-    )
-    total = ranks.sum(float(shares.sum()))
-    return float(np.partition(largest, -few)[-few:].sum()) > FOCUS * total
+    return float(np.partition(shares, -few)[-few:].sum()) > FOCUS * float(shares.sum())
 
 
-def _locks(group: ElementGroup | Kind) -> bool:
+def _locks(group: ElementGroup) -> bool:
     """Return whether a plain element has a nearly incompressible material; jumps of pressure show in 10N."""
     shape = group.element.shape
     plain = group.element.formulation == "standard" and not (shape.cell == "tetrahedron" and shape.degree > 1)

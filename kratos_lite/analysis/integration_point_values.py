@@ -65,11 +65,7 @@ class GaussPoints:
     def energy_density(self) -> Array:
         """Return ½ ε:C:ε (m, g) in J/m³."""
         strain = self.strain()
-        if self.group.element.inherits("stress"):
-            elastic = self.group.stress(strain)
-        else:
-            elastic = self.stress() - self.group.initial_stress(slice(None))
-        return (strain * elastic).sum(axis=-1) / 2
+        return (strain * self.group.stress(strain)).sum(axis=-1) / 2
 
     def elasticity(self) -> Array:
         """Return C (m, g, 6, 6) in Pa of the material."""
@@ -97,7 +93,7 @@ class GaussPoints:
 
     def B(self) -> Array:
         """Return B (m, g, 6, 3k) in 1/m."""
-        return self.element._B(self.group.material.C)
+        return self.element._operator(self.group.material.C)
 
 
 QUANTITIES: dict[str, Callable[[GaussPoints], Array]] = {

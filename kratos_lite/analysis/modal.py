@@ -13,7 +13,8 @@ from kratos_lite.errors import InputError
 from kratos_lite.model.structure import Structure
 from kratos_lite.solvers import direct
 from kratos_lite.solvers.constraint_map import rigid_modes
-from kratos_lite.solvers.eigen import DENSE_MODES, modes
+from kratos_lite.solvers.eigen import modes
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.solvers.quadratic_eigen import Pencil, neutral_motions
 from kratos_lite.typing import Array, Complexes, Progress
 from kratos_lite.validation import whole_number

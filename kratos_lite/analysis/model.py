@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kratos_lite.analysis.engines import check_own, check_whole
+from kratos_lite.analysis.engines import check_own
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.static import StaticAnalysis
 from kratos_lite.errors import InputError
@@ -83,7 +83,7 @@ class Model(Structure):
             as `Result.error` estimates it, in place of the energy norm.  Relative to its value, which must
             not be 0.
         engine : ``own``, or ``petsc`` for statics by PETSc, which must be installed; if not given, that
-            which takes the mesh: PETSc where several ranks share it.
+            of one process.
         petsc : options of PETSc, which win over what is chosen: ``"-ksp_type cg -pc_type hypre"``.
 
         Returns
@@ -107,13 +107,13 @@ class Model(Structure):
             if error is not None:
                 from kratos_lite.analysis.adaptive import UNKNOWNS, solve_to  # a quick start without it
 
-                check_own(self.mesh, engine, petsc, "a requested error")
+                check_own(engine, petsc, "a requested error")
                 most = UNKNOWNS if most_unknowns is None else most_unknowns
                 return solve_to(self, error, solver, tolerance, shown, most, geometry, quantity)
             if self.motion is not None:
                 from kratos_lite.analysis.steady import solve_steady  # a quick start for statics
 
-                check_own(self.mesh, engine, petsc, "a motion of the material")
+                check_own(engine, petsc, "a motion of the material")
                 return solve_steady(self, solver, tolerance, shown)
             analysis = StaticAnalysis(self, solver, tolerance, shown, engine=engine, petsc=petsc)
             try:
@@ -136,8 +136,8 @@ class Model(Structure):
 
         Parameters
         ----------
-        solver, tolerance, progress, engine, petsc : as for `solve`.  What PETSc holds is let go of by
-            the analysis's ``release()``, on all ranks.
+        solver, tolerance, progress, engine, petsc : as for `solve`.  The analysis's
+            ``release()`` releases what PETSc holds.
 
         Returns
         -------
@@ -314,7 +314,6 @@ class Model(Structure):
         """
         from kratos_lite.analysis.plot import plot  # a quick start without it
 
-        check_whole(self.mesh, "a picture")
         return plot(self, path, **options)
 
     # ---- the equations themselves --------------------------------------------------------------

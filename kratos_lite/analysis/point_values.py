@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from kratos_lite import voigt
 from kratos_lite.analysis.columns import data_frame, stress_columns, vector_columns
 from kratos_lite.analysis.element_fields import ElementFields
@@ -44,26 +42,17 @@ class PointValues:
     @cached_property
     def displacement(self) -> Array:
         """Displacements N u (..., 3) in m."""
-        return self._of_all_ranks(self._located.interpolate(self._fields.u))
+        return self._located.interpolate(self._fields.u)
 
     @cached_property
     def strain(self) -> Array:
         """Strains B u (..., 6) in Voigt order xx yy zz xy yz zx, with engineering shear."""
-        return self._of_all_ranks(self._fields.at_located(self._located, stress=False))
+        return self._fields.at_located(self._located, stress=False)
 
     @cached_property
     def stress(self) -> Array:
         """Stresses (..., 6) in Pa in Voigt order xx yy zz xy yz zx."""
-        return self._of_all_ranks(self._fields.at_located(self._located, recovered=self._recovered))
-
-    def _of_all_ranks(self, values: Array) -> Array:
-        """Return values (..., k) at points, each from the first rank that holds its element."""
-        ranks = self._fields.mesh.ranks
-        if ranks.size == 1:
-            return values
-        holder = ranks.min(np.where(self._located.inside, ranks.rank, ranks.size))
-        found: Array = ranks.sum(np.where((holder == ranks.rank)[..., None], values, 0.0))
-        return found
+        return self._fields.at_located(self._located, recovered=self._recovered)
 
     @property
     def von_mises(self) -> Array:

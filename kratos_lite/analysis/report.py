@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
 from kratos_lite.native import described
 from kratos_lite.tabular import Tabular
@@ -157,12 +158,11 @@ class Report(Tabular):
         ]
 
 
-def element_counts(mesh: Mesh, kinds: Kinds, formulation: str) -> dict[str, int]:
+def element_counts(mesh: Mesh, groups: Sequence[ElementGroup], formulation: str) -> dict[str, int]:
     """Return the number of elements by names in the mesh, or by class where a formulation was chosen."""
     counts: dict[str, int] = {}
-    blocks = zip(mesh.blocks, mesh.totals.blocks["elements"], strict=True)
-    named = [(kind.element.__name__, len(kind)) for kind in kinds]
-    for name, count in named if formulation else [(block.name, n) for block, (n,) in blocks]:
+    named = [(group.element.__name__, len(group)) for group in groups]
+    for name, count in named if formulation else [(block.name, len(block)) for block in mesh.blocks]:
         counts[name] = counts.get(name, 0) + count
     return {name: count for name, count in counts.items() if count}
 

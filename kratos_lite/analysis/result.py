@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from kratos_lite.analysis.element_fields import ElementFields
-from kratos_lite.analysis.engines import check_whole
 from kratos_lite.analysis.report import Report, element_counts, vector
-from kratos_lite.assembly.element_groups import ElementGroup, Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.errors import InputError
 from kratos_lite.mesh import Mesh, Where
 from kratos_lite.tabular import Tabular
@@ -45,13 +44,6 @@ class Result(ElementFields, Tabular):
     report : what was solved, how, and how well.
     u0 : (n, 3) displacements in m without stress; none if not given.
     origin : what was solved, for bounds of the error and the errors of quantities.
-    kinds : of the elements of all ranks, where these share the mesh.
-
-    Notes
-    -----
-    Where ranks share the mesh, arrays are those of the nodes and elements of each, and of those around them.
-    What one rank asks for, all ask for: values at points, recovered stresses, estimates of the error, totals
-    and the table are found together, and are those of the whole mesh.
     """
 
     def __init__(
@@ -64,9 +56,8 @@ class Result(ElementFields, Tabular):
         report: Report,
         u0: Array | None = None,
         origin: Origin | None = None,
-        kinds: Kinds | None = None,
     ) -> None:
-        super().__init__(mesh, groups, u, u0, kinds)
+        super().__init__(mesh, groups, u, u0)
         self.reactions = reactions
         self.loads = loads
         for array in (reactions, loads):
@@ -249,7 +240,6 @@ class Result(ElementFields, Tabular):
         """
         if of is None:
             return self._error
-        check_whole(self.mesh, "the error of a quantity")
         if self._origin is None:
             raise InputError(
                 "the error of a quantity needs the model and the matrix of a static analysis; this result "
@@ -266,7 +256,7 @@ class Result(ElementFields, Tabular):
         from kratos_lite.analysis.error_estimate import energy_error  # as for the recovery
 
         squares = self._recovery.squared_errors(self._strained, self.mesh.n_elements)
-        return energy_error(*squares, 2 * self.energy(), self.kinds, self.mesh)
+        return energy_error(*squares, 2 * self.energy(), self.groups, self.mesh)
 
     def _stated_error(self) -> str:
         """Return the error for the table: the one that was asked for, which its meshes have corrected."""
@@ -318,7 +308,6 @@ class Result(ElementFields, Tabular):
         KratosLiteError
             PyVista is not installed.
         """
-        check_whole(self.mesh, "a grid of PyVista")
         from kratos_lite.analysis.fields import fields
         from kratos_lite.mesh.vtk import pyvista_grid
 
@@ -341,37 +330,31 @@ class Result(ElementFields, Tabular):
         """
         from kratos_lite.analysis.plot import plot  # a quick start for results
 
-        check_whole(self.mesh, "a picture")
         return plot(self, path, values=values, **options)
 
     # ---- out -----------------------------------------------------------------------------------
 
     def largest_displacement(self) -> tuple[float, int, Array]:
-        """Return the largest displacement of a node, of those of all ranks.
+        """Return the largest displacement of a node.
 
         Returns
         -------
         Its size in m, the id of the node, and the displacement (3,) in m.
         """
-        mesh = self.mesh
         length = np.linalg.norm(self.u, axis=1)
-        size = mesh.ranks.max(float(length.max(initial=0.0)))
-        node = mesh.first_node((length == size) & mesh.own_nodes)
-        found = None if node is None else (int(mesh.node_ids[node]), self.u[node])
-        return size, *mesh.ranks.first(found)
+        node = int(length.argmax())
+        return float(length[node]), int(self.mesh.node_ids[node]), self.u[node]
 
     def largest_von_mises(self) -> tuple[float, int, Array]:
-        """Return the largest von Mises stress at a Gauss point, of those of all ranks.
+        """Return the largest von Mises stress at a Gauss point.
 
         Returns
         -------
         In Pa, the id of its element, and the center (3,) of that in m.
         """
-        mesh, (_, mises, row), found = self.mesh, self._totals, None
-        if row >= 0:
-            (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
-            found = int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
-        return mises, *mesh.ranks.first(found)
+        mesh, (_, mises, row) = self.mesh, self._totals
+        (nodes,) = (group.nodes[group.rows == row] for group in self.groups if row in group.rows)
+        return mises, int(mesh.element_ids[row]), mesh.points[nodes[0]].mean(axis=0)
 
     def table(self) -> list[tuple[str, str]]:
         """Return the rows of the summary.
@@ -383,13 +366,12 @@ class Result(ElementFields, Tabular):
         mesh, report = self.mesh, self.report
         length, node, u = self.largest_displacement()
         mises, element, center = self.largest_von_mises()
-        kinds = element_counts(mesh, self.kinds, report.formulation)
-        own = mesh.own_nodes
-        forces = mesh.ranks.sum(float(np.abs(self.loads[own]).sum() + np.abs(self.reactions[own]).sum()))
+        counts = element_counts(mesh, self.groups, report.formulation)
+        forces = float(np.abs(self.loads).sum() + np.abs(self.reactions).sum())
         place = f"in element {element} around {vector(center)} m"
         return [
-            ("nodes", f"{mesh.totals.counts['nodes']}"),
-            ("elements", ", ".join(f"{count} {name}" for name, count in kinds.items())),
+            ("nodes", str(mesh.n_nodes)),
+            ("elements", ", ".join(f"{count} {name}" for name, count in counts.items())),
             *report.load_rows(forces),
             ("largest displacement", f"{length:.6e} m at node {node}, {vector(u)} m"),
             ("strain energy", f"{self.energy():.6e} J"),

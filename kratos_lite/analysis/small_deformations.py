@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.mesh import Mesh
-from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.checks import young_moduli
 from kratos_lite.model.structure import Structure
 from kratos_lite.registry import remembered
@@ -26,19 +26,18 @@ GOLDEN = (5**0.5 - 1) / 2
 UNITS = "is E in Pa (steel: 210e9), are lengths in m, forces in N and pressures in Pa?"
 
 
-def check_deformation(model: Structure, kinds: Kinds, u: Array) -> list[str]:
+def check_deformation(model: Structure, groups: Sequence[ElementGroup], u: Array) -> list[str]:
     """Warn of displacements u (n, 3) in m, or their strains, that are too large for linear theory.
 
     Those of a model without units, softer than everything there is, are whatever they are.
     """
     mesh, start, prescribed = model.mesh, model.initial_displacement, model.supports.values
-    ranks, moved = mesh.ranks, u if start is None else u - start
-    if not ranks.any(bool(moved.any())):
+    moved = u if start is None else u - start
+    if not moved.any():
         return []
-    strain, size = ranks.max(largest_elongation(mesh, moved)), _diagonal(mesh.points, ranks)
-    largest = _diagonal(moved, ranks)
+    strain, size, largest = largest_elongation(mesh, moved), _diagonal(mesh.points), _diagonal(moved)
     if largest > LARGE * size:  # nodes without elements stay, whatever the body does
-        largest = _diagonal(moved[mesh.used_nodes()], ranks)
+        largest = _diagonal(moved[mesh.used_nodes()])
     found = []
     if largest > LARGE * size:
         share = largest / size
@@ -46,10 +45,9 @@ def check_deformation(model: Structure, kinds: Kinds, u: Array) -> list[str]:
         found.append(f"displacements differ by {largest:.3g} m, {times} the size of the body")
     if strain > STRAINED:
         found.append(f"strains reach at least {strain:.0%}")
-    if not found or all(young_moduli(kind.material)[1] < UNITLESS for kind in kinds):
+    if not found or all(young_moduli(group.material)[1] < UNITLESS for group in groups):
         return []
-    given = ranks.any(bool(prescribed.any()))
-    meant = given and _diagonal(prescribed, ranks) > 0.5 * largest
+    meant = prescribed.any() and _diagonal(prescribed) > 0.5 * largest
     limits = f"linear theory holds up to about {LARGE:.0%} of the size and strains of {STRAINED:.0%}"
     return ["; ".join([", ".join(found), *([] if meant else [UNITS]), limits])]
 
@@ -86,8 +84,6 @@ def _spread(count: int, wanted: int) -> Ints:
     return (np.arange(wanted) * GOLDEN % 1 * count).astype(np.int64)
 
 
-def _diagonal(values: Array, ranks: Alone = ALONE) -> float:
+def _diagonal(values: Array) -> float:
     """Return the diagonal of the smallest box around vectors (n, 3)."""
-    low, high = values.min(axis=0, initial=np.inf), values.max(axis=0, initial=-np.inf)
-    sides = ranks.max(high) - ranks.min(low)
-    return float(np.linalg.norm(sides)) if (sides >= 0).all() else 0.0
+    return float(np.linalg.norm(np.ptp(values, axis=0))) if len(values) else 0.0

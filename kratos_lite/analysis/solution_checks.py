@@ -13,9 +13,10 @@ from kratos_lite.errors import InputError, SolveError
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import equilibrium
 from kratos_lite.model.structure import Structure
-from kratos_lite.solvers.linear_solver import Solution, choose
+from kratos_lite.solvers.linear_solver import Solution
+from kratos_lite.solvers.plan import METHODS
 from kratos_lite.typing import Array, Progress
-from kratos_lite.validation import function_or_none
+from kratos_lite.validation import choice, function_or_none
 
 
 class Phases:
@@ -44,7 +45,7 @@ def check_arguments(solver: str, tolerance: float) -> None:
     """Raise InputError for an unknown solver, or a tolerance beyond 0 … 1."""
     if isinstance(tolerance, bool) or not isinstance(tolerance, (float, int)) or not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a number between 0 and 1; got {tolerance!r}")
-    choose(solver, 0)
+    choice(solver, "solver", METHODS)
 
 
 def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
@@ -61,10 +62,9 @@ def quality(solution: Solution, balance: tuple[float, float]) -> dict[str, Any]:
 
 def initial_noise(model: Structure, norm: float, tolerance: float, forces: Array) -> float:
     """Return what rounding and the solver leave of the forces (n, 3) of an initial state, in N."""
-    ranks, u0 = model.mesh.ranks, model.initial_displacement
-    largest = ranks.max(0.0 if u0 is None else float(np.abs(u0).max(initial=0.0)))
-    size = ranks.sum(float((forces[model.mesh.own_nodes] ** 2).sum())) ** 0.5
-    return float(max(np.finfo(float).eps * norm * largest, tolerance * size))
+    u0 = model.initial_displacement
+    largest = 0.0 if u0 is None else float(np.abs(u0).max(initial=0.0))
+    return float(max(np.finfo(float).eps * norm * largest, tolerance * np.linalg.norm(forces)))
 
 
 def balance_of(
@@ -74,13 +74,9 @@ def balance_of(
 
     `forces` are `external` ones without those of the initial stress, `inner` those of the stresses, (n, 3).
     """
-    own = mesh.own_nodes
     # Without loads, each prescribed degree of freedom may hold nothing but the rounding of K u.
-    here = np.array([np.count_nonzero(values[own]) for values in (forces, reactions)])
-    loaded, held = mesh.ranks.sum(here).tolist()
-    points, external, reactions, inner = (values[own] for values in (mesh.points, external, reactions, inner))
-    rounding = (unknowns**0.5 if loaded else held) * noise
-    return equilibrium(points, external, reactions, inner, rounding, mesh.ranks)
+    rounding = (unknowns**0.5 if forces.any() else np.count_nonzero(reactions)) * noise
+    return equilibrium(mesh.points, external, reactions, inner, rounding)
 
 
 def judge(solution: Solution, u: Array, balance: tuple[float, float]) -> None:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from kratos_lite.analysis.engines import System, displacements, engine_of, release, system_of
-from kratos_lite.analysis.nodal_loads import external_loads, initial_loads, stress_load
+from kratos_lite.analysis.engines import System, engine_of, release, system_of
+from kratos_lite.analysis.nodal_loads import stress_load
 from kratos_lite.analysis.origin import Origin
+from kratos_lite.analysis.prepared import (
+    Equations,
+    LoadSet,
+    any_axis,
+    dirichlet_conditions,
+    load_set,
+    prepared,
+)
 from kratos_lite.analysis.report import Report
 from kratos_lite.analysis.result import Result
 from kratos_lite.analysis.small_deformations import check_deformation
@@ -33,17 +41,6 @@ from kratos_lite.validation import finite
 
 ADJOINT_TOLERANCE = 1e-5
 """Relative residual that is enough for the adjoint: its own error on the mesh is far larger."""
-
-
-@dataclass(eq=False)
-class LoadSet:
-    """Loads, their nodal forces (n, 3) in N without and with initial stress, and the parts that they move."""
-
-    loads: list[Load]
-    external: Array
-    forces: Array
-    moving: Mask
-    phase: Phases
 
 
 class StaticAnalysis:
@@ -82,17 +79,24 @@ class StaticAnalysis:
         petsc: str | None = None,
     ) -> None:
         check_arguments(solver, tolerance)
-        self.engine, self.petsc = engine_of(model.mesh, engine, petsc), petsc
+        self.engine, self.petsc = engine_of(engine, petsc), petsc
         if model.motion is not None:
             raise ModelError("a model with a motion is solved by model.solve() or moves by model.transient()")
         self.model, self.solver, self.tolerance = model, solver, tolerance
-        self.ranks = model.mesh.ranks
-        self.progress = progress if self.ranks.rank == 0 else None
-        self.system: System | None = None
-        self._solved = np.zeros(0, dtype=bool)  # parts in the equations
-        self._phase = Phases(self.progress)
-        with self.ranks.together():
-            self._prepare()
+        self.progress = progress
+        self._phase = Phases(progress)
+        self._equations: Equations | None = None
+        self._prepare()
+
+    @property
+    def system(self) -> System | None:
+        """The system that is solved, or None as long as nothing has moved."""
+        return self._equations.system if self._equations else None
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the checks of the structure found, one sentence each."""
+        return self._state.warnings
 
     def solve(
         self,
@@ -123,14 +127,13 @@ class StaticAnalysis:
         SolveError
             If the accuracy asked for cannot be reached.
         """
-        with self.ranks.together():
-            self._follow()
-            case = self._load(self.model.loads if loads is None else loads)
-            if tolerance is not None:
-                check_arguments(self.solver, tolerance)
-            if start is not None:
-                start = finite(start, "start", (self.model.mesh.n_nodes, 3))
-            return self._solve(case, case.moving, tolerance, start)
+        self._follow()
+        case = self._load(self.model.loads if loads is None else loads)
+        if tolerance is not None:
+            check_arguments(self.solver, tolerance)
+        if start is not None:
+            start = finite(start, "start", (self.model.mesh.n_nodes, 3))
+        return self._solve(case, case.moving, tolerance, start)
 
     def check(self) -> list[str]:
         """Check the loads of the model, too, as a solution does, without solving.
@@ -144,121 +147,64 @@ class StaticAnalysis:
         MeshError, ModelError, InputError
             A load does not fit, or a change of the model has broken it.
         """
-        with self.ranks.together():
-            self._follow()
-            case = self._load(self.model.loads)
-            return self._warnings(case) + self.free.notes(case.moving)
+        self._follow()
+        case = self._load(self.model.loads)
+        return self._warnings(case) + self._state.free.notes(case.moving)
 
     def solve_cases(self, cases: Mapping[str, Load | Sequence[Load]]) -> dict[str, Result]:
         """Return the result of each load case by its name; see `Model.solve_cases`."""
         if not isinstance(cases, Mapping):
             raise InputError(f"load cases must map names to lists of loads; got {type(cases).__name__}")
-        with self.ranks.together():
-            self._follow()
-            loaded = {name: self._load(loads) for name, loads in cases.items()}
-            moving = np.any([case.moving for case in loaded.values()], axis=0)
-            return {name: self._solve(case, moving) for name, case in loaded.items()}
+        self._follow()
+        loaded = {name: self._load(loads) for name, loads in cases.items()}
+        moving = np.any([case.moving for case in loaded.values()], axis=0)
+        return {name: self._solve(case, moving) for name, case in loaded.items()}
 
     # ---- what is kept from one solution to the next ------------------------------------------------
 
     def _prepare(self) -> None:
         """Check the model; what fails is tried again at the next solution."""
-        model = self.model
-        self._version: tuple[int, int] | None = None
         with self._phase("check"):
-            version = model.version
-            self.groups, self.warnings = model.checked()
-            self.kinds = model.kinds(self.groups)
-            self.free = model.free_motions(self.groups)
-            self.part = self.free.part
-            self._used = self.part >= 0
-            self._n_used, self._n_unused = self._count(self._used), self._count(~self._used)
-            self._read_supports()
-            self.initial = initial_loads(model, self.groups)
+            state = prepared(self.model)
+            self._dirichlet = dirichlet_conditions(self.model.supports, state.used)
+            self._state = state
             self.release()
-            self._prescribed: Array | None = None  # where it differs from that of the system
-            self._still = 0  # elements left out of them
-            self._version = version
-
-    def _read_supports(self) -> None:
-        """Find the nodes that supports displace, and those that they hold at rest."""
-        supports = self.model.supports
-        slaves = supports.slaves()  # first, as it may refuse them
-        self._value_version = supports.value_version
-        moved = supports.fixed & (supports.values != 0)
-        pushed = [slave for slave, (_, constant) in slaves.items() if constant]
-        moved.flat[np.array(pushed, dtype=np.int64)] = True
-        self._moved = _any_axis(moved)
-        self._held = ~_any_axis(~supports.fixed) & ~self._moved
-        own = self._used & self.model.mesh.own_nodes
-        fixed = supports.fixed if own.all() else supports.fixed[own]
-        self._fixed = self.ranks.sum(int(fixed.sum()))
 
     def _follow(self) -> None:
         """Take over what has changed in the model."""
-        supports = self.model.supports
-        changed = self._version != self.model.version, self._value_version != supports.value_version
-        prepare, read = self.ranks.any(np.array(changed)).tolist()
-        if prepare:
+        supports, state = self.model.supports, self._state
+        if state.version != self.model.version:
             self._prepare()
-        elif read:
-            held = self._held
-            self._read_supports()
-            if self.ranks.any(not np.array_equal(held, self._held)):
-                self.release()  # elements that were left out may be needed now
-            if self.system:
-                self._prescribed = displacements(self.model, self.system)
+        elif self._dirichlet.version != supports.value_version:
+            before, self._dirichlet = self._dirichlet, dirichlet_conditions(supports, state.used)
+            if not np.array_equal(before.at_rest, self._dirichlet.at_rest):
+                self.release()  # elements that were omitted may be needed now
+            if self._equations:
+                c = supports.constraint_map(self._equations.system.nodes).c
+                self._equations = replace(self._equations, prescribed=c)
 
     def _load(self, given: Load | Sequence[Load]) -> LoadSet:
-        """Return the nodal forces of loads, and which parts are pushed or pulled by anything."""
         phase, self._phase = self._phase, Phases(self.progress)
-        if not isinstance(given, (Load, list, tuple)):
-            raise InputError(f"a load, or a list of them, is needed; got {type(given).__name__}")
-        loads = [given] if isinstance(given, Load) else list(given)
-        for load in loads:
-            if not isinstance(load, Load):
-                raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
-        with phase("load"):
-            mesh, fixed = self.model.mesh, self.model.supports.fixed
-            external = self.model.supports.on_masters(external_loads(mesh, self.groups, loads))
-            if mesh.subdomain is not None:
-                external = mesh.subdomain.fetch(external)  # at ghosts, not all of it is here
-            forces = external if self.initial is None else external - self.initial
-            acts = forces != 0
-            checks.check_carried(mesh, forces, self._used)
-            moving = self._parts_with(_any_axis(acts & ~fixed) | self._moved)
-            self.free.check((load.forces(mesh, self.groups) for load in loads), moving)
-        return LoadSet(loads, external, forces, moving, phase)
-
-    def _parts_with(self, nodes: Mask) -> Mask:
-        """Return the parts with one of some own nodes, a mask (n,)."""
-        parts = np.zeros(len(self.free.counts), dtype=bool)
-        parts[self.part[nodes & self._used & self.model.mesh.own_nodes]] = True
-        found: Mask = self.ranks.any(parts)
-        return found
+        return load_set(self.model, self._state, self._dirichlet, given, phase)
 
     def _warnings(self, case: LoadSet) -> list[str]:
         """Return the warnings of the model and of a load set."""
-        idle = checks.check_loads(case.loads, self.kinds, case.forces, self.model.supports)
-        return self.warnings + idle + equal_loads(case.loads, self.ranks)
+        idle = checks.check_loads(case.loads, self._state.groups, case.forces, self.model.supports)
+        return self.warnings + idle + equal_loads(case.loads)
 
-    def _system_of(self, moving: Mask) -> System:
-        """Return the system of the elements in moving parts, made anew only for a part that is new."""
-        if self.system is None or (moving & ~self._solved).any():
-            model = self.model
-            solved = moving if self.system is None else moving | self._solved
-            parts = solved[self.part] & self._used
-            every, groups = among(self.groups, parts), among(self.groups, parts & ~self._held)
-            how = self.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
-            system = system_of(model, groups, *how)  # which may be refused; the one before stays then
+    def _equations_of(self, moving: Mask) -> Equations:
+        """Return the equations of the components that move, made anew only for one that is new."""
+        state, known = self._state, self._equations
+        if known is None or (moving & ~known.components).any():
+            components = moving if known is None else moving | known.components
+            nodes = components[state.component] & state.used
+            every, groups = among(state.groups, nodes), among(state.groups, nodes & ~self._dirichlet.at_rest)
+            how = state.free.held, self.solver, self.tolerance, self.progress, self.engine, self.petsc
+            system = system_of(self.model, groups, *how)  # which may be refused; the one before stays then
             self.release()
-            self.system = system
-            self._prescribed = None
-            own = model.mesh.own_elements
-            still = (sum(int(own[group.rows].sum()) for group in some) for some in (every, groups))
-            self._still = self.ranks.sum(next(still) - next(still))
-            self._solved = solved
-        return self.system
+            self._equations = Equations(system, components, sum(map(len, every)) - sum(map(len, groups)))
+            return self._equations
+        return known
 
     # ---- one solution ------------------------------------------------------------------------------
 
@@ -266,47 +212,46 @@ class StaticAnalysis:
         self, case: LoadSet, moving: Mask, tolerance: float | None = None, start: Array | None = None
     ) -> Result:
         """Solve for a load set with the equations of all parts in `moving`."""
-        model, phase = self.model, case.phase
+        model, state, phase = self.model, self._state, case.phase
         warnings = self._warnings(case)
         u, reactions, noise = self._at_rest(), 0.0 - case.forces, 0.0
         solution = Solution(u, "none", "nothing moves: u = 0 needs no solution", 0, 0.0)
         if case.moving.any():
             with phase("assemble"):
-                system = self._system_of(moving)
+                equations = self._equations_of(moving)
+                system = equations.system
                 noise = float(np.finfo(float).eps * system.norm)
             with phase("solve"):
-                u, solution = system.solve(case.forces, self._prescribed, tolerance, start)
+                u, solution = system.solve(case.forces, equations.prescribed, tolerance, start)
                 warnings += system.warnings
-                u = self.free.without(self._complete(u, system, case.moving))
-                noise *= self.ranks.max(float(np.abs(u).max(initial=0.0)))
+                u = state.free.without(self._complete(u, system, case.moving))
+                noise *= float(np.abs(u).max(initial=0.0))
         with phase("verify"):
             if case.moving.any():
                 reactions = system.residual(u, case.forces)
             reactions = model.supports.supported(reactions)
-            if model.mesh.subdomain is not None:
-                reactions = model.mesh.subdomain.fetch(reactions)
-            inner = model.supports.on_masters(stress_load(model, self.groups, u))
-            if self.initial is not None and self.system is not None:
+            inner = model.supports.on_masters(stress_load(model, state.groups, u))
+            if state.initial is not None and self.system is not None:
                 rounding = initial_noise(model, self.system.norm, self.tolerance, case.forces)
             else:
                 rounding = 0.0
             forces = case.external, case.forces, reactions, inner
-            balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * self._n_used)
+            balance = balance_of(model.mesh, *forces, max(noise, rounding), 3 * int(state.used.sum()))
             if tolerance is None:
                 judge(solution, u, balance)
             initial = case.external - case.forces
             warnings += checks.check_rounding(noise, case.external, initial, reactions, model.supports)
-            warnings += check_deformation(model, self.kinds, u)
+            warnings += check_deformation(model, state.groups, u)
         report = self._report(case, solution, reactions, balance, warnings)
         u0 = model.initial_displacement
         origin = Origin(self, model.version)
-        return Result(model.mesh, self.groups, u, reactions, case.external, report, u0, origin, self.kinds)
+        return Result(model.mesh, state.groups, u, reactions, case.external, report, u0, origin)
 
     def release(self) -> None:
-        """Let go of the matrix and what is made of it; another solution makes them anew."""
-        if self.system is not None:
-            release(self.system)
-        self.system, self._solved = None, np.zeros(0, dtype=bool)
+        """Release the matrix and what is made of it; another solution makes them anew."""
+        if self._equations is not None:
+            release(self._equations.system)
+        self._equations = None
 
     def adjoint(self, load: Array, motion: Array) -> Array:
         """Return the displacement (n, 3) in m under a load alone, with supports displaced by a motion alone.
@@ -326,16 +271,15 @@ class StaticAnalysis:
             A motion is given, and nothing is prescribed there.
         """
         self._follow()
-        supports, load = self.model.supports, self.free.balanced(load)
+        supports, load = self.model.supports, self._state.free.balanced(load)
         moved = np.where(supports.fixed, motion, 0.0)
-        motions = self.ranks.any(np.array([motion.any(), moved.any()]))
-        if motions[0] and not motions[1]:
+        if motion.any() and not moved.any():
             raise ModelError("nothing is prescribed on the part along this axis, so that it has no reaction")
-        moving = self._parts_with(_any_axis(load != 0) | _any_axis(moved != 0))
+        moving = self._state.components_with(any_axis(load != 0) | any_axis(moved != 0))
         if not moving.any():
             return np.zeros_like(load)
-        system = self._system_of(moving)
-        displaced, at_rest = (displacements(self.model, system, u) for u in (moved, 0.0 * moved))
+        system = self._equations_of(moving).system
+        displaced, at_rest = (supports.constraint_map(system.nodes, u).c for u in (moved, 0.0 * moved))
         return system.solve(load, displaced - at_rest, max(self.tolerance, ADJOINT_TOLERANCE))[0]
 
     def _report(
@@ -346,18 +290,18 @@ class StaticAnalysis:
         balance: tuple[float, float],
         warnings: list[str],
     ) -> Report:
-        own = self.model.mesh.own_nodes
-        slaves = self.ranks.sum(sum(bool(own[slave // 3]) for slave in self.model.supports.slaves()))
+        model, state = self.model, self._state
+        n_equations = 3 * int(state.used.sum()) - self._dirichlet.count
         return Report(
-            unknowns=3 * self._n_used - self._fixed - slaves,
-            total_load=self.ranks.sum(case.external[own].sum(axis=0)),
-            total_reaction=self.ranks.sum(reactions[own].sum(axis=0)),
+            unknowns=n_equations - len(model.supports.slaves()),
+            total_load=case.external.sum(axis=0),
+            total_reaction=reactions.sum(axis=0),
             **quality(solution, balance),
             seconds=case.phase.seconds,
             warnings=warnings,
-            notes=[*self.model.remarks(), *self.free.notes(case.moving)],
+            notes=[*model.remarks(), *state.free.notes(case.moving)],
             skipped=self._skipped(case.moving),
-            formulation=self.model.chosen(self.kinds),
+            formulation=model.chosen(state.groups),
         )
 
     def _at_rest(self) -> Array:
@@ -371,34 +315,24 @@ class StaticAnalysis:
             rest[system.nodes] = u[system.nodes]
             u = rest
         if not moving.all():
-            u[self._used & ~moving[self.part]] = 0.0
+            u[self._state.used & ~moving[self._state.component]] = 0.0
         return u
-
-    def _count(self, nodes: Mask) -> int:
-        """Return how many of some nodes, a mask (n,), all ranks have."""
-        return int(self.ranks.sum(int((nodes & self.model.mesh.own_nodes).sum())))
 
     def _skipped(self, moving: Mask) -> list[str]:
         """Return what this solution did without, in words."""
-        skipped = []
+        state, skipped = self._state, []
         if not moving.any():
             skipped.append("assembly and solution, as nothing moves")
         elif not moving.all():
-            count = self._count(~moving[self.part] & self._used)
+            count = int((~moving[state.component] & state.used).sum())
             skipped.append(
                 f"{int((~moving).sum())} of {len(moving)} parts ({count} nodes), as nothing moves them"
             )
-        if moving.any() and self.system and self._still:
-            skipped.append(f"{self._still} elements, as all their nodes are held")
-        if self._fixed:
-            skipped.append(f"{self._fixed} prescribed degrees of freedom")
-        if self._n_unused:
-            skipped.append(f"{self._n_unused} nodes without elements")
-        if moving.any() and self.system:
-            skipped += self.system.skipped
-        return skipped
-
-
-def _any_axis(mask: Mask) -> Mask:
-    """Return mask.any(axis=1) of a mask (n, 3), faster."""
-    return mask[:, 0] | mask[:, 1] | mask[:, 2]
+        equations = self._equations if moving.any() else None
+        if equations and equations.n_at_rest:
+            skipped.append(f"{equations.n_at_rest} elements, as all their nodes are held")
+        if self._dirichlet.count:
+            skipped.append(f"{self._dirichlet.count} prescribed degrees of freedom")
+        if unused := int((~state.used).sum()):
+            skipped.append(f"{unused} nodes without elements")
+        return skipped + (equations.system.skipped if equations else [])

@@ -42,8 +42,6 @@ class BlockMatrix:
     array([2., 4., 6.])
     """
 
-    is_split = False  # as nearly incompressible stiffness is
-
     def __init__(self, data: Array, indices: Rows, indptr: Rows) -> None:
         self.data, self.indices, self.indptr = data, indices, indptr
 

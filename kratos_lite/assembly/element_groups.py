@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.elements import KinematicLinear
+from kratos_lite.elements.custom import is_builtin
 from kratos_lite.elements.exact_rules import (
     AFFINE,
     CURVED,
@@ -18,7 +19,7 @@ from kratos_lite.elements.exact_rules import (
     geometries,
     interpolations,
 )
-from kratos_lite.elements.formulations import NON_LOCKING, element_of, is_of_library
+from kratos_lite.elements.formulations import NON_LOCKING, element_of
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials import LinearMaterial
@@ -35,12 +36,9 @@ CHUNK_BYTES = 4_000_000
 """Memory of the element matrices computed at once: small enough for the cache."""
 
 
-def compiled(name: str, element: type[KinematicLinear], *methods: str) -> Any:
-    """Return the kernels of a name, or None where they do not stand for these methods of an element class.
-
-    A class that overrides one that they stand for is computed by its own, in NumPy.
-    """
-    return kernels(name) if element.has_kernels(*methods) else None
+def compiled(name: str, element: type[KinematicLinear] | None = None) -> Any:
+    """Return the kernels of a name, or None if a method of a user does their part for an element class."""
+    return kernels(name) if element is None or not element.custom else None
 
 
 def floats(values: Any) -> Array:
@@ -75,7 +73,7 @@ class ElementGroup:
     @property
     def is_proven(self) -> bool:
         """Whether class and rule are those of the library, which leave no hourglass modes in a mesh."""
-        return self.rule is self.element.rule and is_of_library(self.element)
+        return self.rule is self.element.rule and is_builtin(self.element)
 
     def tables(self, rule: Rule | None = None) -> tuple[Rows, Array, Array, Array]:
         """Return nodes, N (g, k), dN (g, k, 3) and weights (g,) of a rule, or the own one, for kernels."""
@@ -199,8 +197,6 @@ def element_groups_of(
     [8]
     """
     m, found = mesh.n_elements, []
-    if mesh.subdomain is not None and material_of is not None:
-        _check_assigned(mesh, material_of)
     material_of = np.zeros(m, dtype=np.int64) if material_of is None else material_of
     rule_of = np.full(m, -1) if rule_of is None else rule_of
     for block, at in with_rows(mesh.blocks):
@@ -215,63 +211,16 @@ def element_groups_of(
             nodes = block.nodes if len(mine) == len(block) else block.nodes[mine]
             stress = None if prestress is None else prestress[rows]
             found.append(ElementGroup(element, chosen, materials[material], nodes, rows, stress))
-    if not mesh.ranks.any(bool(found)):
+    if mesh.whole and not found:
         raise ModelError("the model has no elements; nothing can be solved")
     return found
 
 
 def _rule_of(element: type[KinematicLinear], given: Rule | int | None) -> Rule:
     """Return the rule of an element, or one that replaces it, if it fits."""
-    if given is None and is_of_library(element):
+    if given is None and is_builtin(element):
         return element.rule
     return _fitting(element, element.rule if given is None else given)
-
-
-@dataclass(eq=False)
-class Kind:
-    """Elements that share class, rule and material, as an `ElementGroup` does: how many all ranks have."""
-
-    element: type[KinematicLinear]
-    rule: Rule
-    material: LinearMaterial
-    count: int
-
-    def __len__(self) -> int:
-        return self.count
-
-    @property
-    def is_proven(self) -> bool:
-        """As of a group."""
-        return self.rule is self.element.rule and is_of_library(self.element)
-
-
-Kinds: TypeAlias = "Sequence[ElementGroup | Kind]"
-"""Element groups, or what all ranks have of them."""
-
-
-def kinds_over_ranks(
-    mesh: Mesh,
-    materials: Sequence[LinearMaterial],
-    material_of: Ints,
-    rules: Mapping[int, Rule | int],
-    rule_of: Ints,
-    formulation: str | None,
-    unnamed: str,
-) -> list[Kind]:
-    """Return the kinds of elements of all ranks, in the order of the groups of one that had all elements."""
-    number = np.repeat(np.arange(len(mesh.blocks)), [len(block) for block in mesh.blocks])
-    own = mesh.own_elements
-    counts: dict[tuple[int, ...], int] = {}
-    codes = np.stack([number[own], material_of[own], rule_of[own]], axis=1)
-    for found in mesh.ranks.gather(np.unique(codes, axis=0, return_counts=True)):
-        for code, count in zip(map(tuple, found[0].tolist()), found[1].tolist(), strict=True):
-            counts[code] = counts.get(code, 0) + count
-    kinds = []
-    for (block, material, rule), count in sorted(counts.items()):
-        law = materials[material]
-        element = element_of(mesh.blocks[block].name, formulation, law.C, unnamed)
-        kinds.append(Kind(element, _rule_of(element, rules[rule] if rule >= 0 else None), law, count))
-    return kinds
 
 
 def group_of_element(mesh: Mesh, groups: Sequence[ElementGroup], id: int) -> ElementGroup:
@@ -308,14 +257,6 @@ def _without_material(mesh: Mesh, block: Block, cell: int) -> ModelError:
         f"{mesh.place(block, cell)} has no material (property {block.properties[cell]}); "
         "give one with Model(mesh, material), model.assign or --material"
     )
-
-
-def _check_assigned(mesh: Mesh, material_of: Ints) -> None:
-    """Raise ModelError for the first element without material, of those of all ranks."""
-    row = mesh.first_element(material_of < 0)
-    for block, at in with_rows(mesh.blocks):
-        if row is not None and at.start <= row < at.stop:
-            raise _without_material(mesh, block, row - at.start)
 
 
 def _fitting(element: type[KinematicLinear], chosen: Rule | int) -> Rule:

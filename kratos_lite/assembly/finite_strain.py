@@ -1,4 +1,4 @@
-"""Large displacements: internal load, stiffness, energy and highest frequency of groups of elements.
+"""Large displacements: internal forces, stiffness, energy and highest frequency of groups of elements.
 
 Total Lagrangian with the Saint Venant–Kirchhoff law S = C:E + S0, where C is that of the material and
 S0 the prestress of a group; the formulas are in `elements.total_lagrangian`.  It holds for large
@@ -21,8 +21,6 @@ from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements import total_lagrangian as lagrange
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.errors import MaterialError, ModelError
 from kratos_lite.typing import Array
 
@@ -31,21 +29,20 @@ SAME_SHAPE = 1e-10
 
 
 def check_elements(groups: Sequence[ElementGroup]) -> None:
-    """Raise ModelError for elements whose strain, stress or load is not that of their gradients."""
+    """Raise ModelError for elements whose strain or stiffness is not that of their gradients."""
     for group in groups:
-        own = [name for name in MECHANICS if not group.element.inherits(name)]
-        if own:
+        if group.element.custom or not group.element.has_standard_strain():
             raise ModelError(
-                f"{group.element.__name__} overrides {', '.join(own)}: a small-strain step.  Large "
+                f"{group.element.__name__} has a B or local system of small strains.  Large "
                 "displacements take Green's strain from the gradients dN/dX alone; use "
-                'formulation="corotational" or "modal", or an element that inherits these steps'
+                'formulation="corotational" or "modal", or a KinematicLinear element'
             )
 
 
 def _compiled(group: ElementGroup) -> Any:
     """Return the kernels if they stand for the geometry of an element class, else None."""
     check_elements([group])
-    return compiled("lagrange", group.element, *GEOMETRY)
+    return compiled("lagrange")
 
 
 def _placed(points: Array, group: ElementGroup) -> tuple[Any, ...]:
@@ -90,7 +87,7 @@ def internal_load(
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
-            add_nodal(total, group.nodes[chunk], lagrange.internal_load(element, at))
+            add_nodal(total, group.nodes[chunk], lagrange.internal_force(element, at))
     return total
 
 
@@ -201,7 +198,7 @@ def highest_frequency(
     for group in groups:
         if not group.material.density > 0:
             raise MaterialError("an angular frequency needs a density > 0; give the material its density")
-        alike = q is None and group.element.has_kernels(*GEOMETRY, *MECHANICS)  # own steps may depend on X
+        alike = q is None and not group.element.custom  # a user's B may depend on X
         part = _distinct(points, group) if alike else group
         for chunk in part.chunks():
             largest = max(largest, float(_eigenvalues(points, part, chunk, q, lumped).max()))
@@ -223,7 +220,7 @@ def _eigenvalues(points: Array, group: ElementGroup, chunk: slice, q: Array | No
     C, density = group.material.C, group.material.density
     if q is None:
         element = group.at(points, chunk)
-        K = stiffness_of(element, C)
+        K = element.stiffness_by_axis(C)
     else:
         check_elements([group])
         element, at = _moved(points, group, chunk, q, None, 0.0)

@@ -19,12 +19,9 @@ from kratos_lite.assembly.element_groups import ElementGroup, add_nodal, by_mass
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.exact_rules import geometries
-from kratos_lite.elements.mass import MASS
 from kratos_lite.elements.tables import lumped
 from kratos_lite.typing import Array
 
-STEPS = (*MASS, "gauss_points")
-"""What an element class may redefine so that its matrices are not those of its tables."""
 REST = np.zeros((3, 4))
 
 
@@ -58,7 +55,7 @@ def inertia_matrices(
     data = {name: np.zeros(len(pattern.indices)) for name in names}
     points = floats(points)
     for number, group in enumerate(groups):
-        if module := compiled("inertia", group.element, *STEPS):
+        if module := compiled("inertia"):
             _add_compiled(module, data, points, group, pattern, velocity)
         else:
             _add_computed(data, points, group, pattern, number, velocity)
@@ -125,7 +122,7 @@ def lumped_mass(points: Array, groups: Sequence[ElementGroup]) -> Array:
 def _element_masses(points: Array, group: ElementGroup) -> Array:
     """Return the lumped masses (m, k) in kg of the elements of a group by its rule."""
     density = group.material.density
-    module = compiled("gauss", group.element, *MASS, "lumped_mass")
+    module = compiled("gauss")
     if module is None:
         return group.at(points).lumped_mass(density)
     sums, diagonal = module.mass_sums(floats(points), *group.tables())

@@ -15,8 +15,6 @@ from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import assemble_stiffness
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.quadrature import Rule
 from kratos_lite.registry import remembered
@@ -48,8 +46,6 @@ class MatrixFree:
     ...     assert np.abs(K @ rigid).max() < 1e-6 * K.norm()
     """
 
-    is_split = False
-
     def __init__(
         self,
         points: Array,
@@ -67,10 +63,7 @@ class MatrixFree:
 
         Of linear elements it does for hexahedra.
         """
-        if (
-            compiled("multigrid", group.element, *GEOMETRY, *MECHANICS) is None
-            or group.strain_tables() is not None
-        ):
+        if compiled("multigrid", group.element) is None or group.strain_tables() is not None:
             return False
         shape = group.element.shape
         return len(shape.nodes) > shape.corners or factors(shape, group.rule) is not None

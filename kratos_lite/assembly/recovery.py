@@ -21,8 +21,6 @@ from kratos_lite.assembly.nodal_values import extrapolation
 from kratos_lite.assembly.patches import Patches, outer_corners, patches
 from kratos_lite.assembly.polynomial_fit import Lists, Polynomials, Samples, as_rows, fit, lists
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import STRAIN
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.mesh import Block, Mesh
 from kratos_lite.mesh.blocks import NO_ROWS
@@ -282,7 +280,7 @@ def _plain(group: ElementGroup) -> ElementGroup:
 def _compared_at(group: ElementGroup) -> ElementGroup:
     """Return a group with a rule for squared errors, where its stresses are known at any points."""
     shape = group.element.shape
-    if group.rule.degree >= 2 * shape.degree or not group.element.inherits(*GEOMETRY, *STRAIN, "stress"):
+    if group.rule.degree >= 2 * shape.degree or not group.element.has_standard_strain():
         return group
     return replace(group, prestress=None, rule=rule_for(shape.cell, 2 * shape.degree))
 

@@ -13,8 +13,6 @@ import numpy as np
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.assembly.element_groups import ElementGroup, compiled, floats
 from kratos_lite.assembly.sparsity_pattern import Pattern
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS, stiffness_of
 from kratos_lite.typing import Array, Progress
 
 SCATTER_BYTES = 64_000_000
@@ -43,7 +41,7 @@ def assemble_stiffness(
     points = floats(points)
     done, total = 0, sum(len(group) for group in groups)
     for number, group in enumerate(groups):
-        kernels = compiled("stiffness", group.element, *GEOMETRY, *MECHANICS)
+        kernels = compiled("stiffness", group.element)
         add = _add_compiled if kernels else _add_computed
         for count, constant in add(data, points, group, pattern, number):
             done += count
@@ -69,12 +67,12 @@ def _add_computed(
     data: Array, points: Array, group: ElementGroup, pattern: Pattern, number: int
 ) -> Iterator[tuple[int, bool]]:
     """Do the same in NumPy, in parts."""
-    standard, constant = group.element.inherits(*GEOMETRY, *MECHANICS), False
+    standard, constant = group.element.has_standard_strain() and not group.element.custom, False
 
     def stiffness(chunk: slice) -> Array:
         nonlocal constant
         elements = group.at(points, chunk)
-        K = stiffness_of(elements, group.material.C)
+        K = elements.stiffness_by_axis(group.material.C)
         constant |= standard and elements.constant_jacobian
         return K
 
@@ -105,6 +103,6 @@ def assemble_dense(points: Array, groups: Sequence[ElementGroup]) -> Array:
             dofs = 3 * group.nodes[chunk].astype(np.int64)[:, None, :] + np.arange(3)[:, None]
             dofs = dofs.reshape(len(dofs), -1)
             places = (dofs[:, :, None] * n + dofs[:, None, :]).ravel()
-            matrices = stiffness_of(group.at(points, chunk), group.material.C)
+            matrices = group.at(points, chunk).stiffness_by_axis(group.material.C)
             K += np.bincount(places, weights=matrices.ravel(), minlength=n * n)
     return K.reshape(n, n)

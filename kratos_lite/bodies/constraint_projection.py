@@ -46,19 +46,7 @@ Advance: TypeAlias = Callable[[Array], Step]
 
 
 def constrained_step(body: Body, h: float, qh: Array, advance: Advance, solver: Callable[[], Solve]) -> Array:
-    """Take a step of h s that meets the constraints; return the load with reactions (..., dofs).
-
-    Parameters
-    ----------
-    qh : configuration at the middle, where the directions of the reactions are taken.
-    advance : takes the step.
-    solver : gives what solves A x = b, one right side or columns of them, for the matrix A of the kick.
-
-    Raises
-    ------
-    SolveError
-        If the constraints cannot be met.
-    """
+    """Take a step of h s that meets the constraints; return the load with reactions (..., dofs)."""
     if not body.constraints:
         step = advance(np.zeros_like(body.u))
         body.q, body.u = step.q, step.u
@@ -77,17 +65,7 @@ def constrained_step(body: Body, h: float, qh: Array, advance: Advance, solver: 
 
 
 def project_velocity(body: Body, h: float) -> None:
-    """Make the velocities of a body satisfy its constraints by an impulse.
-
-    Without it a point that is fixed would go on with the velocity it had, there and back, for ever.
-
-    Raises
-    ------
-    InputError
-        If a constraint is not met where the body is.
-    SolveError
-        If the constraints contradict each other.
-    """
+    """Make the velocities of a body satisfy its constraints by an impulse; InputError if they are not met."""
     before, H = float(body.kinetic_energy()), constraint_jacobian(body, body.q)
     wanted, size = [], _extent(body)
     for constraint in body.constraints:

@@ -71,7 +71,7 @@ def convert(body: Body, kind: Any, **options: Any) -> Any:
     if not (isinstance(kind, type) and issubclass(kind, Body) and kind.convertible):
         raise InputError(f"a body becomes a RigidBody, PseudoRigidBody or FiniteElementBody; got {kind!r}")
     if not body.convertible:
-        raise ModelError(f"an {body.kind} has no mass, so it does not become another kind; make a new body")
+        raise ModelError("a fixed body has no mass, so it does not become another kind; make a new body")
     if body.q.ndim > 1 or body.mesh is None or body.material is None:
         raise ModelError(f"only a single body with a mesh and a material changes its kind; got {body!r}")
     other = _made(body, kind, options)

@@ -95,7 +95,7 @@ def _increment(body: Deformable, start: Array, share: float, progress: Progress 
     initial, noise = _gap(body, start), ROUND_OFF * body.extent()
     multipliers = np.zeros(len(initial))
     for iteration in range(1, NEWTON_MAX + 1):
-        left = share * _load(body) - body.internal_load(body.q)
+        left = share * _load(body) - body.internal_force(body.q)
         gap = _gap(body, body.q) - (1 - share) * initial
         tangent = _tangent(body, share, multipliers)
         step, multipliers = body.solve_static(left, _entries(body), gap, tangent)
@@ -120,7 +120,7 @@ def _gap(body: Deformable, q: Array) -> Array:
 
 def _load(body: Deformable) -> Array:
     """Return the generalized load on the body at rest, (dofs,)."""
-    return body.external_load(body.q, u=np.zeros_like(body.u))
+    return body.external_force(body.q, u=np.zeros_like(body.u))
 
 
 def _tangent(body: Deformable, share: float, multipliers: Array) -> Entries:
@@ -148,7 +148,7 @@ def _entries(body: Deformable) -> Entries:
 
 
 def _balance(body: Deformable, share: float, multipliers: Array) -> None:
-    """Note the reactions; SolveError if loads, reactions and internal load do not balance."""
+    """Note the reactions; SolveError if loads, reactions and internal forces do not balance."""
     reaction, at = np.zeros_like(body.q), 0
     for constraint in body.constraints:
         own = multipliers[at : at + constraint.count]
@@ -156,7 +156,7 @@ def _balance(body: Deformable, share: float, multipliers: Array) -> None:
         row, dof, value = constraint.jacobian_entries(body, body.q)
         np.add.at(reaction, dof, own[row] * value)
         at += constraint.count
-    load, inner = share * _load(body), body.internal_load(body.q)
+    load, inner = share * _load(body), body.internal_force(body.q)
     left = np.abs(load + reaction - inner).max()
     scale = max(np.abs(load).max(), np.abs(reaction).max(), np.abs(inner).max())
     K = body.stiffness(body.q)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements.formulations import NON_LOCKING
-from kratos_lite.errors import InputError, ModelError
+from kratos_lite.errors import InputError
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.mesh import Mesh
 from kratos_lite.model.checks import checked_material
@@ -24,21 +24,8 @@ Material: TypeAlias = "LinearMaterial | Mapping[Any, LinearMaterial]"
 
 
 def elements_of(mesh: Mesh, material: Material, unnamed: str = NON_LOCKING) -> list[ElementGroup]:
-    """Return the elements of a mesh with their material, after checks of its geometry.
-
-    `unnamed` is the formulation of elements whose names say none.
-
-    Raises
-    ------
-    MeshError, ModelError, InputError
-        If the mesh is broken or inverted, or elements have no material.
-    """
+    """Return the elements of a mesh with their material; MeshError or ModelError if they are broken."""
     structure = Structure(mesh, material if isinstance(material, Mapping) else checked_material(material))
-    if mesh.ranks.size > 1:
-        raise ModelError(
-            f"a body needs its whole mesh on one process, and {mesh.ranks.size} ranks share it; "
-            "start without mpirun"
-        )
     structure.check_geometry()
     groups = structure.element_groups(unnamed)
     if not all(group.is_proven for group in groups):

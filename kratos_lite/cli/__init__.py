@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 from kratos_lite.cli.options import build_parser, with_values
-from kratos_lite.cli.ranks import Job
+from kratos_lite.cli.ranks import share
 
 EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED = 2, 1, 130
 
@@ -27,24 +27,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(100_000)  # and a hundred times while modules are loaded, for 5 ms
     _escape_unknown_characters()
     words = with_values(sys.argv[1:] if arguments is None else arguments)
-    job = Job(words)
-    with job.quiet():
-        try:
-            with _ended_by_signals():
-                return job.end(_run(words, job))
-        except SystemExit as end:  # of the parser, which has said why
-            if job.size == 1:
-                raise
-            return job.end(int(end.code or 0))
-        except (Exception, KeyboardInterrupt) as error:
-            code, text = _verdict(error)
-            if "--debug" in words and not isinstance(error, (KeyboardInterrupt, BrokenPipeError)):
-                if job.size == 1:
-                    raise
-                import traceback
-
-                text = traceback.format_exc().rstrip()
-            return job.end(code, error, text)
+    try:
+        with _ended_by_signals():
+            return _run(words) if share(words) else 0
+    except (Exception, KeyboardInterrupt) as error:
+        code, text = _verdict(error)
+        if "--debug" in words and not isinstance(error, (KeyboardInterrupt, BrokenPipeError)):
+            raise
+        if text:
+            print(text, file=sys.stderr, flush=True)
+        return code
 
 
 def _verdict(error: BaseException) -> tuple[int, str]:
@@ -72,7 +64,7 @@ def _verdict(error: BaseException) -> tuple[int, str]:
     )
 
 
-def _run(words: Sequence[str], job: Job) -> int:
+def _run(words: Sequence[str]) -> int:
     """Run one command; return its exit code."""
     parser = build_parser()
     options, rest = parser.parse_known_args(words)
@@ -80,8 +72,14 @@ def _run(words: Sequence[str], job: Job) -> int:
     if rest and options.command != "bench":
         parser.refuse(options.command, rest)
     from kratos_lite.cli import commands
+    from kratos_lite.cli.apply_options import refuse_serial_options
+    from kratos_lite.errors import InputError
 
-    code = int(job.run(getattr(commands, options.command), options))
+    if getattr(options, "engine", None) == "petsc":
+        refuse_serial_options(options)
+    elif getattr(options, "petsc", None) is not None:
+        raise InputError("--petsc belongs to --engine petsc; add that, too")
+    code = int(getattr(commands, options.command)(options))
     if sys.stdout:
         sys.stdout.flush()  # a full disk shows here rather than after the end of the program
     return code

@@ -7,6 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kratos_lite.analysis.model import Model
@@ -46,6 +47,7 @@ OF_MODELS = (
     *("integrator", "rayleigh", "lumped"),
 )
 """Options that bodies do not have."""
+NO_STATICS = "does not go with --engine petsc, which solves statics; leave one out"
 OWNERS = {
     **dict.fromkeys(("center", "center_velocity", "center_acceleration", "stiffening"), ("rotation",)),
     "boundaries": ("translation",),
@@ -54,8 +56,11 @@ OWNERS = {
 """Options of a motion, and those that they belong to."""
 
 
-def case_of(options: Namespace) -> Case:
-    """Return the case of an input and the options of the command line, which win where there is one value."""
+def case_of(options: Namespace, part: int | None = None) -> Case:
+    """Return the case of an input and the options of the command line, which win where there is one value.
+
+    `part` is the number of the part file to read, of a mesh in parts.
+    """
     materials = [material(text) for text in options.material]
     everywhere = any(part is None for part, _ in materials)
     case = read_case(
@@ -63,7 +68,7 @@ def case_of(options: Namespace) -> Case:
         materials=not everywhere,
         strict=not options.lenient,
         initial_displacement=not options.ignore_initial_displacement,
-        comm=options.ranks,
+        part=part,
     )
     case.engine, case.petsc = options.engine or case.engine, options.petsc
     if case.is_of_model:
@@ -106,6 +111,18 @@ def refuse(options: Namespace, names: tuple[str, ...], why: str) -> None:
     for name in names:
         if getattr(options, name) not in (None, False, []):
             raise InputError(f"--{name.replace('_', '-')} {why}")
+
+
+def refuse_serial_options(options: Namespace) -> None:
+    """Raise InputError, before a file is read, for options that do not go with PETSc, or without PETSc."""
+    from kratos_lite.distributed.petsc import parsed, petsc
+
+    refuse(options, ("modes", "time", "restart", "state", *OF_TIME, "rotation", "translation"), NO_STATICS)
+    refuse(options, ("error",), "is for one process; leave it out, or --engine petsc")
+    if Path(options.input).suffix.lower() == ".py":
+        raise InputError(f"{options.input}: scripts are for one process; leave --engine petsc out")
+    parsed(options.petsc)
+    petsc()
 
 
 def _take_modes(case: Case, options: Namespace) -> None:

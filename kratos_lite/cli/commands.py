@@ -57,12 +57,17 @@ def use_threads(count: int | None) -> None:
 
 def _solve(options: Namespace, clock: float) -> int:
     from kratos_lite.cli.apply_options import case_of
+    from kratos_lite.cli.ranks import part_files_of, solve_parts
     from kratos_lite.io.run import run
     from kratos_lite.solvers.blas import reserve_buffers
 
     reserve_buffers()
     seconds = {"import": perf_counter() - clock}
     clock = perf_counter()
+    if part_files_of(options):
+        summary, written = solve_parts(options)
+        _print([] if options.quiet else [*summary, *(f"{'written':<22}{path}" for path in written)])
+        return 0
     with shown("read", options.progress) as progress:
         case = case_of(options)
         seconds["read"] = perf_counter() - clock
@@ -173,8 +178,7 @@ def _what(case: Case) -> str:
     if not case.is_of_model:
         return f"{case.body.kind} body"
     mesh = case.model.mesh
-    nodes, elements = (mesh.ranks.sum(int(own.sum())) for own in (mesh.own_nodes, mesh.own_elements))
-    return f"{nodes} nodes, {elements} elements"
+    return f"{mesh.n_nodes} nodes, {mesh.n_elements} elements"
 
 
 def _needs(case: Case) -> tuple[list[str], list[str]]:
@@ -195,8 +199,7 @@ def _needs(case: Case) -> tuple[list[str], list[str]]:
     )
     for cure in cures:
         try:
-            with model.mesh.ranks.together():  # all ranks have the same needs
-                warnings = checked(case)
+            warnings = checked(case)
             break
         except ModelError as error:
             needs += [str(error)] if str(error) not in needs else []

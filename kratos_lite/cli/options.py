@@ -155,7 +155,6 @@ def _add_case(command: argparse.ArgumentParser) -> None:
     _add_model(command)
     _add_motion(command)
     _add_time(command)
-    command.set_defaults(ranks=None)  # with --engine petsc, those who run it
     how = command.add_argument_group("solver")
     _add_options(how, ("--modes", "N", MODES), type=int)
     _add_options(how, ("--solver", "", "auto chooses by size"), choices=("auto", "dense", "direct", "amg"))

@@ -1,14 +1,17 @@
-"""One command over many processes (ranks): what started them, who speaks, and how they end together."""
+"""One command over many processes (ranks): rank 0 runs it, the others work for it."""
 
 from __future__ import annotations
 
 import os
-import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from time import sleep
-from typing import Any, TextIO
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kratos_lite.errors import InputError
+
+if TYPE_CHECKING:
+    from kratos_lite.distributed.communicator import Alone
 
 LAUNCHERS = (
     ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"),
@@ -22,10 +25,8 @@ In the script of a Slurm job, outside srun, there is no SLURM_STEP_NUM_TASKS.
 """
 COMMANDS = ("solve", "check")
 """Commands that ranks share."""
-ENDING = 3.0
-"""Seconds after a signal in which the launcher, if it was that which sent it, ends all ranks by force."""
-PATIENCE = 0.2
-"""Seconds that rank r waits r times for a rank below it to say what is wrong, five times at most."""
+OF_PARTS = (".pvtu",)
+"""Results that many processes write together."""
 
 
 def launched(environment: Mapping[str, str] | None = None) -> tuple[int, int, int]:
@@ -42,92 +43,42 @@ def launched(environment: Mapping[str, str] | None = None) -> tuple[int, int, in
     return 0, 1, 1
 
 
-class Job:
-    """The processes that run one command.
+def share(words: Sequence[str]) -> bool:
+    """Let ranks that were started with ``--engine petsc`` share a command; return whether this one runs it.
 
-    Parameters
-    ----------
-    words : of the command.
-
-    Attributes
-    ----------
-    rank, size : as the launcher says.
-    ranks : the communicator, None while there is none.
+    Raises
+    ------
+    InputError
+        Copies of a command were started that would all write the same files; or what ranks need is missing.
     """
+    rank, size, local = launched()
+    if size == 1 or not words or words[0] not in COMMANDS:
+        return True
+    engine = _engine(words)
+    if engine == "petsc":
+        from kratos_lite.distributed.communicator import start
 
-    def __init__(self, words: Sequence[str]) -> None:
-        self.rank, self.size, self._local = launched()
-        is_for_ranks = len(words) > 0 and words[0] in COMMANDS and _engine(words) != "own"
-        self._is_shared = is_for_ranks and self.size > 1
-        self.ranks: Any = None
-        self._streams: tuple[TextIO, TextIO] | None = None
+        _share_cores(local)
+        start(words, size)
+    elif not engine:
+        if rank:
+            return False
+        raise InputError(
+            f"{size} copies of this command have been started, which would all {' '.join(words[:2])} and "
+            "write the same files; add --engine petsc to share it among them, start it without mpirun or "
+            "srun, or add --engine own if each has an input of its own"
+        )
+    return True
 
-    @contextmanager
-    def quiet(self) -> Iterator[None]:
-        """Let rank 0 alone speak, if the ranks share the command."""
-        if not (self._is_shared and self.rank):
-            yield
-            return
-        self._streams = sys.stdout, sys.stderr
-        with open(os.devnull, "w", encoding="utf-8") as nowhere:
-            sys.stdout = sys.stderr = nowhere
-            try:
-                yield
-            finally:
-                sys.stdout, sys.stderr = self._streams
 
-    def run(self, command: Callable[[Namespace], int], options: Namespace) -> int:
-        """Run a command, over all ranks with ``--engine petsc``; return its exit code."""
-        from kratos_lite.errors import InputError
-
-        engine = getattr(options, "engine", "own")
-        if self._is_shared and engine is None:
-            raise InputError(
-                f"{self.size} copies of this command have been started, which would all {options.command} "
-                f"{options.input} and write the same files; add --engine petsc to share it among them, start "
-                "it without mpirun or srun, or add --engine own if each has an input of its own"
-            )
-        if engine != "petsc":
-            if getattr(options, "petsc", None) is not None:
-                raise InputError("--petsc belongs to --engine petsc; add that, too")
-            return command(options)
-        from kratos_lite.cli.over_ranks import connected, prepare, refuse_serial_options
-
-        refuse_serial_options(options)
-        self._share_cores()
-        self.ranks = options.ranks = connected(self.size)
-        with self.ranks.together():
-            prepare(options, self.ranks)
-            return command(options)
-
-    def _share_cores(self) -> None:
-        """Give each rank its share of the cores, unless the user has said how many threads it takes."""
-        if self._local < 2:
-            return
-        count = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-        share = str(max(1, len(count) // self._local))
-        for name in ("KRATOS_LITE_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-            os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", share))
-
-    def end(self, code: int, error: BaseException | None = None, text: str = "") -> int:
-        """Say a text and end, all ranks together; return the exit code of this process.
-
-        An error that the others do not know, as of a defect, ends them as well: they may wait for this rank.
-        """
-        many = self.ranks is not None and self.ranks.size > 1
-        if many and error is not None and not getattr(error, "is_shared", False):
-            if isinstance(error, KeyboardInterrupt):
-                sleep(ENDING)
-            sleep(PATIENCE * min(self.rank, 5))  # it may be the same on all
-            stderr = self._streams[1] if self._streams else sys.stderr
-            print(f"rank {self.rank}: {text}", file=stderr, flush=True)
-            self.ranks.comm.Abort(code)
-        if text:
-            print(text, file=sys.stderr, flush=True)
-        if many:
-            self.ranks.agree()  # mpirun kills the others once one has ended with an error
-            return code
-        return 0 if self._is_shared and self.rank else code
+def _share_cores(local: int) -> None:
+    """Give each rank its fraction of the cores, unless the user has said how many threads it takes."""
+    if local < 2:
+        return
+    count = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+    threads = str(max(1, len(count) // local))
+    for name in ("KRATOS_LITE_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", threads))
 
 
 def _engine(words: Sequence[str]) -> str:
@@ -135,3 +86,62 @@ def _engine(words: Sequence[str]) -> str:
     joined = " ".join(words).replace("--engine=", "--engine ").split()
     after = [joined[at + 1 : at + 2] for at, word in enumerate(joined) if word == "--engine"]
     return "".join(after[-1]) if after else ""
+
+
+# ---- part files ----------------------------------------------------------------------------------------
+
+
+def part_files_of(options: Namespace) -> dict[int, Path]:
+    """Return the part files that an input stands for, by number; none where one file holds the mesh."""
+    if getattr(options, "engine", None) != "petsc":
+        return {}
+    from kratos_lite.io.formats import ending, input_file
+    from kratos_lite.io.formats.part_files import check_part_files, part_files
+    from kratos_lite.io.kratos.run_file import part_files_of as of_project
+
+    path = input_file(options.input)
+    files = of_project(path) if ending(path) == ".json" else part_files(path)
+    if files:
+        from kratos_lite.distributed.communicator import started
+
+        check_part_files(path, files, started().size)
+    return files
+
+
+def solve_parts(options: Namespace) -> tuple[list[str], list[str]]:
+    """Let each rank solve its part; return the lines of the summary and the files written."""
+    from kratos_lite.distributed.communicator import started
+
+    found: tuple[list[str], list[str]] = started().run(_solve_part, options)
+    return found
+
+
+def _solve_part(ranks: Alone, options: Namespace) -> tuple[list[str], list[str]]:
+    from kratos_lite.analysis.part_analysis import solve_part
+    from kratos_lite.cli.apply_options import case_of
+    from kratos_lite.distributed.partition import Partition
+    from kratos_lite.io.runners.outcome import Outcome
+    from kratos_lite.io.writers.pieces import write_pieces
+
+    with ranks.agree_on_errors():
+        case = case_of(options, part=ranks.rank)
+        _check(case)
+    model = case.model
+    given = case.solver, case.tolerance, None, options.petsc
+    result = solve_part(model, Partition(ranks, model.mesh), *given)
+    for path in case.outputs.results:
+        write_pieces(path, result, case.outputs.mode or "binary")
+    return Outcome(case, result.table()).summary(verbose=options.verbose), case.outputs.results
+
+
+def _check(case: Any) -> None:
+    """Raise InputError for what a case in parts cannot have: time, modes, other outputs than pieces."""
+    from kratos_lite.io.outputs import check_outputs
+    from kratos_lite.io.run import check_case
+
+    check_case(case)
+    check_outputs(case)
+    outputs = case.outputs
+    for path in (*outputs.results, outputs.json, outputs.picture):
+        if path is not None and not str(path).endswith(OF_PARTS):
+            raise InputError(f"{path}: no process has the whole of a mesh in part files; write -o OUT.pvtu")

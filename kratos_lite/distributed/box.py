@@ -1,15 +1,26 @@
-"""A box: whole, or of which each of several ranks makes its own part."""
+"""A box of which each rank makes its own part, however large the whole is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from kratos_lite.distributed.pieces import Piece
-    from kratos_lite.mesh import Mesh
-    from kratos_lite.mesh.generators import Counts
-    from kratos_lite.mesh.subdomain import Alone
+import numpy as np
+
+from kratos_lite.distributed.communicator import Alone, world
+from kratos_lite.distributed.partition import Partition
+from kratos_lite.mesh import SIDES, Block, Mesh
+from kratos_lite.mesh.generators import (
+    Counts,
+    corner_and_lengths,
+    counts_of,
+    kind_of,
+    sides_of,
+    unit_cells,
+)
+from kratos_lite.typing import Array, Ints
+
+STEPS = 4
+"""Places of nodes along a brick: those of a 13-node pyramid lie at its quarters."""
 
 
 def box(
@@ -17,73 +28,45 @@ def box(
     cells: Sequence[int] = (1, 1, 1),
     element: str = "Element3D8N",
     origin: Sequence[float] = (0.0, 0.0, 0.0),
-    *,
-    comm: Any = None,
-) -> Mesh:
-    """Return a box with parts ``x- x+ y- y+ z- z+``, the nodes of its six sides.
+    ranks: Alone | None = None,
+) -> tuple[Mesh, Partition]:
+    """Return the part of a box that belongs to this rank, and its partition; all ranks call it.
 
     Parameters
     ----------
-    size : edge lengths in m, > 0.
-    cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
-    element : name of the element, or its number of nodes, ``"20N"``, which means ``Element3D20N``: it and its
-        kin are computed by one that does not lock.
-    origin : the corner with the smallest coordinates, m.
-    comm : communicator of mpi4py, whose processes share the box: each makes a block of it and the elements
-        around, with the ids that they have in the whole; None for one process.
+    size, cells, element, origin : as for `kratos_lite.box`.
+    ranks : those of mpirun if not given.
 
     Returns
     -------
-    Mesh
+    The mesh of the part, with those nodes of the sides ``x- x+ y- y+ z- z+`` that it has; and the partition.
 
     Raises
     ------
     InputError
-        If a length or a number of cells is not positive, there is no such element, or `comm` is none.
+        As for `kratos_lite.box`, or there are more ranks than bricks.
 
     Examples
     --------
-    >>> mesh = box((1, 1, 1), cells=(2, 2, 2), element="KinematicLinear3D20N")
-    >>> mesh.n_nodes, mesh.n_elements, len(mesh.nodes("z+"))
-    (81, 8, 21)
+    >>> from kratos_lite.distributed.communicator import ALONE
+    >>> mesh, partition = box(cells=(2, 2, 2), ranks=ALONE)
+    >>> mesh.n_elements, int(partition.own.sum())
+    (8, 27)
     """
-    from kratos_lite.mesh import generators
-
-    if comm is None:
-        return generators.box(size, cells, element, origin)
-    from dataclasses import replace
-
-    from kratos_lite.distributed.communicator import ranks_of
-    from kratos_lite.distributed.subdomains import subdomain_mesh
-
-    ranks = ranks_of(comm)
-    with ranks.together():
-        corner, lengths = generators.corner_and_lengths(size, origin)
-        piece = _piece(ranks, cells, element)
-        return subdomain_mesh(ranks, replace(piece, points=corner + piece.points * lengths))
-
-
-def _piece(ranks: Alone, cells: Sequence[int], element: str) -> Piece:
-    """Return the block of the unit cube that a rank makes, by the ids of the whole."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from kratos_lite.distributed.box_ids import element_ids, node_ids
-    from kratos_lite.distributed.pieces import Kind, Piece
-    from kratos_lite.mesh import SIDES
-    from kratos_lite.mesh.generators import counts_of, kind_of, sides_of, unit_cells
-
+    ranks = world() if ranks is None else ranks
+    corner, lengths = corner_and_lengths(size, origin)
     (name, shape), counts = kind_of(element), counts_of(cells)
     low, high = block_of(counts, ranks.rank, ranks.size)
-    if min(b - a for a, b in zip(low, high, strict=True)) < 1:
-        return Piece()
-    points, nodes = unit_cells(counts, shape, low, high)
-    ids = node_ids(counts, shape, low, high, nodes)
-    sides = {side: replace(part, nodes=ids[part.nodes]) for side, part in sides_of(points, SIDES).items()}
-    numbers = element_ids(counts, shape, low, high)
-    kind = Kind(name, ids[nodes], numbers, np.ones_like(numbers), shape)
-    return Piece((kind,), (), ids, points, parts=sides)
+    unit, nodes = unit_cells(counts, shape, low, high)
+    ids = _element_ids(counts, low, high, len(nodes))
+    mesh = Mesh(
+        corner + unit * lengths,
+        [Block(name, nodes, ids, shape=shape)],
+        node_ids=_node_ids(counts, unit),
+        parts=sides_of(unit, SIDES),
+        whole=False,
+    )
+    return mesh, Partition(ranks, mesh)
 
 
 def block_of(cells: Counts, rank: int, size: int) -> tuple[Counts, Counts]:
@@ -104,3 +87,18 @@ def block_of(cells: Counts, rank: int, size: int) -> tuple[Counts, Counts]:
         else:
             low[axis], rank, size = cut, rank - lower, size - lower
     return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def _node_ids(cells: Counts, unit: Array) -> Ints:
+    """Return a number of each place in the grid of all that nodes may have."""
+    steps = STEPS * np.array(cells)
+    x, y, z = np.rint(unit * steps).astype(np.int64).T
+    return np.asarray(1 + x + (steps[0] + 1) * (y + (steps[1] + 1) * z))
+
+
+def _element_ids(cells: Counts, low: Counts, high: Counts, count: int) -> Ints:
+    """Return the ids that the cells between two corners of the grid have in the whole."""
+    i, j, k = (np.arange(a, b) for a, b in zip(low, high, strict=True))
+    bricks = ((i[:, None, None] * cells[1] + j[:, None]) * cells[2] + k).ravel()
+    each = count // len(bricks) if len(bricks) else 1
+    return np.asarray(1 + (bricks[:, None] * each + np.arange(each)).ravel())

@@ -1,72 +1,108 @@
-"""Ranks: the processes that share a mesh, over MPI; an error of one of them ends the work of all."""
+"""Ranks: the processes that mpirun has started. Rank 0 runs the program; the others work for it."""
 
 from __future__ import annotations
 
+import atexit
+import ctypes
+import logging
+import os
 import pickle
-from collections.abc import Iterator, Sequence
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from time import perf_counter, sleep
-from typing import Any
+from importlib.util import find_spec
+from signal import SIG_IGN, SIGINT, signal
+from threading import Timer
+from time import sleep
+from typing import Any, TypeVar
 
 import numpy as np
 
 from kratos_lite.errors import InputError, KratosLiteError
-from kratos_lite.mesh.subdomain import ALONE, Alone
 
+T = TypeVar("T")
+LOG = logging.getLogger(__name__)
 INSTALL = "python3-mpi4py of Debian or `pip install kratos-lite[mpi]`"
-SPIN, PAUSE = 1e-3, 1e-4
-"""Seconds that a rank looks for the others without a pause, and between two looks after that."""
+LIMIT = 60.0
+"""Seconds within which all ranks must have begun: one that has ended would be waited for without end."""
+PAUSE = 1e-3
+"""Seconds between two looks for work, so that a rank without work leaves its core to others."""
 
 
-def world() -> Alone:
-    """Return the ranks that ``mpirun`` has started, or the single process."""
-    return ranks_of(_mpi().COMM_WORLD)
+class Alone:
+    """The communicator of a single process: each reduction returns what it is given.
 
-
-def ranks_of(comm: Any) -> Alone:
-    """Return the ranks of an mpi4py communicator; InputError if it is none.
-
-    Parameters
-    ----------
-    comm : such as ``mpi4py.MPI.COMM_WORLD``; Ranks are returned as they are, and None is the one process.
+    All ranks make each call but `run`, which rank 0 makes.
     """
-    if comm is None:
-        return ALONE
-    if isinstance(comm, Alone):
-        return comm
-    if not isinstance(comm, _mpi().Comm):
-        raise InputError(f"comm must be a communicator such as mpi4py.MPI.COMM_WORLD; got {comm!r}")
-    return Ranks(comm)
+
+    rank = 0
+    size = 1
+    comm: Any = None
+
+    def sum(self, value: Any) -> Any:
+        """Return the sum over ranks of a number or of each entry of an array, the same on all ranks."""
+        return value
+
+    def max(self, value: Any) -> Any:
+        """Return the largest over ranks, entry by entry."""
+        return value
+
+    def min(self, value: Any) -> Any:
+        """Return the smallest over ranks, entry by entry."""
+        return value
+
+    def any(self, value: bool) -> bool:
+        """Return whether it is true on any rank."""
+        return bool(self.max(int(value)))
+
+    def all(self, value: bool) -> bool:
+        """Return whether it is true on all ranks."""
+        return bool(self.min(int(value)))
+
+    def gather(self, value: Any) -> list[Any]:
+        """Return the value of each rank, on all ranks; for small values."""
+        return [value]
+
+    def exchange(self, arrays: Sequence[Any]) -> list[Any]:
+        """Send array i to rank i, and return what each rank has sent here.
+
+        Parameters
+        ----------
+        arrays : one for each rank, with as many entries as there is to send; all of one type and shape.
+        """
+        return list(arrays)
+
+    @contextmanager
+    def agree_on_errors(self) -> Iterator[None]:
+        """Let an error of one rank in this block, in which nothing is sent, be raised on all ranks."""
+        yield
+
+    def run(self, task: Callable[..., T], *arguments: Any, each: Callable[[int], Any] | None = None) -> T:
+        """Call task(ranks, *arguments) on all ranks, and return what it returns on rank 0, which calls this.
+
+        A task sends and receives on all ranks alike.  It raises a KratosLiteError on all ranks, or before
+        it sends anything inside `agree_on_errors`; whatever else one rank raises ends all of them.
+
+        Parameters
+        ----------
+        task : a function of a module.
+        arguments : the same for all ranks.
+        each : called with the number of a rank, gives one more argument for that rank alone.
+        """
+        return task(self, *arguments, *([] if each is None else [each(0)]))
 
 
-def _mpi() -> Any:
-    """Return mpi4py's MPI; InputError where it is absent."""
-    try:
-        from mpi4py import MPI
-    except ImportError as error:
-        raise InputError(
-            f"several ranks need mpi4py, which does not load ({error}); install {INSTALL}"
-        ) from None
-    return MPI
+ALONE = Alone()
 
 
 class Ranks(Alone):
     """The ranks of an MPI communicator.
 
-    Each call below is made by all ranks.  It begins by agreeing that nobody has failed: a rank that fails
-    inside `together` takes part in that with its error, which all others then raise as well.
-
     Parameters
     ----------
     comm : mpi4py communicator.
-
-    Attributes
-    ----------
-    shares : the kinds of errors that all ranks raise if one does.  Others, and Ctrl-C, may come while the
-        others wait for something else: they leave `together` at once, and who catches them ends all ranks.
     """
-
-    shares: tuple[type[BaseException], ...] = (BaseException,)
 
     def __init__(self, comm: Any) -> None:
         self.comm, self._MPI = comm, _mpi()
@@ -75,10 +111,7 @@ class Ranks(Alone):
     def __deepcopy__(self, memo: Any) -> Ranks:
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        raise InputError("what is shared by several ranks cannot be pickled; each rank writes its own piece")
-
-    # ---- reductions --------------------------------------------------------------------------------
+    # ---- values ------------------------------------------------------------------------------------
 
     def sum(self, value: Any) -> Any:
         """Return the sum over ranks."""
@@ -92,34 +125,19 @@ class Ranks(Alone):
         """Return the smallest over ranks."""
         return self._reduce(value, self._MPI.MIN)
 
-    def any(self, value: Any) -> Any:
-        """Return whether it is true on any rank."""
-        return self._reduce(np.asarray(value, dtype=bool), self._MPI.LOR)
-
-    def all(self, value: Any) -> Any:
-        """Return whether it is true on all ranks."""
-        return self._reduce(np.asarray(value, dtype=bool), self._MPI.LAND)
-
     def _reduce(self, value: Any, operation: Any) -> Any:
-        self.agree()
         given = np.ascontiguousarray(value)
         found = np.empty_like(given)
         self.comm.Allreduce(given, found, operation)
-        if isinstance(value, np.ndarray) and value.ndim:
-            return found.reshape(value.shape)
-        return found.ravel()[0].item()
-
-    # ---- messages ----------------------------------------------------------------------------------
+        return found.reshape(value.shape) if isinstance(value, np.ndarray) else found.ravel()[0].item()
 
     def gather(self, value: Any) -> list[Any]:
         """Return the value of each rank."""
-        self.agree()
         found: list[Any] = self.comm.allgather(value)
         return found
 
     def exchange(self, arrays: Sequence[Any]) -> list[Any]:
         """Send array i to rank i, and return what each rank has sent here."""
-        self.agree()
         counts = np.array([len(one) for one in arrays], dtype=np.int64)
         coming = np.empty_like(counts)
         self.comm.Alltoall(counts, coming)
@@ -127,50 +145,223 @@ class Ranks(Alone):
         sent = np.ascontiguousarray(np.concatenate(arrays))
         came = np.empty((int(coming.sum()), *shape), dtype=dtype)
         width = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
-        row = self._MPI.BYTE.Create_contiguous(max(width, 1)).Commit()  # so that counts are those of rows
+        entry = self._MPI.BYTE.Create_contiguous(
+            max(width, 1)
+        ).Commit()  # so that counts are those of entries
         try:
             self.comm.Alltoallv(
-                [sent, (counts, _starts(counts)), row], [came, (coming, _starts(coming)), row]
+                [sent, (counts, _starts(counts)), entry], [came, (coming, _starts(coming)), entry]
             )
         finally:
-            row.Free()
+            entry.Free()
         return np.split(came, np.cumsum(coming)[:-1])
 
     # ---- errors ------------------------------------------------------------------------------------
 
-    def agree(self) -> None:
-        """Raise on all ranks the error that one of them has met."""
-        if self._has_anybody_failed(False):
-            raise self._shared(None)
-
     @contextmanager
-    def together(self) -> Iterator[None]:
-        """Let an error that a rank raises inside end the block on all ranks."""
+    def agree_on_errors(self) -> Iterator[None]:
+        """Let an error of one rank in this block, in which nothing is sent, be raised on all ranks."""
+        error = None
         try:
             yield
-            self.agree()
-        except BaseException as error:
-            is_known = getattr(error, "is_shared", False)
-            if is_known or isinstance(error, KeyboardInterrupt) or not isinstance(error, self.shares):
+        except Exception as raised:
+            error = raised
+        found = [pickle.loads(one) for one in self.gather(_packed(error)) if one is not None]
+        if found:
+            raise found[0] from error
+
+    def abort(self, error: BaseException) -> None:
+        """End all ranks, of which others may wait for this one, and say why."""
+        known = isinstance(error, KratosLiteError)
+        text = "interrupted" if isinstance(error, KeyboardInterrupt) else f"{error}"
+        text = text if known or isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {text}"
+        LOG.debug("%s", "".join(traceback.format_exception(error)))
+        if sys.__stderr__ is not None:
+            sys.__stderr__.write(f"error: rank {self.rank}: {text}\n")
+            sys.__stderr__.flush()
+        self.comm.Abort(2)
+
+    # ---- work --------------------------------------------------------------------------------------
+
+    def run(self, task: Callable[..., T], *arguments: Any, each: Callable[[int], Any] | None = None) -> T:
+        """Call task(ranks, *arguments) on all ranks, and return what it returns here, on rank 0."""
+        for rank in range(1, self.size):
+            given = arguments if each is None else (*arguments, each(rank))
+            self.comm.send(self._message(task, given), dest=rank)
+        return self._do(lambda: (task, arguments if each is None else (*arguments, each(0))))
+
+    def _message(self, task: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+        try:
+            return pickle.dumps((task, arguments), protocol=5)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise InputError(
+                f"this model cannot be sent to other ranks: {error}; define its elements and materials in a "
+                "module that all ranks can import"
+            ) from None
+
+    def _do(self, work: Callable[[], tuple[Callable[..., T], tuple[Any, ...]]]) -> T:
+        """Do one task here; all ranks raise the error of one of them."""
+        with self.agree_on_errors():
+            task, arguments = work()
+        result: Any = None
+        with self.agree_on_errors():
+            try:
+                result = task(self, *arguments)
+            except KratosLiteError:
                 raise
-            self._has_anybody_failed(True)
-            raise self._shared(error) from None
+            except BaseException as error:
+                self.abort(error)
+        return result
 
-    def _has_anybody_failed(self, mine: bool) -> bool:
-        flag = np.array([mine], dtype=np.int32)
-        request = self.comm.Iallreduce(self._MPI.IN_PLACE, flag, self._MPI.MAX)
-        start = perf_counter()
-        while not request.Test():  # in Python, so that a signal ends a rank that waits for the others
-            if perf_counter() - start > SPIN:
-                sleep(PAUSE)
-        return bool(flag[0])
+    def serve(self) -> None:
+        """Do the tasks of rank 0 until it ends."""
+        while True:
+            while not self.comm.Iprobe(source=0):
+                sleep(PAUSE)  # in Python, so that a signal ends a rank that waits
+            message = self.comm.recv(source=0)
+            if message is None:
+                return
+            try:
+                self._do(lambda message=message: pickle.loads(message))  # type: ignore[misc]
+            except Exception as error:
+                LOG.debug("rank %d: %s", self.rank, error)  # rank 0 raises it
 
-    def _shared(self, error: BaseException | None) -> BaseException:
-        """Return the error of the lowest rank that has one, marked as known to all."""
-        found = next(one for one in self.comm.allgather(_packed(error)) if one is not None)
-        shared: BaseException = pickle.loads(found)
-        shared.is_shared = True  # type: ignore[attr-defined]
-        return shared
+    def stop(self) -> None:
+        """End the other ranks."""
+        for rank in range(1, self.size):
+            self.comm.send(None, dest=rank)
+
+
+def world(launched: int = 1) -> Alone:
+    """Return the ranks that mpirun has started, or the single process.
+
+    Parameters
+    ----------
+    launched : processes that a launcher says it has started.
+    """
+    comm = _mpi().COMM_WORLD
+    if launched > comm.Get_size():
+        raise InputError(
+            f"{launched} processes have been started, but mpi4py sees {comm.Get_size()}: it was made for "
+            "another MPI than that of this mpirun or srun; use the mpirun of its MPI "
+            "(python -m mpi4py --version)"
+        )
+    return Ranks(comm) if comm.Get_size() > 1 else ALONE
+
+
+def start(words: Sequence[str] = (), launched: int = 1) -> Alone:
+    """Return the ranks on rank 0; on the others, work for it until it ends, and end.
+
+    A script that ``mpirun`` starts calls this before anything else but the definition of its own elements and
+    materials.  Rank 0 goes on with the script; the others assemble and solve their parts whenever a model is
+    solved with ``engine="petsc"``.
+
+    Parameters
+    ----------
+    words : of the command, the same on all ranks.
+    launched : processes that a launcher says it has started.
+
+    Returns
+    -------
+    Ranks of mpirun, or the single process.
+
+    Raises
+    ------
+    InputError
+        mpi4py or PETSc is missing on a rank, or the ranks were started with different words.
+    """
+    if _STARTED:
+        return _STARTED[0]
+    ranks = world(launched)
+    if isinstance(ranks, Ranks):
+        with _limited():
+            ranks.comm.Barrier()
+        try:
+            _check(ranks, list(words))
+        except InputError:
+            if ranks.rank:
+                sys.exit()
+            raise
+        if ranks.rank:
+            signal(SIGINT, SIG_IGN)  # rank 0 ends the others
+            try:
+                ranks.serve()
+            except BaseException as error:
+                ranks.abort(error)
+            sys.exit()
+        atexit.register(ranks.stop)
+    _STARTED.append(ranks)
+    return ranks
+
+
+def started() -> Alone:
+    """Return the ranks that `start` has found, or the single process; InputError for several without it."""
+    if not _STARTED and find_spec("mpi4py") is not None and (size := world().size) > 1:
+        raise InputError(
+            f"{size} ranks have been started, and each runs this program; begin it with "
+            "kratos_lite.distributed.start(), so that rank 0 runs it and the others work for it"
+        )
+    return _STARTED[0] if _STARTED else ALONE
+
+
+_STARTED: list[Alone] = []
+"""What `start` has found, once it was called."""
+
+
+def _check(ranks: Ranks, words: list[str]) -> None:
+    """Raise InputError on all ranks where one of them lacks a package or was started otherwise."""
+    from kratos_lite.distributed.petsc import petsc
+
+    with ranks.agree_on_errors():
+        try:
+            petsc()
+        except InputError as error:
+            raise InputError(f"rank {ranks.rank}: {error}" if ranks.rank else str(error)) from None
+    found = ranks.gather(words)
+    for rank, one in enumerate(found):
+        if one != found[0]:
+            raise InputError(
+                f"ranks share one command; rank 0 has {' '.join(found[0])!r}, rank {rank} {' '.join(one)!r}"
+            )
+
+
+def _mpi() -> Any:
+    """Return mpi4py's MPI, initialized; InputError where it is absent."""
+    try:
+        import mpi4py
+
+        if "mpi4py.MPI" not in sys.modules:  # its own initialization would let no other thread run
+            mpi4py.rc.initialize, mpi4py.rc.finalize = False, True
+        from mpi4py import MPI
+    except ImportError as error:
+        raise InputError(
+            f"several ranks need mpi4py, which does not load ({error}); install {INSTALL}"
+        ) from None
+    if not MPI.Is_initialized():
+        with _limited():
+            ctypes.CDLL(MPI.__file__).MPI_Init(None, None)
+    return MPI
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """End this process, and so all ranks, where the others do not come: one may have ended early."""
+
+    def end() -> None:
+        if sys.__stderr__ is not None:
+            sys.__stderr__.write(
+                f"error: after {LIMIT:g} s not all ranks have begun; one may have ended early\n"
+            )
+            sys.__stderr__.flush()
+        os._exit(2)
+
+    timer = Timer(LIMIT, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _starts(counts: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.mesh.subdomain import Alone
+from kratos_lite.distributed.communicator import Alone
 from kratos_lite.typing import Ints
 
 
@@ -40,7 +40,7 @@ class Ghosts:
         """Give ghosts the values of their owners, in place; `values` (n, k) of any type."""
         if not (self._givers or self._takers):
             return
-        comm: Any = self.ranks.comm  # type: ignore[attr-defined]
+        comm: Any = self.ranks.comm
         sent = [np.ascontiguousarray(values[self.wanted[rank]]) for rank in self._takers]
         open_ = [comm.Irecv(_bytes(values[self._of(rank)]), source=rank) for rank in self._givers]
         open_ += [comm.Isend(_bytes(one), dest=rank) for one, rank in zip(sent, self._takers, strict=True)]
@@ -50,7 +50,7 @@ class Ghosts:
         """Add the values of ghosts to those of their owners, in place; the ghosts keep theirs."""
         if not (self._givers or self._takers):
             return
-        comm: Any = self.ranks.comm  # type: ignore[attr-defined]
+        comm: Any = self.ranks.comm
         came = [np.empty((len(self.wanted[rank]), *values.shape[1:]), values.dtype) for rank in self._takers]
         open_ = [comm.Irecv(_bytes(one), source=rank) for one, rank in zip(came, self._takers, strict=True)]
         open_ += [comm.Isend(_bytes(values[self._of(rank)]), dest=rank) for rank in self._givers]

@@ -58,7 +58,6 @@ class Krylov:
         self.prefix = f"{PREFIX}{next(NUMBERS)}_"
         self.options, self.given = {**chosen, **given}, dict(given)
         self._A, self._is_ready, self.most = A, False, most
-        self._error: BaseException | None = None
         self._share: Share | None = None
         with plain_errors():
             set_options(self.prefix, self.options)
@@ -151,9 +150,6 @@ class Krylov:
         self._size = 0.0
         with plain_errors():
             ksp.solve(b, x)
-        if self._error:
-            error, self._error = self._error, None
-            raise error
         if self._share:
             self._share.finish()
         return (0 if ksp.getType() == "preonly" else ksp.getIterationNumber()), self._failure()
@@ -169,15 +165,10 @@ class Krylov:
         return f"{self.name}: {words.format(self.ksp.getIterationNumber())}"
 
     def _report(self, ksp: Any, iteration: int, residual: float) -> None:
-        """Report progress; an error waits until all ranks have come out of the iteration."""
-        if self._share is None or self._error:
-            return
-        try:
-            self._size = self._size or residual
-            if self._size > 0:
-                self._share(residual / self._size)
-        except BaseException as error:  # such as the user's Ctrl-C
-            self._error = error
+        """Report progress."""
+        self._size = self._size or residual
+        if self._share is not None and self._size > 0:
+            self._share(residual / self._size)
 
     def unused(self) -> list[str]:
         """Return the user's options that PETSc has not asked for."""

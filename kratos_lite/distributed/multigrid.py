@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.distributed.coarsening import Coarser, coarsened
+from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.ghosts import Ghosts
-from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.native import kernels
 from kratos_lite.solvers.multigrid import DEGREE, RATIO
 from kratos_lite.typing import Array, Mask

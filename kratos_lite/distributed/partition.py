@@ -1,128 +1,194 @@
-"""Partition: which rank gets each element, so that all have equal work and few neighbors.
-
-METIS cuts the graph of the elements that share faces, on rank 0, where its wheel `pymetis` is installed.
-Else, and for meshes too large for one rank, the ranks halve the mesh together (`bisection`).
-"""
+"""Partition: how the parts of a mesh that no process has whole hang together."""
 
 from __future__ import annotations
 
+import itertools
+import pickle
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from kratos_lite.distributed.bisection import bisected
-from kratos_lite.distributed.directory import Route
-from kratos_lite.distributed.lookup import Lookup, merged
-from kratos_lite.distributed.node_directory import places
-from kratos_lite.distributed.pieces import Kind, Piece, aligned, cell_ids
-from kratos_lite.mesh import Block, Faces, Mesh
-from kratos_lite.mesh.subdomain import ALONE, Alone
-from kratos_lite.typing import Ints
-
-METIS_ELEMENTS = 10_000_000
-"""Elements up to which one rank cuts the graph: it takes 3 µs and 0.6 kB for each, 6 GB of all these."""
-FEW = 10
-"""Elements a part below which METIS leaves some parts empty."""
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.distributed.communicator import Alone
+from kratos_lite.distributed.cut import Part
+from kratos_lite.errors import MeshError
+from kratos_lite.mesh import Mesh
+from kratos_lite.typing import Array, Ints, Mask, Numbers
 
 
-def parts_of(mesh: Mesh, ranks: Alone) -> Ints:
-    """Return the rank of each element of a mesh that every rank knows whole.
+class Partition:
+    """What a rank knows of the nodes of its part, which is an ordinary mesh; all ranks make it and call it.
 
-    The work of an element is taken as the square of its number of nodes.
+    Each element is in one part, each node in every part that uses it; the lowest of these owns it.
 
     Parameters
     ----------
-    mesh : the same on all ranks.
-    ranks : that share it.
+    ranks : with a part each.
+    mesh : the part of this one.
 
-    Returns
-    -------
-    (m,) int, 0 … size - 1.
-    """
-    work = _work(mesh.blocks)
-    if not _takes_metis(ranks, mesh.n_elements):
-        centers = [mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks if len(block)]
-        return bisected(ALONE, np.concatenate([np.zeros((0, 3)), *centers]), work, ranks.size)
-    with ranks.together():
-        parts = metis(mesh.blocks, work, ranks.size) if ranks.rank == 0 else work[:0]
-        return ranks.exchange([parts] * ranks.size)[0]
-
-
-def partitioned(ranks: Alone, piece: Piece) -> Piece:
-    """Return a piece with its elements replaced by those of its part; all the rest stays where it is.
-
-    Parameters
+    Attributes
     ----------
-    ranks : the communicator.
-    piece : what this rank has of a mesh, such as a range of a file.
+    rank, size, sum, max, gather, agree_on_errors : those of the ranks.
+    owner : (n,) int, rank that owns each node.
+    own : (n,) bool, whether this one does.
+    number : (n,) int, number of each node among those of all ranks, from 0, ascending by owner.
 
     Raises
     ------
     MeshError
-        Nobody knows a node of an element, or ranks disagree on its place.
+        Two parts have the same element, or a node at different places.
     """
-    with ranks.together():
-        kinds = aligned(ranks, piece.elements)
-        if _takes_metis(ranks, ranks.sum(len(cell_ids(kinds)))):
-            parts = _cut_on_one(ranks, kinds)
-        else:
-            ids, points = places(ranks, piece, kinds)
-            rows = Lookup(ids)
-            centers = [points[rows.rows(kind.nodes)].mean(axis=1) for kind in kinds]
-            parts = bisected(ranks, np.concatenate([points[:0], *centers]), _work(kinds), ranks.size)
-        ends = np.cumsum([len(kind.ids) for kind in kinds])[:-1]
-        routes = [Route(ranks, part) for part in np.split(parts, ends)[: len(kinds)]]
-        moved = [kind.with_table(route.send(kind.table)) for kind, route in zip(kinds, routes, strict=True)]
-        return replace(piece, elements=tuple(moved))
+
+    def __init__(self, ranks: Alone, mesh: Mesh) -> None:
+        self.ranks, self.rank, self.size = ranks, ranks.rank, ranks.size
+        self.sum, self.max, self.gather = ranks.sum, ranks.max, ranks.gather
+        self.agree_on_errors = ranks.agree_on_errors
+        for block in mesh.blocks:
+            self._check_once(block.ids)
+        order = np.argsort(mesh.node_ids, kind="stable")
+        places = _Directory(ranks, mesh.node_ids[order], mesh.points[order])
+        self.owner = np.empty(mesh.n_nodes, dtype=np.int64)
+        self.owner[order] = places.owner
+        self.own: Mask = self.owner == ranks.rank
+        rows = np.flatnonzero(self.own)
+        self.offsets = np.concatenate([[0], np.cumsum(ranks.gather(len(rows)))])
+        self.number = np.full(mesh.n_nodes, -1)
+        self.number[rows] = self.offsets[ranks.rank] + np.arange(len(rows))
+        ids = mesh.node_ids[rows]
+        by_id = np.argsort(ids, kind="stable")
+        ghosts = [np.flatnonzero((self.owner == rank) & ~self.own) for rank in range(ranks.size)]
+        asked = ranks.exchange([mesh.node_ids[some] for some in ghosts])
+        own = [rows[by_id[np.searchsorted(ids[by_id], some)]] for some in asked]
+        self._ghosts, self._asked = ghosts, own
+        self.number = self.fetch(self.number)
+
+    def _check_once(self, ids: Ints) -> None:
+        """Raise MeshError for an element that two parts have."""
+        to = ids % self.ranks.size
+        came = np.sort(np.concatenate(self.ranks.exchange([ids[to == r] for r in range(self.ranks.size)])))
+        twice = came[1:][came[1:] == came[:-1]]
+        with self.ranks.agree_on_errors():
+            if len(twice):
+                raise MeshError(f"element {twice[0]} is in two parts; make the parts anew")
+
+    # ---- values of nodes ---------------------------------------------------------------------------
+
+    def fetch(self, values: Numbers) -> Any:
+        """Return nodal values (n, ...) with those of nodes that others own taken from these."""
+        out = np.array(values)
+        for rows, came in zip(
+            self._ghosts, self.ranks.exchange([out[some] for some in self._asked]), strict=True
+        ):
+            out[rows] = came
+        return out
+
+    def add(self, values: Numbers) -> Any:
+        """Return nodal values (n, ...) summed over the parts that have the node."""
+        out = np.array(values)
+        for rows, came in zip(
+            self._asked, self.ranks.exchange([out[some] for some in self._ghosts]), strict=True
+        ):
+            out[rows] += came  # a part has a node once
+        return self.fetch(out)
+
+    @cached_property
+    def _shared_by(self) -> Array:
+        return np.asarray(self.add(np.ones(len(self.owner))))
+
+    def average(self, values: Array) -> Array:
+        """Return nodal values (n, ...) averaged over the parts that have the node."""
+        return np.asarray(self.add(values) / self._shared_by.reshape(-1, *[1] * (values.ndim - 1)))
+
+    # ---- equations ---------------------------------------------------------------------------------
+
+    def equations(self, points: Array, groups: Sequence[ElementGroup], held: Mask) -> Part:
+        """Return the equations of this rank, with all elements at own nodes.
+
+        Parameters
+        ----------
+        points : (n, 3) m.
+        groups : the elements of the part, without initial stress.
+        held : (n, 3) bool, what is prescribed, the same on all ranks that have a node.
+        """
+        has = np.zeros(len(points), dtype=bool)
+        for group in groups:
+            has[group.nodes] = True
+        has = np.asarray(self.add(has.astype(np.int8)) > 0) & ~held.all(axis=1)
+        rows = np.flatnonzero(has & self.own)
+        counts = self.ranks.gather(len(rows))
+        equation = np.full(len(points), -1)
+        equation[rows] = sum(counts[: self.ranks.rank]) + np.arange(len(rows))
+        equation = self.fetch(equation)
+        return self._with_halo(points, list(groups), held, rows, equation)
+
+    def _with_halo(
+        self, points: Array, groups: list[ElementGroup], held: Mask, own: Ints, equation: Ints
+    ) -> Part:
+        """Return the equations with the elements of other parts at own nodes, which these send."""
+        mine = self._groups_of_all(groups)
+        about = np.column_stack([self.number, equation, held])
+        tables, places = [], []
+        known, found = [about], [points]
+        for group in mine:
+            nodes = group.nodes
+            to = [np.asarray((self.owner[nodes] == r).any(axis=1)) for r in range(self.ranks.size)]
+            to[self.ranks.rank][:] = False
+            came = self.ranks.exchange([about[nodes[chosen]] for chosen in to])
+            where = self.ranks.exchange([points[nodes[chosen]] for chosen in to])
+            tables.append(np.concatenate(came))
+            places.append(np.concatenate(where))
+            known.append(tables[-1].reshape(-1, 5))
+            found.append(places[-1].reshape(-1, 3))
+        every, at = np.concatenate(known), np.concatenate(found)
+        numbers, first = np.unique(every[:, 0], return_index=True)
+        row = np.full(len(numbers), -1)
+        row[np.searchsorted(numbers, self.number)] = np.arange(len(points))
+        new = np.flatnonzero(row < 0)
+        row[new] = len(points) + np.arange(len(new))
+        pick = np.concatenate([np.arange(len(points)), first[new]])
+        whole = []
+        for group, table in zip(mine, tables, strict=True):
+            halo = row[np.searchsorted(numbers, table[..., 0])].astype(np.int32)
+            nodes = np.concatenate([group.nodes, halo])
+            whole.append(replace(group, nodes=nodes, rows=np.arange(len(nodes))))
+        fixed = every[pick, 2:].astype(bool)
+        return Part(at[pick], whole, own, every[pick, 1], ~fixed, fixed, {})
+
+    def _groups_of_all(self, groups: list[ElementGroup]) -> list[ElementGroup]:
+        """Return the groups that any rank has, in the same order on all, empty where this one has none."""
+        empty = [replace(g, nodes=g.nodes[:0], rows=g.rows[:0], prestress=None) for g in groups]
+        here = {pickle.dumps(kind): group for kind, group in zip(empty, groups, strict=True)}
+        every = dict.fromkeys(itertools.chain(*self.ranks.gather(list(here))))
+        return [here[kind] if kind in here else pickle.loads(kind) for kind in every]
 
 
-def _work(cells: Sequence[Block | Kind]) -> Ints:
-    return np.concatenate(
-        [np.zeros(0, dtype=np.int64), *(np.full(len(c.ids), c.nodes.shape[1] ** 2) for c in cells)]
-    )
+class _Directory:
+    """Who owns nodes: each id is looked after by one rank, which the others ask."""
 
-
-def _takes_metis(ranks: Alone, n_elements: int) -> bool:
-    """Return whether METIS cuts a mesh of so many elements: as rank 0 says, which does it."""
-    fits = FEW * ranks.size <= n_elements <= METIS_ELEMENTS
-    return ranks.size > 1 and fits and ranks.gather(find_spec("pymetis") is not None)[0]
-
-
-def _cut_on_one(ranks: Alone, kinds: Sequence[Kind]) -> Ints:
-    """Return the ranks of the elements of this rank, which rank 0 has found from the nodes of all."""
-    routes = [Route(ranks, np.zeros(len(kind.ids), dtype=np.int64)) for kind in kinds]
-    nodes = [route.send(kind.nodes) for kind, route in zip(kinds, routes, strict=True)]
-    here = Lookup(merged(*nodes))
-    blocks = [
-        Block(kind.name, here.rows(some).astype(np.int32), shape=kind.shape)
-        for kind, some in zip(kinds, nodes, strict=True)
-    ]
-    found = metis(blocks, _work(blocks), ranks.size) if ranks.rank == 0 else np.zeros(0, dtype=np.int64)
-    ends = np.cumsum([len(block) for block in blocks])[:-1]
-    parts = [route.back(part) for route, part in zip(routes, np.split(found, ends), strict=True)]
-    return np.concatenate(parts)
-
-
-def metis(blocks: Sequence[Block], work: Ints, size: int) -> Ints:
-    """Return the part of each element, by METIS; elements that share a face are neighbors.
-
-    Source: Karypis & Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392.
-
-    Parameters
-    ----------
-    blocks : of elements.
-    work : (m,) int, of each.
-    size : number of parts, 2 or more.
-    """
-    import pymetis
-
-    faces: Any = Faces(blocks)
-    one, other = faces.element[faces.one], faces.element[faces.other]
-    cells, neighbors = np.concatenate([one, other]), np.concatenate([other, one])
-    order = np.argsort(cells, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(cells, minlength=len(work)))])
-    graph = pymetis.CSRAdjacency(starts, neighbors[order])
-    return np.array(pymetis.part_graph(size, graph, vweights=work).vertex_part, dtype=np.int64)
+    def __init__(self, ranks: Alone, ids: Ints, points: Array) -> None:
+        to = ids % ranks.size
+        order = np.argsort(to, kind="stable")
+        cuts = np.searchsorted(to[order], np.arange(1, ranks.size))
+        asked = ranks.exchange(np.split(ids[order], cuts))
+        places = np.concatenate(ranks.exchange(np.split(points[order], cuts)))
+        known = np.concatenate(asked)
+        of_rank = np.repeat(np.arange(ranks.size), [len(some) for some in asked])
+        by_id = np.lexsort((of_rank, known))
+        starts = np.flatnonzero(np.diff(known[by_id], prepend=-1))
+        first = by_id[np.repeat(starts, np.diff(np.append(starts, len(known))))]
+        owner, first_of = np.empty_like(of_rank), np.empty_like(of_rank)
+        owner[by_id], first_of[by_id] = of_rank[first], first
+        with ranks.agree_on_errors():
+            apart = np.flatnonzero((places != places[first_of]).any(axis=1))
+            if len(apart):
+                at, other = apart[0], first_of[apart[0]]
+                raise MeshError(
+                    f"node {known[at]} lies at {places[other].tolist()} m in part {of_rank[other]} and at "
+                    f"{places[at].tolist()} m in part {of_rank[at]}; make the parts anew"
+                )
+        replies = ranks.exchange(np.split(owner, np.cumsum([len(some) for some in asked])[:-1]))
+        self.owner = np.empty(len(ids), dtype=np.int64)
+        self.owner[order] = np.concatenate(replies)

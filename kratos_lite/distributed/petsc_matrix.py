@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from kratos_lite.assembly.block_matrix import BlockMatrix
+from kratos_lite.distributed.communicator import Alone
 from kratos_lite.distributed.petsc import petsc
-from kratos_lite.mesh.subdomain import Alone
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.typing import Array, Ints, Mask, Rows
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import Any
 
+from kratos_lite.distributed.communicator import Ranks
 from kratos_lite.distributed.petsc import petsc
 from kratos_lite.distributed.petsc_matrix import communicator
 from kratos_lite.distributed.stiffness import SharedStiffness
-from kratos_lite.typing import Array
-
-LOG = logging.getLogger(__name__)
 
 
 def product_of(K: SharedStiffness) -> Any:
@@ -50,20 +47,17 @@ class _Cycle:
 
     def setUp(self, preconditioner: Any) -> None:
         if self.multigrid is None:
-            with self.K.ranks.together():
-                self.multigrid = self.K.multigrid()
+            self.multigrid = _safely(self.K, self.K.multigrid)
 
     def apply(self, preconditioner: Any, x: Any, y: Any) -> None:
         y.setArray(_safely(self.K, self.multigrid.precondition, x.getArray(readonly=True)))
 
 
-def _safely(K: SharedStiffness, call: Callable[[Array], Array], x: Array) -> Array:
+def _safely(K: SharedStiffness, call: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a call returns; an error ends all ranks, as the others wait for this one in an exchange."""
     try:
-        return call(x)
+        return call(*arguments)
     except Exception as error:
-        if K.ranks.size == 1:
-            raise
-        LOG.critical("rank %d: %s: %s", K.ranks.rank, type(error).__name__, error)
-        K.ranks.comm.Abort(1)  # type: ignore[attr-defined]
+        if isinstance(K.ranks, Ranks):
+            K.ranks.abort(error)
         raise

@@ -53,15 +53,7 @@ _LINES = {
 
 @remembered
 def degree_of(shape: type[Shape]) -> int:
-    """Return the polynomial degree of shape functions along the directions of a rule.
-
-    Functions that are no polynomials count as those that they span, `Shape.degree`.
-
-    >>> from kratos_lite.shapes.hexahedra import Hexahedron20
-    >>> from kratos_lite.shapes.tetrahedra import Tetrahedron4
-    >>> degree_of(Hexahedron20), degree_of(Tetrahedron4)
-    (2, 1)
-    """
+    """Return the degree of shape functions along directions of a rule; `Shape.degree` if not polynomials."""
     found, k = 0, np.arange(MOST + 2)
     T = np.cos(np.outer(k, np.pi * (k + 0.5) / (MOST + 2)))  # Chebyshev polynomials at the zeros of the last
     for start, end in np.array(_LINES[shape.cell]):
@@ -73,16 +65,7 @@ def degree_of(shape: type[Shape]) -> int:
 
 @remembered
 def exact_rule(shape: type[Shape], factors: int, geometry: int = CURVED, flow: bool = False) -> Rule:
-    """Return the rule that integrates a product of shape functions, det J included.
-
-    Parameters
-    ----------
-    shape : of the cell.
-    factors : number of functions in the product; coordinates X = Σ N_a X_a count, too.
-    geometry : AFFINE, STRAIGHT or CURVED.
-    flow : whether the integrand is N_a c·grad N_b or (c·grad N_a)(c·grad N_b) with a linear c.  The first is
-        a polynomial of the degree of N N det J; the second is one over affine cells alone.
-    """
+    """Return the rule that integrates a product of shape functions, or N c·grad N (`flow`), with det J."""
     p, simplex = degree_of(shape), shape.cell == "tetrahedron"
     curved = 3 * (p - 1) if simplex else 3 * p - 1
     degree = factors * p + (0, 0 if simplex else 2, curved)[geometry]
@@ -98,10 +81,7 @@ def has_rules(shape: type[Shape]) -> bool:
 
 @remembered
 def interpolations(shape: type[Shape]) -> list[tuple[Array, Array] | None]:
-    """Return nodes (b,) and C (n, b) of AFFINE and STRAIGHT: a cell has that geometry if X = C X[nodes].
-
-    None stands for a geometry that the functions of the shape do not span.
-    """
+    """Return nodes and C of AFFINE and STRAIGHT cells, X = C X[nodes]; None if a shape spans none."""
     if not has_rules(shape):
         return [None, None]
     xi = shape.nodes

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from kratos_lite.errors import InputError
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import ending, input_file, read_document, write_document
+from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.to_model import model_from
-from kratos_lite.mesh.subdomain import ALONE
 from kratos_lite.validation import path_of
 from kratos_lite.view.progress import watched
 
@@ -55,7 +55,7 @@ def read_case(
     strict: bool = True,
     allow_outside: bool = False,
     initial_displacement: bool = True,
-    comm: Any = None,
+    part: int | None = None,
 ) -> Case:
     """Return what an input means: model or body, analysis, outputs and expected values.
 
@@ -68,8 +68,7 @@ def read_case(
     allow_outside : let a .json file name files outside its folder.
     initial_displacement : take the DISPLACEMENT of nodes that are not fixed for the state without stress;
         False ignores it.
-    comm : communicator of mpi4py, such as ``MPI.COMM_WORLD``, whose ranks share the model: each gets its own
-        part of the mesh.
+    part : number of the part to read, of a mesh that Kratos has divided into part files.
 
     Returns
     -------
@@ -81,30 +80,26 @@ def read_case(
     InputError, MeshError, ModelError, MaterialError
         With file, line and cure of everything that is wrong.
     """
-    ranks = ALONE
-    if comm is not None:
-        from kratos_lite.distributed.communicator import ranks_of  # one process does without it
-
-        ranks = ranks_of(comm)
     path = input_file(path_of(path))
-    with watched(None, "read"), ranks.together():
+    with watched(None, "read"):
         if ending(path) == ".json":
             from kratos_lite.io.kratos.run_file import read_kratos_project
 
             case = read_kratos_project(
-                path, allow_outside, initial_displacement=initial_displacement, ranks=ranks
+                path, allow_outside, initial_displacement=initial_displacement, part=part
             )
         elif ending(path) == ".py":
             from kratos_lite.io.script import read_script
 
             case = read_script(path)
         else:
-            document = read_document(path, strict=strict, ranks=ranks)
+            document = (
+                read_document(path, strict=strict)
+                if part is None
+                else read_part(part_files(path)[part], strict)
+            )
             model = model_from(document, materials=materials, initial_displacement=initial_displacement)
             case = Case(model, files=[path])
-        if case.is_of_model and ranks.size > 1:  # what is noted of a line, each rank has noted
-            found = ranks.gather(case.model.notes)
-            case.model.notes = list(dict.fromkeys(note for notes in found for note in notes))
         return case
 
 
@@ -114,7 +109,7 @@ def write(path: str | Path, thing: Any, mode: str | None = None) -> list[str]:
     Parameters
     ----------
     path : a result goes to .vtu, .vtk, .json, .html, a page for the browser, or, values of nodes alone, .csv;
-        of many processes, which all call this, to .pvtu and a .vtu piece of each; values at points to .csv; a
+        to .pvtu and .vtu pieces of a result of many processes; values at points to .csv; a
         state to .npz, from which `read_state` reads; a model or a mesh to .mdpa, an .elem set, .vtu or a
         format of meshio.
     thing : a `Result`, what its `at` or `along` returns, a `State`, `Model` or `Mesh`.

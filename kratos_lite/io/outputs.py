@@ -14,10 +14,7 @@ from kratos_lite.io.writers.endings import (
     check_ending,
     check_modes,
     check_result,
-    check_result_of_ranks,
     check_series,
-    index_of,
-    piece_of,
 )
 from kratos_lite.io.writers.pictures import check_picture, write_picture
 from kratos_lite.io.writers.results import write_result
@@ -31,8 +28,6 @@ def check_outputs(case: Case) -> None:
     outputs, restart = case.outputs, case.time.restart if case.time else None
     read = [*case.files, *([Path(restart)] if restart else [])]
     check_targets(read, outputs.paths(), new_folders=case.time is not None)
-    if case.is_of_model and case.model.mesh.ranks.size > 1:
-        _check_of_ranks(case)
     for path in outputs.results:
         if case.modes:
             check_modes(path)
@@ -53,27 +48,6 @@ def check_outputs(case: Case) -> None:
         check_picture(outputs.picture)
     if not case.is_of_model and outputs.json is not None:
         raise InputError(f"{outputs.json}: a body has no summary in .json; write .csv or .npz")
-
-
-def _check_of_ranks(case: Case) -> None:
-    """Raise InputError for an output that several processes cannot write together."""
-    outputs, ranks = case.outputs, case.model.mesh.ranks
-    for path in outputs.results:
-        check_result_of_ranks(path)
-    if outputs.picture is not None:
-        raise InputError(f"{outputs.picture}: a picture is drawn by one process; write .pvtu for ParaView")
-    files = [written_as(path, ranks.size) for path in outputs.results]
-    pieces = [str(piece_of(path, ranks.rank)) for path in files if ending(path) == ".pvtu"]
-    check_targets(case.files, [*files, *pieces])
-
-
-def written_as(path: str, ranks: int) -> str:
-    """Return the file that is written for a path, the index of the pieces where several processes write.
-
-    >>> written_as("beam.vtu", 1), written_as("beam.vtu", 4)
-    ('beam.vtu', 'beam.pvtu')
-    """
-    return str(index_of(path)) if ranks > 1 and ending(path) == ".vtu" else path
 
 
 def write_at_end(outputs: Outputs, result: Result, *, in_time: bool) -> None:

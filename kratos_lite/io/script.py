@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kratos_lite.bodies import Body
-from kratos_lite.bodies.batched import together
+from kratos_lite.bodies.batched import batch
 from kratos_lite.errors import InputError, KratosLiteError, nearest
 from kratos_lite.io.case import Case, Outputs, TimeIntegration
 from kratos_lite.io.writers.endings import SERIES
@@ -60,7 +60,7 @@ def _case_of_body(path: Path, names: dict[str, Any]) -> Case:
         )
     body = names["body"]
     if isinstance(body, Sequence):
-        body = together(body)
+        body = batch(body)
     if not isinstance(body, Body):
         raise InputError(f"{path}: body must be a body such as kl.RigidBody, or a list of them; got {body!r}")
     given = {name: names[name] for name in ("every", "substeps") if name in names}

@@ -99,12 +99,7 @@ class LinearMaterial:
             raise MaterialError(f"{type(self).__name__}: C must be positive definite; {self.why_unstable()}")
 
     def why_unstable(self) -> str:
-        """Name the bound that the constants violate.
-
-        Returns
-        -------
-        str
-        """
+        """Return which bound the constants violate."""
         return "the strain energy of some strain is not positive"
 
     def compliance(self) -> Array:
@@ -170,13 +165,7 @@ class LinearMaterial:
         return e @ self.C.T
 
     def check_stress(self) -> None:
-        """Check that `stress` is C strain, once for each material; what is solved is C.
-
-        Raises
-        ------
-        MaterialError
-            If it is not, or does not take strains (..., 6).
-        """
+        """Check that `stress` is C strain, once for each material; what is solved is C."""
         if type(self).stress is not LinearMaterial.stress:
             _ = self._stress_is_checked
 

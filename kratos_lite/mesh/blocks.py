@@ -149,17 +149,8 @@ class Part:
         return Part, tuple(getattr(self, name) for name in names_of(type(self)))
 
     def __str__(self) -> str:
-        return listed([len(self.nodes), len(self.elements), len(self.conditions)])
-
-
-def listed(counts: Sequence[int]) -> str:
-    """Return in words how many nodes, elements and conditions a part has.
-
-    >>> listed([4, 0, 2])
-    '4 nodes, 2 conditions'
-    """
-    words = zip(counts, ("nodes", "elements", "conditions"), strict=True)
-    return ", ".join(f"{count} {what}" for count, what in words if count) or "empty"
+        counts = {what: len(getattr(self, what)) for what in ("nodes", "elements", "conditions")}
+        return ", ".join(f"{count} {what}" for what, count in counts.items() if count) or "empty"
 
 
 def blocks_of(given: Any, what: str = "blocks") -> tuple[Block, ...]:

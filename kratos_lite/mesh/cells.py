@@ -10,7 +10,6 @@ import numpy as np
 
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, blocks_of, ids_of, rows_of_ids
-from kratos_lite.mesh.subdomain import ALONE, Alone, Subdomain
 from kratos_lite.mesh.topology import Faces
 from kratos_lite.typing import Array, Ints, Mask
 
@@ -31,7 +30,7 @@ class Cells:
     node_ids : (n,) int, ids of the nodes; 1 … n if not given.
     source : name of the file they came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, or None.
-    subdomain : which nodes and cells are own, where many processes share them, or None.
+    whole : False for one part of a larger mesh, where named parts may be empty.
 
     Raises
     ------
@@ -44,7 +43,7 @@ class Cells:
     blocks: tuple[Block, ...]
     source: str
     hanging: HangingNodes | None
-    subdomain: Subdomain | None
+    whole: bool
 
     def __init__(
         self,
@@ -53,7 +52,7 @@ class Cells:
         node_ids: ArrayLike | None,
         source: str,
         hanging: HangingNodes | None = None,
-        subdomain: Subdomain | None = None,
+        whole: bool = True,
     ) -> None:
         X = finite(points, "points", ("n", 3), error=MeshError)
         n = len(X)
@@ -64,7 +63,7 @@ class Cells:
             blocks=blocks_of(blocks),
             source=source,
             hanging=hanging,
-            subdomain=subdomain,
+            whole=whole,
         )
         if not self._is_counting:
             ordered = self.node_ids[self._node_order]
@@ -89,77 +88,16 @@ class Cells:
                     f"rows are 0 … {self.n_nodes - 1}"
                 )
 
-    # ---- what is own, where many processes share the mesh ----------------------------------
-
-    @property
-    def ranks(self) -> Alone:
-        """The processes that share the mesh."""
-        return ALONE if self.subdomain is None else self.subdomain.ranks
-
-    @property
-    def own_nodes(self) -> Mask:
-        """(n,) bool, the nodes of this process: all, unless others share the mesh."""
-        return np.ones(self.n_nodes, dtype=bool) if self.subdomain is None else self.subdomain.mine
-
-    @property
-    def own_elements(self) -> Mask:
-        """(m,) bool, the elements of this process."""
-        return np.ones(self.n_elements, dtype=bool) if self.subdomain is None else self.subdomain.own_elements
-
     @cached_property
     def extent(self) -> Array:
-        """(2, 3) float, m, the lowest and the highest coordinates, of the nodes of all processes.
+        """(2, 3) float, m, the lowest and the highest coordinates of the nodes.
 
         Without nodes they are infinite.
         """
         columns = self.points.T  # one by one, which is faster
         low = np.array([x.min(initial=np.inf) for x in columns])
         high = np.array([x.max(initial=-np.inf) for x in columns])
-        return read_only(np.stack([self.ranks.min(low), self.ranks.max(high)]))
-
-    def first_element(self, chosen: Mask) -> int | None:
-        """Return the row of the first element of a mask (m,); None where only another process has that.
-
-        All processes ask.  The first is the one in the first block with the lowest id.
-
-        Parameters
-        ----------
-        chosen : (m,) bool.
-
-        Returns
-        -------
-        The row, or None, as where no process has any.
-        """
-        if self.subdomain is None:
-            return int(chosen.argmax()) if chosen.any() else None
-        rows = np.flatnonzero(chosen)
-        number = np.repeat(np.arange(len(self.blocks)), [len(block) for block in self.blocks])[rows]
-        ids = self.element_ids[rows]
-        best = np.lexsort((ids, number))[:1]
-        mine = (int(number[best[0]]), int(ids[best[0]])) if len(rows) else None
-        known = [one for one in self.ranks.gather(mine) if one is not None]
-        return int(rows[best[0]]) if mine is not None and mine == min(known) else None
-
-    def first_node(self, chosen: Mask) -> int | None:
-        """Return the row of the first node of a mask (n,); None where only another process has that.
-
-        All processes ask; of several, the first is the one with the lowest id.
-
-        Parameters
-        ----------
-        chosen : (n,) bool.
-
-        Returns
-        -------
-        The row, or None, as where no process has any.
-        """
-        if self.subdomain is None:
-            return int(chosen.argmax()) if chosen.any() else None
-        rows = np.flatnonzero(chosen)
-        none = np.iinfo(np.int64).max
-        mine = int(self.node_ids[rows].min(initial=none))
-        first = self.ranks.min(mine)
-        return int(self.node_rows(mine)) if first == mine < none else None
+        return read_only(np.stack([low, high]))
 
     # ---- nodes and elements ----------------------------------------------------------------
 

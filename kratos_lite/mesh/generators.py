@@ -135,8 +135,27 @@ def box(
     element: str = "Element3D8N",
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Mesh:
-    """Return a box on one process; `kratos_lite.box` says more.
+    """Return a box with parts ``x- x+ y- y+ z- z+``, the nodes of its six sides.
 
+    Parameters
+    ----------
+    size : edge lengths in m, > 0.
+    cells : bricks along x, y, z; a brick holds one hexahedron, two wedges or six tetrahedra or pyramids.
+    element : name of the element, or its number of nodes, ``"20N"``, which means ``Element3D20N``: it and its
+        kin are computed by one that does not lock.
+    origin : the corner with the smallest coordinates, m.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    InputError
+        If a length or a number of cells is not positive, or there is no such element.
+
+    Examples
+    --------
     >>> mesh = box((1, 1, 1), cells=(2, 2, 2), element="KinematicLinear3D20N")
     >>> mesh.n_nodes, mesh.n_elements, len(mesh.nodes("z+"))
     (81, 8, 21)

@@ -9,7 +9,6 @@ from typing import TypeAlias
 import numpy as np
 
 from kratos_lite.elements import ELEMENTS
-from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import NO_ROWS, Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, corners_around, keys_of, surroundings
 from kratos_lite.mesh.finer import Finer
@@ -60,15 +59,6 @@ def _joined(blocks: Sequence[Block]) -> Block:
         blocks[0].shape,
         np.concatenate(lines) if len(lines) == len(blocks) else None,
     )
-
-
-def check_whole(mesh: Mesh) -> None:
-    """Raise MeshError for a mesh that several processes share."""
-    if mesh.ranks.size > 1:
-        raise MeshError(
-            f"a mesh that {mesh.ranks.size} ranks share keeps its elements; refine it or raise its order on "
-            "one process, write it to a file, and let the ranks read that"
-        )
 
 
 class Growth:

@@ -77,7 +77,7 @@ class Located:
         MeshError
             If one does not; the text names it, its distance from the mesh and the nearest element.
         """
-        outside = np.argwhere(np.logical_not(self.mesh.ranks.any(self.inside)))
+        outside = np.argwhere(~np.asarray(self.inside))
         if not len(outside):
             return self
         i = tuple(outside[0])
@@ -123,19 +123,14 @@ class Located:
     def nodes_and_weights(self, point: int = 0) -> tuple[Ints, Array]:
         """Return the nodes (k,) of the element that contains one point, and their shape functions (k,).
 
-        None if the element is on other ranks alone.
-
         >>> from kratos_lite import box
         >>> nodes, weights = box().locate([0.5, 0.5, 0.5]).nodes_and_weights()
         >>> nodes.tolist(), weights.tolist()
         ([0, 4, 6, 2, 1, 5, 7, 3], [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125])
         """
         one = self[point] if self.rows.ndim else self
-        if self.mesh.ranks.size == 1:
-            one.require()
-        for _, nodes, N in one._shares():
-            return nodes[0].astype(np.int64), N[0]
-        return NO_ROWS, np.zeros(0)
+        _, nodes, N = next(one.require()._shares())
+        return nodes[0].astype(np.int64), N[0]
 
     def _shares(self) -> Iterator[tuple[Ints, Rows, Array]]:
         """Yield, for each block, points (m,) in it, counted through, nodes (m, k) and N (m, k)."""
@@ -149,8 +144,7 @@ class Located:
 def locate(mesh: Cells, points: ArrayLike) -> Located:
     """Return the elements that contain points (..., 3), by the inverse isoparametric map.
 
-    A tree of bounding boxes gives the candidates of each point, which are tried nearest first.  All processes
-    that share a mesh look for the same points.
+    A tree of bounding boxes gives the candidates of each point, which are tried nearest first.
 
     Raises
     ------
@@ -169,11 +163,6 @@ def locate(mesh: Cells, points: ArrayLike) -> Located:
     xi = np.concatenate([np.zeros((0, 3)), *(part[1] for part in parts)])
     block = np.where(rows >= 0, search.block_of(rows), -1)
     cell = np.where(rows >= 0, rows - search.starts[block], -1)
-    if mesh.ranks.size > 1:
-        from kratos_lite.mesh.agreed import agreed  # rarely needed
-
-        block, cell, xi = agreed(mesh.ranks, mesh.blocks, block, cell, xi)
-        rows = np.where(block >= 0, cell + search.starts[block], -1)
     rows, block, cell = (value.reshape(x.shape[:-1]) for value in (rows, block, cell))
     return Located(mesh, x, rows, block, cell, xi.reshape(x.shape))
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kratos_lite.errors import MeshError
-from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, listed, select
+from kratos_lite.mesh.blocks import NO_ROWS, Block, Part, blocks_of, select
 from kratos_lite.mesh.cells import Cells
 from kratos_lite.mesh.selection import (
     Where,
@@ -20,9 +19,7 @@ from kratos_lite.mesh.selection import (
     find_nodes,
     find_part,
 )
-from kratos_lite.mesh.subdomain import Subdomain
 from kratos_lite.mesh.topology import inverted, mirror
-from kratos_lite.mesh.totals import Totals
 from kratos_lite.tabular import Tabular
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import instance, whole_numbers
@@ -32,7 +29,6 @@ if TYPE_CHECKING:
 
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.mesh.locate import Located
-    from kratos_lite.typing import Mask
 
 PART = "kl.Part(nodes=[4, 5])"
 
@@ -51,7 +47,7 @@ class Mesh(Cells, Tabular):
     parts : named parts; a child of part ``A`` is named ``A.b``.
     source : name of the file it came from, used in messages.
     hanging : nodes inside edges or faces of larger neighbors, as `refine` finds them.
-    subdomain : if this is what one of many processes holds of a mesh: which nodes and cells are its own.
+    whole : False for one part of a larger mesh, where named parts may be empty.
 
     Raises
     ------
@@ -80,32 +76,17 @@ class Mesh(Cells, Tabular):
         parts: Mapping[str, Part] | None = None,
         source: str = "",
         hanging: HangingNodes | None = None,
-        subdomain: Subdomain | None = None,
+        whole: bool = True,
     ) -> None:
-        super().__init__(points, blocks, node_ids, source, hanging, subdomain)
+        super().__init__(points, blocks, node_ids, source, hanging, whole)
         named = instance(parts or {}, "parts", Mapping, f"{{'top': {PART}}}", error=MeshError)
         vars(self).update(conditions=blocks_of(conditions, "conditions"), _parts=dict(named))
         self._check_rows(self.conditions)
         self._check_parts()
-        if subdomain is not None:
-            self._check_subdomain(subdomain)
 
     def __reduce__(self) -> tuple[Any, ...]:  # copies and unpickled meshes are made as all others are
         state = (self.points, self.blocks, self.node_ids, self.conditions, self._parts, self.source)
-        return _remade, (*state, self.hanging, self.subdomain)
-
-    def _check_subdomain(self, subdomain: Subdomain) -> None:
-        """Raise MeshError if there are more or fewer of anything than a subdomain is for."""
-        sizes = {
-            "nodes": (len(subdomain.owner), self.n_nodes),
-            "elements": (len(subdomain.own_elements), self.n_elements),
-            "conditions": (len(subdomain.own_conditions), self.n_conditions),
-        }
-        for what, (expected, found) in sizes.items():
-            if expected != found:
-                raise MeshError(f"a subdomain of {expected} {what} cannot be that of a mesh with {found}")
-        # while all ranks are here: one of them alone may ask for these later
-        _ = self.extent, self.totals, subdomain.offsets
+        return _remade, (*state, self.hanging, self.whole)
 
     def _check_parts(self) -> None:
         """Raise MeshError for rows of parts that do not exist."""
@@ -124,13 +105,14 @@ class Mesh(Cells, Tabular):
         blocks: Mapping[str, ArrayLike] | Sequence[Block] | None = None,
         conditions: Mapping[str, ArrayLike] | Sequence[Block] | None = None,
         parts: Mapping[str, Part] | None = None,
+        whole: bool | None = None,
     ) -> Mesh:
         """Return a mesh in which some of these are others; ids of nodes and all the rest stay.
 
         Parameters
         ----------
         points : (n, 3) float, m.
-        blocks, conditions, parts : as for a new mesh.
+        blocks, conditions, parts, whole : as for a new mesh.
 
         Returns
         -------
@@ -156,26 +138,13 @@ class Mesh(Cells, Tabular):
             parts=self._parts if parts is None else parts,
             source=self.source,
             hanging=self.hanging,
-            subdomain=self.subdomain,
+            whole=self.whole if whole is None else whole,
         )
 
     @property
     def n_conditions(self) -> int:
         """Number of conditions in all blocks."""
         return sum(len(block) for block in self.conditions)
-
-    @property
-    def own_conditions(self) -> Mask:
-        """(c,) bool, the conditions of this process."""
-        if self.subdomain is None:
-            return np.ones(self.n_conditions, dtype=bool)
-        return self.subdomain.own_conditions
-
-    @cached_property
-    def totals(self) -> Totals:
-        """How many nodes, elements and conditions all processes have, also by block and part."""
-        own = self.own_nodes, self.own_elements, self.own_conditions
-        return Totals(self.ranks, self.blocks, self.conditions, own, self._parts)
 
     # ---- parts -----------------------------------------------------------------------------
 
@@ -228,18 +197,16 @@ class Mesh(Cells, Tabular):
         if not isinstance(name, str) or not name:
             raise MeshError(f"a part needs a name; got {name!r}")
         rows = self.nodes(where)
-        if not self.ranks.any(len(rows) > 0):
+        if self.whole and not len(rows):
             raise MeshError(f"no node is chosen for part {name!r}")
         if name in self._parts:
-            if self.ranks.any(set(self._parts[name].nodes.tolist()) != set(rows.tolist())):
+            if set(self._parts[name].nodes.tolist()) != set(rows.tolist()):
                 raise MeshError(
                     f"there is a part {name!r} with other nodes already, on which supports and loads may "
                     "rely; take another name, or make the mesh anew"
                 )
             return
         self._parts[name] = Part(nodes=rows)
-        if "totals" in vars(self):
-            self.totals.add({name: self._parts[name]})
 
     def nodes(self, where: Where) -> Ints:
         """Return the rows of nodes, each once and in the order in which they are given.
@@ -290,8 +257,7 @@ class Mesh(Cells, Tabular):
     def locate(self, points: ArrayLike, *, required: bool = False) -> Located:
         """Return which elements contain points, and where in them the points lie.
 
-        A point on a face, edge or node of several elements belongs to the one in the lowest row.  Processes
-        that share a mesh all ask for the same points; each finds those in elements that it holds.
+        A point on a face, edge or node of several elements belongs to the one in the lowest row.
 
         Parameters
         ----------
@@ -357,15 +323,13 @@ class Mesh(Cells, Tabular):
         extent    [0, 1] × [0, 1] × [0, 1] m
         elements  1 KinematicLinear3D4N
         """
-        totals = self.totals
-        rows = [("nodes", str(totals.counts["nodes"]))]
+        rows = [("nodes", str(self.n_nodes))]
         if np.isfinite(self.extent).all():
             sides = [f"[{a + 0.0:g}, {b + 0.0:g}]" for a, b in self.extent.T]  # no -0
             rows.append(("extent", " × ".join(sides) + " m"))
         for label, blocks in (("elements", self.blocks), ("conditions", self.conditions)):
-            counted = zip(blocks, totals.blocks[label], strict=True)
-            rows += [(label, f"{count} {block.name}") for block, (count,) in counted if count]
-        return rows + [("part", f"{name}: {listed(totals.parts[name])}") for name in self.parts]
+            rows += [(label, f"{len(block)} {block.name}") for block in blocks if len(block)]
+        return rows + [("part", f"{name}: {part}") for name, part in self.parts.items()]
 
     def __repr__(self) -> str:
         return f"Mesh({self.n_nodes} nodes, {self.n_elements} elements)"
@@ -401,14 +365,11 @@ class Mesh(Cells, Tabular):
             One block for each shape of faces.
         """
         rows = self.part(where).conditions if isinstance(where, str) else NO_ROWS
-        if self.ranks.any(len(rows) > 0):
+        if len(rows):
             return select(self.conditions, rows)
-        inside, own = np.zeros(self.n_nodes, dtype=bool), self.own_nodes
+        inside = np.zeros(self.n_nodes, dtype=bool)
         inside[self.nodes(where)] = True
-        chosen = [
-            block.take(np.asarray(inside[block.nodes].all(axis=1) & own[block.nodes].any(axis=1)))
-            for block in self.boundary  # where no node is own, it is that of the halo
-        ]
+        chosen = [block.take(np.asarray(inside[block.nodes].all(axis=1))) for block in self.boundary]
         return [block for block in chosen if len(block)]
 
 
@@ -420,7 +381,7 @@ def _remade(
     parts: Any,
     source: str,
     hanging: Any,
-    subdomain: Any = None,
+    whole: bool = True,
 ) -> Mesh:
     """Return a mesh from what it was made of."""
     return Mesh(
@@ -431,5 +392,5 @@ def _remade(
         parts=parts,
         source=source,
         hanging=hanging,
-        subdomain=subdomain,
+        whole=whole,
     )

@@ -25,11 +25,9 @@ def nearest_element(mesh: Cells, point: Array) -> str:
         for cell in np.argsort((gap**2).sum(axis=1), kind="stable")[:CANDIDATES].tolist():
             X = mesh.points[block.nodes[cell]]
             found.append((distance_to_cell(block.shape, X, point), mesh.place(block, cell)))
-    nearest = min(found, key=lambda pair: pair[0]) if found else None
-    of_ranks = [one for one in mesh.ranks.gather(nearest) if one is not None]
-    if not of_ranks:
+    if not found:
         return "which has no elements"
-    distance, place = min(of_ranks, key=lambda pair: pair[0])
+    distance, place = min(found, key=lambda pair: pair[0])
     return f"{distance:.3g} m from {place}"
 
 

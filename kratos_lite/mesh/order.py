@@ -10,7 +10,7 @@ from kratos_lite.elements import ELEMENTS
 from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block
 from kratos_lite.mesh.finer import Finer
-from kratos_lite.mesh.growth import Cut, Growth, check_whole, name_of
+from kratos_lite.mesh.growth import Cut, Growth, name_of
 from kratos_lite.mesh.hanging import known_centers
 from kratos_lite.mesh.mesh import Mesh
 from kratos_lite.mesh.subdivision import unchanged
@@ -54,7 +54,6 @@ def raised(mesh: Mesh, element_of: Callable[[str], str] | None = None) -> Finer:
     >>> raised(box()).mesh.blocks[0].name
     'Element3D20N'
     """
-    check_whole(mesh)
     if mesh.hanging is not None:
         raise MeshError("a mesh with hanging nodes keeps its order: raise the order first, then refine")
     names = {block.name: (element_of or quadratic)(block.name) for block in mesh.blocks}

@@ -14,7 +14,7 @@ from kratos_lite.errors import MeshError
 from kratos_lite.mesh.blocks import Block, with_rows
 from kratos_lite.mesh.centers import Centers, Keys, keys_of
 from kratos_lite.mesh.finer import Finer
-from kratos_lite.mesh.growth import Cut, Growth, check_whole, name_of
+from kratos_lite.mesh.growth import Cut, Growth, name_of
 from kratos_lite.mesh.hanging import (
     entity_keys,
     existing_keys,
@@ -65,7 +65,6 @@ def refine(mesh: Mesh, elements: ArrayLike | None = None, keep: ArrayLike | None
     >>> finer.mesh.n_elements, len(finer.mesh.hanging)
     (9, 5)
     """
-    check_whole(mesh)
     marked = _mask(mesh, elements)
     centers = known_centers(mesh.blocks, mesh.hanging)
     if mesh.hanging is not None:

@@ -10,7 +10,6 @@ import numpy as np
 from kratos_lite.errors import MeshError, nearest
 from kratos_lite.mesh.blocks import NO_ROWS, Part, distinct, without_repeats
 from kratos_lite.mesh.cells import Cells
-from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.typing import Array, Ints
 from kratos_lite.validation import finite, whole_numbers
 
@@ -38,7 +37,7 @@ def find_part(name: Any, parts: Mapping[str, Part], mesh: Cells) -> Part:
         )
     if name in parts:
         return parts[name]
-    if name in SIDES and np.isfinite(mesh.extent).all():
+    if name in SIDES and mesh.whole and np.isfinite(mesh.extent).all():
         return Part(nodes=_side(mesh, *SIDES[name]))
     ends = [full for full in parts if full.rsplit(".", 1)[-1] == name]
     if len(ends) == 1:
@@ -59,8 +58,8 @@ def find_nodes(where: Callable[[Array], ArrayLike] | ArrayLike, mesh: Cells) -> 
     """Return the rows of nodes by a point, predicate, mask or rows, each once and in the order given."""
     points = mesh.points
     if (point := point_of(where)) is not None:
-        rows, nearby = nodes_at(point, points, mesh.ranks)
-        if not mesh.ranks.any(len(rows) > 0):
+        rows, nearby = nodes_at(point, points)
+        if mesh.whole and not len(rows):
             raise MeshError(
                 f"there is no node at {point.tolist()} m; {nearby}; choose that one, or read values anywhere "
                 "in the mesh by result.at(points)"
@@ -105,28 +104,22 @@ def point_of(where: Any) -> Array | None:
     return finite(where, "a point", (3,), error=MeshError)
 
 
-def nodes_at(point: Array, points: Array, ranks: Alone = ALONE) -> tuple[Ints, str]:
+def nodes_at(point: Array, points: Array) -> tuple[Ints, str]:
     """Return the rows of the nodes at a point (3,), nearest first, and what is near to it in words.
 
     Parameters
     ----------
-    points : (n, 3) float, m, those of this rank.
-    ranks : all of which ask for the point; it may be at nodes of others alone.
+    points : (n, 3) float, m.
     """
-    distance = np.linalg.norm(points - point, axis=1)
-    row = int(distance.argmin()) if len(points) else -1
-    mine = (float(distance[row]), points[row].tolist(), row) if len(points) else None
-    found = [one for one in ranks.gather(mine) if one is not None]
-    if not found:
+    if not len(points):
         return NO_ROWS, "there are no nodes"
-    off, near, row = min(found)
-    low, high = ranks.min(points.min(axis=0, initial=np.inf)), ranks.max(points.max(axis=0, initial=-np.inf))
-    size = float(np.linalg.norm(high - low))
+    distance = np.linalg.norm(points - point, axis=1)
+    row = int(distance.argmin())
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
     # all at one place, but not the other side of a thin plate
     rows = np.flatnonzero(distance <= AT_NODE * size)
-    rows = rows[np.linalg.norm(points[rows] - np.array(near), axis=1) <= ONE_PLACE * size]
-    which = f" (row {row})" if ranks.size == 1 else ""
-    text = f"the nearest node is that at {near} m{which}, {off:.3g} m away"
+    rows = rows[np.linalg.norm(points[rows] - points[row], axis=1) <= ONE_PLACE * size]
+    text = f"the nearest node is that at {points[row].tolist()} m (row {row}), {distance[row]:.3g} m away"
     return rows[np.argsort(distance[rows], kind="stable")], text
 
 
@@ -135,18 +128,16 @@ def _flags(chosen: Sequence[Any]) -> bool:
 
 
 def find_elements(where: WhereElements, part: Part | None, mesh: Cells) -> Ints:
-    """Return the rows of elements by a part, property id or rows; all ranks ask for them."""
+    """Return the rows of elements by a part, property id or rows."""
     if isinstance(where, (int, np.integer)) and not isinstance(where, bool):
         ids = np.concatenate([NO_ROWS, *(block.properties for block in mesh.blocks)])
         rows = np.flatnonzero(ids == where)
-        known = np.concatenate(mesh.ranks.gather(distinct(ids)))
-        if where not in known:
-            raise MeshError(f"no element has property {where}; the properties are {distinct(known).tolist()}")
+        if mesh.whole and not len(rows):
+            raise MeshError(f"no element has property {where}; the properties are {distinct(ids).tolist()}")
         return rows
     if part is not None:
-        has_own = mesh.ranks.any(len(part.elements) > 0)
-        rows = part.elements if has_own else elements_among(part.nodes, mesh)
-        if not mesh.ranks.any(len(rows) > 0):
+        rows = part.elements if len(part.elements) else elements_among(part.nodes, mesh)
+        if mesh.whole and not len(rows):
             raise MeshError(f"part {where!r} has no elements")
         return rows
     what = "elements are chosen by part name, property id or rows; rows"

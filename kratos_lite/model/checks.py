@@ -9,18 +9,17 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import Kinds, element_class
+from kratos_lite.assembly.element_groups import ElementGroup, element_class
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.tables import gradients_at_nodes, tabulate
 from kratos_lite.errors import MAX_PROBLEMS, InputError, MeshError, ModelError, SolveError
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Block, Mesh, with_rows
-from kratos_lite.mesh.subdomain import ALONE, Alone
+from kratos_lite.mesh import Block, Mesh
 from kratos_lite.model.loads import Load
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.supports import Supports
-from kratos_lite.typing import Array, Ints, Mask
+from kratos_lite.typing import Array, Mask
 
 SLOWEST, QUICKEST = 1.0, 2.5e4
 """Speeds of waves in m/s: jelly is above the one, diamond and graphene below the other."""
@@ -72,16 +71,14 @@ def check_widths(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> None:
 
 def check_repeated_nodes(mesh: Mesh) -> None:
     """Raise MeshError if an element uses a node twice."""
-    twice = [np.zeros(0, dtype=bool)]
     for block in mesh.blocks:
-        twice.append((np.diff(np.sort(block.nodes, axis=1), axis=1) == 0).any(axis=1))
-    row = mesh.first_element(np.concatenate(twice))
-    for block, at in with_rows(mesh.blocks):
-        if row is not None and at.start <= row < at.stop:
-            nodes = np.sort(block.nodes[row - at.start])
+        twice = (np.diff(np.sort(block.nodes, axis=1), axis=1) == 0).any(axis=1)
+        if twice.any():
+            cell = int(twice.argmax())
+            nodes = np.sort(block.nodes[cell])
             node = mesh.node_ids[nodes[1:][np.diff(nodes) == 0][0]]
             raise MeshError(
-                f"{mesh.place(block, row - at.start)} uses node {node} more than once; "
+                f"{mesh.place(block, cell)} uses node {node} more than once; "
                 f"give it {block.nodes.shape[1]} different nodes or use an element with fewer"
             )
 
@@ -93,13 +90,13 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
     elements) is allowed and noted; so is a slight fold at a node, at most FOLD of the mean det J,
     which badly shaped but useful elements have.
     """
-    problems: list[tuple[int, int, str]] = []  # number of the block, id
-    counts, own = np.zeros(3, dtype=np.int64), mesh.own_elements
-    for number, ((block, at), kind) in enumerate(zip(with_rows(mesh.blocks), kinds, strict=True)):
+    problems: list[str] = []
+    counts = np.zeros(3, dtype=np.int64)
+    for block, kind in zip(mesh.blocks, kinds, strict=True):
         shape, g = kind.shape, len(kind.rule)
         dN = np.concatenate([tabulate(shape, kind.rule)[1], gradients_at_nodes(shape)])
         limit = np.where(np.arange(len(dN)) < g, 0.0, -FOLD)
-        doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, kind, dN, g) & own[at])
+        doubtful = np.flatnonzero(~clearly_positive(mesh.points, block.nodes, kind, dN, g))
         step = max(1, 4_000_000 // (72 * len(dN)))
         for start in range(0, len(doubtful), step):
             cells = doubtful[start : start + step]
@@ -110,20 +107,15 @@ def check_jacobians(mesh: Mesh, kinds: Sequence[type[KinematicLinear]]) -> list[
             folded = (det[:, g:] < -1e-10 * scale).any(axis=1)
             counts += [mask.sum() for mask in (bad, flat, folded)]
             for e in np.flatnonzero(bad)[: MAX_PROBLEMS - len(problems)]:
-                text = _describe_inverted(mesh, block, int(cells[e]), det[e], g)
-                problems.append((number, int(block.ids[cells[e]]), text))
-    return _verdict(mesh.ranks, problems, counts)
+                problems.append(_describe_inverted(mesh, block, int(cells[e]), det[e], g))
+    return _verdict(problems, *counts.tolist())
 
 
-def _verdict(ranks: Alone, problems: list[tuple[int, int, str]], counts: Ints) -> list[str]:
-    """Raise MeshError for elements that are wrong, on any rank, or return notes of those that are bad."""
-    count, flat, folded = ranks.sum(counts).tolist()
-    if count:
-        found = ranks.gather(problems)
-        every = found[0] if len(found) == 1 else sorted(one for some in found for one in some)
-        shown = [text for _, _, text in every[:MAX_PROBLEMS]]
-        more = f"\n… and {count - len(shown)} more" if count > len(shown) else ""
-        raise MeshError("\n".join(shown) + more)
+def _verdict(problems: list[str], wrong: int, flat: int, folded: int) -> list[str]:
+    """Raise MeshError for elements that are wrong, or return notes of those that are badly shaped."""
+    if wrong:
+        more = f"\n… and {wrong - len(problems)} more" if wrong > len(problems) else ""
+        raise MeshError("\n".join(problems) + more)
     notes = [f"{flat} elements have det J = 0 at a corner node (singular corner)"] if flat else []
     if folded:
         notes.append(f"{folded} elements have det J slightly < 0 at a node: badly shaped, so less accurate")
@@ -145,11 +137,11 @@ def _describe_inverted(mesh: Mesh, block: Block, cell: int, det: Array, g: int) 
     )
 
 
-def check_scales(mesh: Mesh, groups: Kinds) -> list[str]:
+def check_scales(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     """Warn where the numbers themselves cost accuracy: far from the origin, or a large stiffness contrast."""
     warnings = []
     low, high = mesh.extent
-    spacing = float((high - low).max()) / max(1.0, mesh.totals.counts["elements"] ** (1 / 3))
+    spacing = float((high - low).max()) / max(1.0, mesh.n_elements ** (1 / 3))
     far = float(np.maximum(-low, high).max())
     loss = float(np.finfo(float).eps * far / spacing) if spacing > 0 else 0.0
     if loss > 1e-9:
@@ -218,9 +210,8 @@ def check_rounding(
 
     Raises SolveError where it is as large as the loads, to two digits: the solution means nothing.
     """
-    ranks = supports.mesh.ranks
-    size = ranks.max(float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions))))
-    if ranks.any(bool(supports.values.any())) or noise <= 1e-6 * size:
+    size = float(max(np.abs(part).max(initial=0.0) for part in (loads, initial, reactions)))
+    if supports.values.any() or noise <= 1e-6 * size:
         return []
     text = (
         f"rounding errors may reach {noise / size:.0e} of the loads: something hardly resists them; "
@@ -231,30 +222,25 @@ def check_rounding(
     return [text]
 
 
-def check_loads(loads: Sequence[Load], groups: Kinds, forces: Array, supports: Supports) -> list[str]:
+def check_loads(
+    loads: Sequence[Load], groups: Sequence[ElementGroup], forces: Array, supports: Supports
+) -> list[str]:
     """Warn of loads that cannot do anything: gravity without mass, or forces on fixed components alone."""
-    own = supports.mesh.own_nodes
-    here = (
-        supports.values.any() or any(c.constant for c in supports.constraints),
-        forces[own].any(),
-        forces[~supports.fixed & own[:, None]].any(),
-    )
-    moved, loaded, pushed = supports.mesh.ranks.any(np.array(here, dtype=bool)).tolist()
+    moved = supports.values.any() or any(c.constant for c in supports.constraints)
     if any(isinstance(load, Gravity) for load in loads) and all(g.material.density == 0 for g in groups):
         return ["gravity acts on no mass: every material has density 0; give density in kg/m³"]
-    if not loaded and not moved:
+    if not forces.any() and not moved:
         return ["no load acts and no displacement is prescribed, so nothing moves"]
-    if not pushed and not moved:
+    if not forces[~supports.fixed].any() and not moved:
         return [LOADS_ON_SUPPORTS]
     return []
 
 
 def check_carried(mesh: Mesh, forces: Array, used: Mask) -> None:
     """Raise ModelError for forces (n, 3) on nodes that no element uses, by the mask (n,) of those used."""
-    lost = ~used & mesh.own_nodes
-    lost[lost] = (forces[lost] != 0).any(axis=1)
-    node = mesh.first_node(lost)
-    if node is not None:
+    lost = np.flatnonzero(~used)
+    lost = lost[(forces[lost] != 0).any(axis=1)]
+    for node in lost[:1]:
         raise ModelError(
             f"node {mesh.node_ids[node]} carries a load but belongs to no element; load another node, or "
             "give it an element"
@@ -267,22 +253,20 @@ def equilibrium(
     reactions: Array,
     internal: Array,
     noise: float = 0.0,
-    ranks: Alone = ALONE,
 ) -> tuple[float, float]:
     """Return what forces and moments miss to equilibrium, relative to the sizes of loads and reactions.
 
     The larger of the sum over all nodes and of what nodes miss one by one, beside the internal load of
-    the stresses.  Forces that are together below `noise` in N are rounding, and in balance.  Over ranks,
-    each gives the values of its own nodes.
+    the stresses.  Forces that are together below `noise` in N are rounding, and in balance.
     """
     total = loads + reactions
-    X = points - ranks.sum(points.sum(axis=0)) / ranks.sum(len(points))
-    size = ranks.sum(float(np.abs(loads).sum() + np.abs(reactions).sum()))
-    arm = ranks.max(float(np.abs(X).max(initial=0.0)))
+    X = points - points.mean(axis=0)
+    size = float(np.abs(loads).sum() + np.abs(reactions).sum())
+    arm = float(np.abs(X).max(initial=0.0))
     if size <= noise:
         return 0.0, 0.0
-    nodal = ranks.sum(float(np.abs(total - internal).sum())) / size
-    force = float(np.abs(ranks.sum(total.sum(axis=0))).max() / size)
-    M = ranks.sum(X.T @ total)
+    nodal = float(np.abs(total - internal).sum()) / size
+    force = float(np.abs(total.sum(axis=0)).max() / size)
+    M = X.T @ total
     moment = float(np.abs(M - M.T).max() / (size * arm)) if arm > 0 else 0.0
     return max(force, nodal), moment

@@ -18,60 +18,33 @@ MOST = 64
 
 def check_coincident(mesh: Mesh, used: Mask, constraints: Sequence[MultiPointConstraint] = ()) -> list[str]:
     """Warn of different nodes at the same place (within 1e-8 of the mean spacing) that nothing ties."""
-    rows = np.flatnonzero(used & mesh.own_nodes)
-    ranks, X, ids = mesh.ranks, mesh.points[rows], mesh.node_ids[rows]
-    count = ranks.sum(len(rows))
-    low = ranks.min(np.array([x.min(initial=np.inf) for x in X.T]))  # by columns, which is faster
-    high = ranks.max(np.array([x.max(initial=-np.inf) for x in X.T]))
-    if count < 2:
+    rows = np.flatnonzero(used)
+    if len(rows) < 2:
         return []
-    tolerance = 1e-8 * float((high - low).max()) / count ** (1 / 3)
-    ties = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
-    tied = np.array([mesh.node_ids[sorted(pair)] for pair in ties if len(pair) == 2], dtype=np.int64)
-    mine = np.ones(len(rows), dtype=bool)
-    if mesh.subdomain is not None:
-        X, ids, mine, tied = _sliced(mesh, X, ids, tied.reshape(-1, 2), tolerance)
-    found = _pairs(X, ids, mine, tolerance)
-    if found and len(tied):
-        known = set(map(frozenset, tied.tolist()))
-        found = [pair for pair in found if frozenset(pair[1:]) not in known]
-    n = ranks.sum(len(found))
-    if not n:
+    X, ids = mesh.points[rows], mesh.node_ids[rows]
+    size = max(float(np.ptp(x)) for x in X.T)  # by columns, which is faster
+    found = _pairs(X, ids, 1e-8 * size / len(rows) ** (1 / 3))
+    if found and constraints:
+        pairs = {frozenset((c.slave // 3, master // 3)) for c in constraints for master in c.masters}
+        tied = {frozenset(mesh.node_ids[list(pair)].tolist()) for pair in pairs}
+        found = [pair for pair in found if frozenset(pair) not in tied]
+    if not found:
         return []
-    every = [one for some in ranks.gather(found[:3]) for one in some]
-    shown = ", ".join(f"{min(a, b)} and {max(a, b)}" for _, a, b in sorted(every, key=lambda one: one[0])[:3])
-    return [f"{n} pairs of nodes coincide ({shown}{' …' if n > 3 else ''}); they are not joined"]
+    shown = ", ".join(f"{min(pair)} and {max(pair)}" for pair in found[:3])
+    more = " …" if len(found) > 3 else ""
+    return [f"{len(found)} pairs of nodes coincide ({shown}{more}); they are not joined"]
 
 
-def _pairs(X: Array, ids: Ints, mine: Mask, tolerance: float) -> list[tuple[int, int, int]]:
-    """Return places between and ids of nodes at the same place, the first of them of those that are mine."""
+def _pairs(X: Array, ids: Ints, tolerance: float) -> list[tuple[int, int]]:
+    """Return the ids of nodes at the same place."""
     along = X @ NORMAL
     order = np.argsort(along, kind="stable")
     X, along = X[order], along[order]
-    pairs: list[tuple[int, int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for step in range(1, min(len(X), MOST)):
         close = np.flatnonzero(along[step:] - along[:-step] <= 2 * tolerance)
         if not len(close):
             break
-        near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1) & mine[order[close]]]
-        pairs += [(step, int(ids[order[i]]), int(ids[order[i + step]])) for i in near]
+        near = close[(np.abs(X[close + step] - X[close]) <= tolerance).all(axis=1)]
+        pairs += [(int(ids[order[i]]), int(ids[order[i + step]])) for i in near]
     return pairs
-
-
-def _sliced(mesh: Mesh, X: Array, ids: Ints, tied: Ints, tolerance: float) -> tuple[Array, Ints, Mask, Ints]:
-    """Return the nodes in the slice of this rank and a little beyond, which are in it, and the ties of all.
-
-    Slices normal to the direction along which nodes are sorted have about as many nodes each.
-    """
-    ranks, along = mesh.ranks, X @ NORMAL
-    sample = np.sort(
-        np.concatenate(ranks.gather(np.quantile(along, np.linspace(0, 1, 33)) if len(X) else along))
-    )
-    cuts = sample[np.arange(1, ranks.size) * len(sample) // ranks.size]
-    home, last = np.searchsorted(cuts, along, side="right"), np.searchsorted(cuts, along - 2 * tolerance)
-    near = np.flatnonzero(last < home)  # the slice before may have a node at the same place
-    rows, to = np.append(np.arange(len(X)), near), np.append(home, last[near])
-    places = np.concatenate(ranks.send(to, X[rows]))
-    known = np.concatenate(ranks.send(to, ids[rows]))
-    mine = np.concatenate(ranks.send(to, to == home[rows]))
-    return places, known, mine, np.concatenate(ranks.gather(tied))

@@ -20,7 +20,7 @@ class Bodies:
     Attributes
     ----------
     part : (n,) int, the first body of each node, -1 for nodes without elements.
-    node, body : all pairs, sorted by node; of the own nodes, where ranks share the mesh.
+    node, body : all pairs, sorted by node.
     count : number of bodies.
     """
 
@@ -36,11 +36,9 @@ class Bodies:
         return self.node[further], self.body[further]
 
     def joined(self, mesh: Mesh) -> tuple[Ints, Ints, Array]:
-        """Return the first and the further body of each joint, and its place (k, 3), of all ranks."""
+        """Return the first and the further body of each joint, and its place (k, 3)."""
         node, second = self.joints
-        found = mesh.ranks.gather((self.part[node], second, mesh.points[node]))
-        one, other, X = (np.concatenate(values) for values in zip(*found, strict=True))
-        return one, other, X
+        return self.part[node], second, mesh.points[node]
 
     def frames(self, mesh: Mesh) -> tuple[Array, Array]:
         """Return the center (b, 3) and the size (b,) of each body."""
@@ -49,12 +47,9 @@ class Bodies:
 
     def described(self, mesh: Mesh) -> tuple[Ints, Ints]:
         """Return the number of nodes of each body (b,), and the id of its first one."""
-        own = mesh.own_nodes[self.node]
-        node, body = self.node[own], self.body[own]
-        row = np.full(self.count, len(mesh.node_ids))
-        row[body[::-1]] = node[::-1]
-        ids = np.append(mesh.node_ids, np.iinfo(np.int64).max)
-        return mesh.ranks.sum(np.bincount(body, minlength=self.count)), mesh.ranks.min(ids[row])
+        first = np.zeros(self.count, dtype=np.int64)
+        first[self.body[::-1]] = self.node[::-1]
+        return np.bincount(self.body, minlength=self.count), mesh.node_ids[first]
 
 
 def extents(mesh: Mesh, node: Ints, group: Ints, count: int) -> tuple[Array, Array]:
@@ -65,7 +60,7 @@ def extents(mesh: Mesh, node: Ints, group: Ints, count: int) -> tuple[Array, Arr
         X, start = mesh.points[node[order]], np.flatnonzero(np.diff(group[order], prepend=-1))
         there = group[order][start]
         low[there], high[there] = np.minimum.reduceat(X, start), np.maximum.reduceat(X, start)
-    return mesh.ranks.min(low), mesh.ranks.max(high)
+    return low, high
 
 
 def bodies(mesh: Mesh, faces: Faces | None = None) -> Bodies:
@@ -85,12 +80,7 @@ def bodies_of_elements(mesh: Mesh, faces: Faces) -> tuple[Ints, int]:
     joined = np.stack([faces.element[faces.one], faces.element[faces.other]], axis=1)
     root = components(mesh.n_elements, joined)
     is_root = root == np.arange(len(root))
-    body, count = (np.cumsum(is_root) - 1)[root], int(is_root.sum())
-    if mesh.subdomain is None:
-        return body, count
-    from kratos_lite.model.shared_bodies import numbered  # a quick start without it
-
-    return numbered(mesh, body, count)
+    return (np.cumsum(is_root) - 1)[root], int(is_root.sum())
 
 
 def _locked(mesh: Mesh, found: Bodies) -> Ints:
@@ -113,15 +103,6 @@ def _locked(mesh: Mesh, found: Bodies) -> Ints:
 
 def _of_elements(mesh: Mesh, body: Ints, count: int) -> Bodies:
     """Return the bodies of the nodes from those of the elements."""
-    found = _of_local_elements(mesh, body, count)
-    if mesh.subdomain is None:
-        return found
-    # of ghosts, not all elements are here
-    part, own = mesh.subdomain.fetch(found.part), mesh.own_nodes[found.node]
-    return Bodies(part, found.node[own], found.body[own], count)
-
-
-def _of_local_elements(mesh: Mesh, body: Ints, count: int) -> Bodies:
     part = np.full(mesh.n_nodes, -1)
     if not body.any():
         part[mesh.used_nodes()] = 0

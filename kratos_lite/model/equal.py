@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.mesh.subdomain import ALONE, Alone
 from kratos_lite.model.loads.base import Load
 from kratos_lite.time_series import TimeSeries
 
@@ -37,15 +36,11 @@ def key_of(value: Any, depth: int = 0) -> Hashable:
     return value if isinstance(value, Hashable) and depth <= DEEPEST else id(value)
 
 
-def equal_loads(loads: Sequence[Load], ranks: Alone = ALONE) -> list[str]:
-    """Return a warning for each load that acts more than once; over ranks, if it is equal on all."""
-    if len(loads) < 2:
-        return []
-    first: dict[Hashable, int] = {}
-    numbers = [first.setdefault(key_of(load), i) for i, load in enumerate(loads)]
+def equal_loads(loads: Sequence[Load]) -> list[str]:
+    """Return a warning for each load that acts more than once."""
     alike: dict[Hashable, list[Load]] = {}
-    for load, key in zip(loads, zip(*ranks.gather(numbers), strict=True), strict=True):
-        alike.setdefault(key, []).append(load)
+    for load in loads:
+        alike.setdefault(key_of(load), []).append(load)
     return [
         f"{len(same)} equal loads {same[0]!r}, which add up; if one alone is meant, give it a name, "
         "model.add(load, name=...), so that it is not added twice"

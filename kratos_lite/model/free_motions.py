@@ -87,11 +87,10 @@ class FreeMotions:
         return R @ normal, over_volume @ normal
 
     def _by_part(self, values: Array, largest: bool = False) -> Array:
-        """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part, of all ranks."""
-        found = np.zeros((len(self.counts), *values.shape[1:]))
-        mine, ranks = (self.part >= 0) & self.mesh.own_nodes, self.mesh.ranks
-        (np.maximum if largest else np.add).at(found, self.part[mine], values[mine])
-        return np.asarray(ranks.max(found) if largest else ranks.sum(found))
+        """Return sum or largest (p, ...) of values ≥ 0 at nodes (n, ...) in each part."""
+        found, used = np.zeros((len(self.counts), *values.shape[1:])), self.part >= 0
+        (np.maximum if largest else np.add).at(found, self.part[used], values[used])
+        return found
 
     # ---- solutions without them ----------------------------------------------------------------------
 
@@ -109,28 +108,25 @@ class FreeMotions:
 
     @cached_property
     def held(self) -> Mask:
-        """Components (n, 3) at own nodes, one for each free motion, that hold these firmly.
+        """Components (n, 3), one for each free motion, that hold these firmly.
 
         Gram-Schmidt on the rows of R: each is that along which what is left of the motions goes farthest.
         """
-        chosen, ranks, part = np.zeros_like(self.supports.fixed), self.mesh.ranks, self.part
+        chosen, part = np.zeros_like(self.supports.fixed), self.part
         if not self.any:
             return chosen
-        left = self._pair[0] * (~self.supports.fixed & self.mesh.own_nodes[:, None])[..., None]
+        left = self._pair[0] * ~self.supports.fixed[..., None]
         left.reshape(-1, left.shape[2])[list(self.supports.slaves())] = 0.0
         for step in range(left.shape[2]):
             size = (left**2).sum(axis=2)
             best = self._by_part(size.max(axis=1), largest=True)
             here = np.flatnonzero((size.max(axis=1) == best[part]) & (self.counts[part] > step) & (part >= 0))
-            first = here[np.unique(part[here], return_index=True)[1]]
-            keeper = np.full(len(best), ranks.size)
-            keeper[part[first]] = ranks.rank
-            node = first[ranks.min(keeper)[part[first]] == ranks.rank]
+            node = here[np.unique(part[here], return_index=True)[1]]
             axis = size[node].argmax(axis=1)
             chosen[node, axis] = True
             row = np.zeros((len(best), left.shape[2]))
             row[part[node]] = left[node, axis]
-            along = (ranks.sum(row) / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[part, None]
+            along = (row / np.sqrt(np.maximum(best, np.finfo(float).tiny))[:, None])[part, None]
             left -= (left * along).sum(axis=2, keepdims=True) * along
         return chosen
 

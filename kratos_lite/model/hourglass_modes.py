@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import clearly_positive
 from kratos_lite.elements import KinematicLinear
 from kratos_lite.elements.kinematic_linear import ELEMENTS
-from kratos_lite.elements.overridden_steps import MECHANICS, brought
 from kratos_lite.elements.tables import tabulate
 from kratos_lite.errors import InputError, MeshError, ModelError
 from kratos_lite.materials.isotropic3d import Isotropic3D
@@ -49,10 +48,8 @@ def hourglass_modes(element: type[KinematicLinear], rule: Rule) -> int:
     return max(0, *found)
 
 
-def check_rules(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | None = None) -> list[str]:
+def check_rules(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
     """Check rules that replace those of their classes, and classes that are not of the library.
-
-    Over ranks, `kinds` are those of all.
 
     Raises MeshError where det J ≤ 0 at a point of such a rule, and ModelError for an own class with hourglass
     modes that it does not state; returns warnings of all others.
@@ -60,15 +57,14 @@ def check_rules(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | None 
     for group in groups:
         if group.rule is not group.element.rule:
             _check_points(mesh, group)
-    kinds = groups if kinds is None else kinds
-    replaced = [kind for kind in kinds if kind.rule is not kind.element.rule]
+    replaced = [group for group in groups if group.rule is not group.element.rule]
     said = [
         f"{element.__name__} with {_points(rule)} has {_modes(n)}; its own rule has {_points(element.rule)} "
         f"and {hourglass_modes(element, element.rule) or 'none'}"
         for element, rule in dict.fromkeys((group.element, group.rule) for group in replaced)
         if (n := hourglass_modes(element, rule)) > 0
     ]
-    own = dict.fromkeys(g.element for g in kinds if g.rule is g.element.rule and not g.is_proven)
+    own = dict.fromkeys(g.element for g in groups if g.rule is g.element.rule and not g.is_proven)
     return list(dict.fromkeys(said)) + [text for element in own if (text := _check_class(element))]
 
 
@@ -92,9 +88,9 @@ def _check_class(element: type[KinematicLinear]) -> str:
     if not modes:
         return ""
     if modes > stated:
-        steps = [step for step in brought(element, KinematicLinear) if step in MECHANICS]
         cures = [f"take a rule with more points{_rule_of_library(element)}"]
-        cures += [f"correct {', '.join(dict.fromkeys(steps))}, which the class overrides"] if steps else []
+        if element.custom:
+            cures.append(f"correct {' and '.join(sorted(element.custom))}, which the class overrides")
         raise ModelError(
             f"{name} has {_modes(modes)} with its {_points(element.rule)}: beside rigid-body motions, an "
             f"element deforms in {modes} ways without energy, so that results may be many times too large; "

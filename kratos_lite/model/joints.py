@@ -24,8 +24,8 @@ def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
             f"{count} pairs of elements ({ids}) share the corners of a face but not its further "
             "nodes: the mesh is non-conforming there; use elements of the same order on both sides"
         )
-    elements, face = _halved_squares(mesh)
-    count, ids = _pairs(mesh, elements, elements, face)
+    elements = _halved_squares(mesh)
+    count, ids = _pairs(mesh, elements, elements)
     if count:
         warnings.append(
             f"{count} four-sided faces (the first of element {ids.split()[0]}) meet "
@@ -34,49 +34,30 @@ def check_joints(mesh: Mesh, faces: Faces | None = None) -> list[str]:
     return warnings
 
 
-def _pairs(mesh: Mesh, one: Ints, other: Ints, face: Ints | int = 0) -> tuple[int, str]:
-    """Return how many pairs of elements, at a face, all ranks have, and the ids of the first."""
-    if mesh.subdomain is not None:
-        return _pairs_over_ranks(mesh, one, other, face)
+def _pairs(mesh: Mesh, one: Ints, other: Ints) -> tuple[int, str]:
+    """Return how many pairs of elements there are, and the ids of the first."""
     if not len(one):
         return 0, ""
     a, b = sorted(mesh.element_ids[[one[0], other[0]]].tolist())
     return len(one), f"{a} and {b}"
 
 
-def _pairs_over_ranks(mesh: Mesh, one: Ints, other: Ints, face: Ints | int) -> tuple[int, str]:
-    """Return the same over ranks: several have the same pair, which counts once; few are expected."""
-    number = np.repeat(np.arange(len(mesh.blocks)), [len(block) for block in mesh.blocks])
-    ids = mesh.element_ids
-    at = np.broadcast_to(face, one.shape)
-    found = np.stack([number[one], ids[one], number[other], ids[other], at], axis=1)
-    turned = (found[:, 0] > found[:, 2]) | ((found[:, 0] == found[:, 2]) & (found[:, 1] > found[:, 3]))
-    found[turned] = found[turned][:, [2, 3, 0, 1, 4]]
-    every = np.concatenate(mesh.ranks.gather(found))
-    if not len(every):
-        return 0, ""
-    pairs = np.unique(every, axis=0)
-    a, b = sorted(pairs[0, [1, 3]].tolist())
-    return len(pairs), f"{a} and {b}"
-
-
-def _halved_squares(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Return elements and their four-sided faces of which three corners are a triangular face."""
+def _halved_squares(mesh: Mesh) -> Ints:
+    """Return the elements of four-sided faces of which three corners are a triangular face."""
     sizes = {len(corners(face)) for block in mesh.blocks if len(block) for face in faces_of(block)}
     if sizes != {3, 4}:
-        return NO_ROWS, NO_ROWS
+        return NO_ROWS
     triangles: list[Sets] = []
     thirds: list[Sets] = []
-    elements, numbers = [NO_ROWS], [NO_ROWS]
+    elements = [NO_ROWS]
     for block, at in with_rows(mesh.blocks):
         found = [corners(face) for face in faces_of(block)]
         triangles.append((block.nodes, [face for face in found if len(face) == 3]))
-        for number, square in enumerate(found):
+        for square in found:
             if len(square) != 4:
                 continue
             thirds.append((block.nodes, [square[:i] + square[i + 1 :] for i in range(4)]))
             elements.append(np.arange(at.start, at.stop))
-            numbers.append(np.full(len(block), number))
     keys = set_keys(triangles + thirds)
     n_triangles = sum(len(cells) * len(columns) for cells, columns in triangles)
     meets, start = [], n_triangles
@@ -84,5 +65,4 @@ def _halved_squares(mesh: Mesh) -> tuple[Ints, Ints]:
         stop = start + len(cells) * len(columns)
         meets.append(np.isin(keys[start:stop].reshape(4, -1), keys[:n_triangles]).any(axis=0))
         start = stop
-    halved = np.concatenate(meets)
-    return np.concatenate(elements)[halved], np.concatenate(numbers)[halved]
+    return np.concatenate(elements)[np.concatenate(meets)]

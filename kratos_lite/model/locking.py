@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kratos_lite.assembly.element_groups import ElementGroup, Kinds
+from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.elements import KinematicLinear
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of, is_of_library
-from kratos_lite.elements.overridden_steps import MECHANICS
+from kratos_lite.elements.custom import is_builtin
+from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear, formulations_of
 from kratos_lite.mesh import Mesh
 from kratos_lite.typing import Array
 
@@ -24,14 +24,10 @@ LONG = 2.0
 QUADRATIC = {"tetrahedron": "3D10N", "wedge": "3D15N", "pyramid": "3D13N", "hexahedron": "3D20N"}
 
 
-def check_locking(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | None = None) -> list[str]:
-    """Return a warning for each kind of elements that will lock, with the better choice.
-
-    Over ranks, `kinds` are those of all.
-    """
-    kinds = groups if kinds is None else kinds
-    warnings = [*_near_half(kinds), *_with_apex(kinds)]
-    for element in dict.fromkeys(kind.element for kind in kinds if _shears(kind.element)):
+def check_locking(mesh: Mesh, groups: Sequence[ElementGroup]) -> list[str]:
+    """Return a warning for each kind of elements that will lock, with the better choice."""
+    warnings = [*_near_half(groups), *_with_apex(groups)]
+    for element in dict.fromkeys(group.element for group in groups if _shears(group.element)):
         warnings += _in_bending(mesh, element, [group for group in groups if group.element is element])
     return warnings
 
@@ -39,11 +35,11 @@ def check_locking(mesh: Mesh, groups: Sequence[ElementGroup], kinds: Kinds | Non
 # ---- by element and material ---------------------------------------------------------------------------
 
 
-def _near_half(groups: Kinds) -> list[str]:
+def _near_half(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of plain elements with ν near ½; ten-node tetrahedra have sound displacements."""
     found: dict[str, str] = {}
     for kind, C in ((group.element, group.material.C) for group in groups):
-        plain = kind.inherits(*MECHANICS) and kind.formulation == "standard"
+        plain = not kind.custom and kind.formulation == "standard"
         if plain and kind.__name__ != "KinematicLinear3D10N" and bulk_over_shear(C) > NEAR_HALF:
             found[kind.__name__] = better_element(kind, "BBar")
     if not found:
@@ -52,11 +48,11 @@ def _near_half(groups: Kinds) -> list[str]:
     return [f"Poisson's ratio lies so near 0.5 that {names} may lock (come out far too stiff); take {better}"]
 
 
-def _with_apex(groups: Kinds) -> list[str]:
+def _with_apex(groups: Sequence[ElementGroup]) -> list[str]:
     """Warn of linear tetrahedra, and of linear pyramids unless they are few, between other elements."""
     counts: dict[type[KinematicLinear], int] = {}
     for group in groups:
-        if is_of_library(group.element) and len(group.element.nodes) in (4, 5):
+        if is_builtin(group.element) and len(group.element.nodes) in (4, 5):
             counts[group.element] = counts.get(group.element, 0) + len(group)
     half = sum(map(len, groups)) / 2
     return [
@@ -89,18 +85,16 @@ def _in_bending(mesh: Mesh, kind: type[KinematicLinear], groups: Sequence[Elemen
         length = np.linalg.norm(X[:, edges[0]] - X[:, edges[1]], axis=2)
         thickness = np.where(length > 0, length, np.inf).min(axis=1)
         ratio = length.max(axis=1) / thickness
-        ratio[~mesh.own_elements[group.rows]] = 0.0
         excess = _shear_over_young(group.material.C) * ratio**2
         worst = int(np.argmax(excess))
         if ratio[worst] > LONG and excess[worst] > most:
             element = mesh.element_ids[group.rows[worst]]
             most = float(excess[worst])
             text = f"such as element {element} ({ratio[worst]:.3g} times as long as thick)"
-    most, text = min(mesh.ranks.gather((-most, text)))
     if not text:
         return []
     return [
-        f"{kind.__name__} may come out up to {1 - most:.2g} times too stiff in bending, {text}; "
+        f"{kind.__name__} may come out up to {1 + most:.2g} times too stiff in bending, {text}; "
         f"take {better_element(kind)}"
     ]
 
@@ -116,4 +110,4 @@ def _shear_over_young(C: Array) -> float:
 def _shears(kind: type[KinematicLinear]) -> bool:
     """Return whether an element is a plain linear brick or wedge of the library, which bends by shearing."""
     linear = kind.shape.cell in ("hexahedron", "wedge") and len(kind.nodes) == kind.shape.corners
-    return linear and is_of_library(kind) and kind.formulation != "enhanced"
+    return linear and is_builtin(kind) and kind.formulation != "enhanced"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from kratos_lite.mesh.topology import corners, faces_of
 from kratos_lite.registry import remembered
 from kratos_lite.shapes import Shape
 from kratos_lite.typing import Array, Ints, Mask
-
-if TYPE_CHECKING:
-    from kratos_lite.mesh.shared_faces import SharedFaces
 
 
 @remembered
@@ -43,38 +39,19 @@ class OppositeFaces:
 
     @cached_property
     def mate(self) -> Ints:
-        """The same face of the neighbor; -1 where it has none, or none on this rank."""
+        """The same face of the neighbor; -1 where it has none."""
         mate = np.full(len(self.faces.element), -1)
         mate[self.faces.one], mate[self.faces.other] = self.faces.other, self.faces.one
         return mate
 
     @cached_property
-    def shared(self) -> SharedFaces | None:
-        """How ranks that share the mesh find the faces in one another; None without such."""
-        if self.mesh.subdomain is None:
-            return None
-        from kratos_lite.mesh.shared_faces import SharedFaces  # a quick start without it
-
-        return SharedFaces(self.mesh)
-
-    @cached_property
-    def kept(self) -> Mask | bool:
-        """Whether this rank is the one that looks at a face."""
-        return True if self.shared is None else self.shared.kept
-
-    @cached_property
     def outer(self) -> Mask:
-        """Whether a face has no neighbor, on any rank."""
-        return ~np.asarray(self.beyond(np.ones(len(self.mate), dtype=bool)))
+        """Whether a face has no neighbor."""
+        return self.mate < 0
 
     def beyond(self, values: Mask) -> Mask:
-        """Return what each face (f,) has on its other side, on any rank; False where there is nothing."""
-        found: Mask = (self.mate >= 0) & values[self.mate]
-        if self.shared is None:
-            return found
-        asked = np.flatnonzero((self.mate < 0) & ~self.shared.kept)
-        found[asked] = self.shared.ask_keepers(asked, found)
-        return found
+        """Return what each face (f,) has on its other side; False where there is nothing."""
+        return np.asarray((self.mate >= 0) & values[self.mate])
 
     def number(self, block: int, face: Ints | int, cells: Ints) -> Ints:
         """Return the numbers of faces, by the number of their block, their face of the cell and cells."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kratos_lite.assembly.element_groups import ElementGroup
-from kratos_lite.mesh import NO_ROWS, Mesh, components, distinct
+from kratos_lite.mesh import Mesh, components, distinct
 from kratos_lite.model.connected_bodies import FEW, Bodies, bodies
 from kratos_lite.model.free_motions import FreeMotions
 from kratos_lite.model.supports import Supports
@@ -38,8 +38,6 @@ def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup])
     found = bodies(mesh)
     frames = found.frames(mesh)
     equations = _equations(mesh, found, supports)
-    if mesh.subdomain is not None:
-        equations = _of_all_ranks(mesh, frames, equations)
     group_of = _groups(len(frames[0]), equations)
     members, mine = _by_group(group_of, equations)
     free = [
@@ -50,28 +48,21 @@ def free_motions(mesh: Mesh, supports: Supports, groups: Sequence[ElementGroup])
     modes = np.zeros((len(group_of), 6, int(counts.max(initial=0))))
     for group, one in zip(members, free, strict=True):
         modes[group, :, : one.shape[2]] = one
-    if modes.size:  # the same basis on all ranks
-        modes = mesh.ranks.gather(modes)[0]
     return FreeMotions(mesh, supports, groups, found, frames, group_of, counts, modes)
 
 
 @dataclass(frozen=True)
 class _Constraints:
-    """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight.
-
-    Or, in place of degrees of freedom and weights, what the modes of the body are in each entry, (k, 6).
-    """
+    """What rigid-body modes must meet, entry by entry: equation, degree of freedom, body, weight."""
 
     row: Ints
     dof: Ints
     body: Ints
     weight: Array
-    on_modes: Array | None = None
 
     def take(self, rows: Ints) -> _Constraints:
         """Return some of the entries."""
-        values = None if self.on_modes is None else self.on_modes[rows]
-        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows], values)
+        return _Constraints(self.row[rows], self.dof[rows], self.body[rows], self.weight[rows])
 
 
 def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
@@ -88,22 +79,6 @@ def _equations(mesh: Mesh, found: Bodies, supports: Supports) -> _Constraints:
     weight = np.concatenate([weight, ones, -ones])
     known = body >= 0
     return _Constraints(row[known], dof[known], body[known], weight[known])
-
-
-def _of_all_ranks(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) -> _Constraints:
-    """Return the equations of all ranks in few rows, on the modes of the bodies."""
-    from kratos_lite.model.shared_bodies import compressed  # a quick start without it
-
-    mine = compressed(equations.row, equations.body, _on_modes(mesh, frames, equations))
-    row, body, values, count = [NO_ROWS], [NO_ROWS], [np.zeros((0, 6))], 0
-    for members, R in (one for found in mesh.ranks.gather(mine) for one in found):
-        r, b = len(R), len(members)
-        row.append(np.repeat(np.arange(count, count + r), b))
-        body.append(np.tile(members, r))
-        values.append(R.reshape(r * b, 6))
-        count += r
-    rows, every = np.concatenate(row), np.concatenate(body)
-    return _Constraints(rows, 0 * rows, every, np.ones(len(rows)), np.concatenate(values))
 
 
 def _groups(n_bodies: int, equations: _Constraints) -> Ints:
@@ -135,7 +110,7 @@ def _free_modes(mesh: Mesh, frames: tuple[Array, Array], group: Ints, equations:
     """
     rows = distinct(equations.row)
     row = np.searchsorted(rows, equations.row)
-    if len(rows) > 2 * SAMPLE * len(group) and equations.on_modes is None:
+    if len(rows) > 2 * SAMPLE * len(group):
         count = SAMPLE * len(group)
         chosen = np.linspace(0, len(rows) - 3, count).astype(np.int64) + np.arange(count) % 3
         some = np.full(len(rows), -1)
@@ -171,8 +146,6 @@ def _on_modes(mesh: Mesh, frames: tuple[Array, Array], equations: _Constraints) 
 
     Entries are scaled before they are summed up, so that rounding, which hanging nodes leave, stays small.
     """
-    if equations.on_modes is not None:
-        return equations.on_modes
     node, axis = np.divmod(equations.dof, 3)
     R = rigid_modes(mesh.points[node], frames[0][equations.body]).reshape(-1, 3, 6)
     R = R[np.arange(len(R)), axis]

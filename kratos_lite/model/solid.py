@@ -9,10 +9,8 @@ import numpy as np
 
 from kratos_lite.assembly.element_groups import (
     ElementGroup,
-    Kind,
     element_class,
     element_groups_of,
-    kinds_over_ranks,
 )
 from kratos_lite.elements import ELEMENTS
 from kratos_lite.elements.formulations import (
@@ -174,39 +172,19 @@ class Solid:
             unnamed,
         )
 
-    def kinds(
-        self, groups: Sequence[ElementGroup], unnamed: str = NON_LOCKING
-    ) -> Sequence[ElementGroup | Kind]:
-        """Return the groups, or the kinds of elements of all ranks where these share the mesh.
-
-        Parameters
-        ----------
-        groups : of `element_groups`.
-        unnamed : as for these.
-
-        Returns
-        -------
-        The groups, or kinds in the order of the groups of one process.
-        """
-        if self.mesh.subdomain is None:
-            return groups
-        known = self._materials, self._material_of, self._rules, self._rule_of
-        return kinds_over_ranks(self.mesh, *known, self.formulation, unnamed)
-
-    def chosen(self, groups: Sequence[ElementGroup | Kind] = ()) -> str:
+    def chosen(self, groups: Sequence[ElementGroup] = ()) -> str:
         """Return which formulation was chosen and why, in one line; "" where names of elements say it.
 
         Parameters
         ----------
-        groups : of `element_groups`, or `kinds`.
+        groups : of `element_groups`.
 
         Returns
         -------
         Such as ``non_locking, as the mesh names none: EnhancedStrain3D8N``.
         """
         found = dict.fromkeys(_kind(group) for group in groups)
-        blocks = [is_unnamed(block.name) for block in self.mesh.blocks if len(block)]
-        unnamed = self.mesh.ranks.any(any(blocks))
+        unnamed = any(is_unnamed(block.name) for block in self.mesh.blocks if len(block))
         if self.formulation is None and not unnamed:
             return ""
         why = "as the mesh names none" if self.formulation is None else "as asked for"
@@ -286,7 +264,7 @@ class Solid:
         return checks.check_geometry(self.mesh, self.formulation)
 
 
-def _kind(group: ElementGroup | Kind) -> str:
+def _kind(group: ElementGroup) -> str:
     """Return the name of the element of a group, with its material where that decides about it."""
     name = group.element.__name__
     return f"{name} for {group.material}" if is_nearly_incompressible(group.material.C) else name

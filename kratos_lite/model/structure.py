@@ -12,7 +12,7 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import PatternCache
 from kratos_lite.errors import InputError, ModelError, nearest
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh import Mesh
+from kratos_lite.mesh import Mesh, distinct
 from kratos_lite.model import checks
 from kratos_lite.model.coincident_nodes import check_coincident
 from kratos_lite.model.equal import key_of
@@ -142,10 +142,6 @@ class Structure(SupportedSolid, Tabular):
         if not isinstance(load, Load):
             raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
         load = load if amplitude is None else ScaledLoad(load, amplitude)
-        with self.mesh.ranks.together():
-            self._add(load, name, override)
-
-    def _add(self, load: Load, name: str | None, override: bool) -> None:
         load.check(self.mesh)
         key, named = key_of(load), self.named_loads
         if name is not None:
@@ -222,7 +218,7 @@ class Structure(SupportedSolid, Tabular):
 
         Returns
         -------
-        Element groups and warnings.  Over ranks, the groups are those of one, the warnings those of all.
+        Element groups and warnings.
 
         Raises
         ------
@@ -232,19 +228,16 @@ class Structure(SupportedSolid, Tabular):
         mesh = self.mesh
         warnings = self.check_geometry()
         groups = self.element_groups()
-        kinds = self.kinds(groups)
         used, faces = mesh.used_nodes(), mesh.all_faces
-        if mesh.subdomain is not None:
-            used = mesh.subdomain.fetch(used)  # a ghost may have its elements elsewhere
-        if not all(kind.is_proven for kind in kinds):
+        if not all(group.is_proven for group in groups):
             from kratos_lite.model.hourglass_modes import check_rules  # rarely needed
 
-            warnings += check_rules(mesh, groups, kinds)
+            warnings += check_rules(mesh, groups)
         warnings += check_joints(mesh, faces)
-        warnings += check_coincident(mesh, used, self.supports.own_constraints)
-        warnings += checks.check_scales(mesh, kinds)
-        warnings += check_locking(mesh, groups, kinds)
-        if any(kind.element.spurious_modes for kind in kinds):
+        warnings += check_coincident(mesh, used, self.supports.constraints)
+        warnings += checks.check_scales(mesh, groups)
+        warnings += check_locking(mesh, groups)
+        if any(group.element.spurious_modes for group in groups):
             from kratos_lite.model.spurious_modes import check_spurious_modes  # rarely needed
 
             check_spurious_modes(mesh, groups, self.supports, faces)
@@ -275,9 +268,8 @@ class Structure(SupportedSolid, Tabular):
         return [*self.notes, *checks.unusual_constants(self._used_materials())]
 
     def _used_materials(self) -> list[LinearMaterial]:
-        found = np.bincount(self._material_of[self.mesh.own_elements] + 1, minlength=len(self._materials) + 1)
-        counts = self.mesh.ranks.sum(found)[1:]
-        return [self._materials[i] for i in np.flatnonzero(counts)]
+        used = distinct(self._material_of)
+        return [self._materials[i] for i in used[used >= 0]]
 
     # ---- summary ------------------------------------------------------------------------------
 
@@ -288,17 +280,15 @@ class Structure(SupportedSolid, Tabular):
         -------
         Labels and values.
         """
-        sums = (self._material_of < 0)[self.mesh.own_elements], self.supports.fixed[self.mesh.own_nodes]
-        counts = np.array([*(mask.sum() for mask in sums), len(self.supports.own_constraints)])
-        without, fixed, constraints = self.mesh.ranks.sum(counts).tolist()
+        without = int((self._material_of < 0).sum())
         rows = self.mesh.table()
         rows += [("formulation", text)] if (text := self.chosen()) else []
         rows += [("material", str(material)) for material in self._used_materials()]
         rows += [("material", f"none for {without} elements")] if without else []
-        rows.append(("fixed", f"{fixed} components"))
+        rows.append(("fixed", f"{self.supports.fixed.sum()} components"))
         rows += [("support", str(fixing)) for fixing in self.supports.named.values()]
-        if constraints:
-            rows.append(("constraints", str(constraints)))
+        if self.supports.constraints:
+            rows.append(("constraints", str(len(self.supports.constraints))))
         names = {id(load): f"{name}: " for name, load in self.named_loads.items()}
         rows += [("load", f"{names.get(id(load), '')}{load!r}") for load in self.loads]
         rows += [] if self.motion is None else [("motion", str(self.motion))]
@@ -311,14 +301,11 @@ class Structure(SupportedSolid, Tabular):
 
 def _without_elements(mesh: Mesh, used: NDArray[np.bool_]) -> list[str]:
     """Return a warning of the nodes that no element uses, by the mask (n,) of those used."""
-    lost = mesh.node_ids[~used & mesh.own_nodes]
-    count = mesh.ranks.sum(len(lost))
-    if not count:
+    lost = mesh.node_ids[~used]
+    if not len(lost):
         return []
-    found = np.concatenate(mesh.ranks.gather(lost[:5]))
-    first = (found if mesh.subdomain is None else np.sort(found))[:5]
-    shown = " ".join(map(str, first)) + (" …" if count > 5 else "")
-    return [f"{count} nodes belong to no element and carry no equations: {shown}"]
+    shown = " ".join(map(str, lost[:5])) + (" …" if len(lost) > 5 else "")
+    return [f"{len(lost)} nodes belong to no element and carry no equations: {shown}"]
 
 
 def _place(loads: list[Load], wanted: object) -> int | None:

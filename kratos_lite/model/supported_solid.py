@@ -81,20 +81,8 @@ class SupportedSolid(Solid):
         MeshError
             There is no such part or node.
         """
-        with self.mesh.ranks.together():
-            self._fix(where, axes, value, field, override, name)
-
-    def _fix(
-        self,
-        where: Where,
-        axes: str,
-        value: ArrayLike | Callable[[float], float],
-        field: Callable[[Array], ArrayLike] | None,
-        override: bool,
-        name: str | None,
-    ) -> None:
         rows = self.mesh.nodes(where)
-        if not self.mesh.ranks.any(len(rows) > 0):
+        if self.mesh.whole and not len(rows):
             what = f"part {where!r} has no nodes" if isinstance(where, str) else "no node is chosen"
             raise ModelError(f"cannot fix {axes}: {what}")
         function_or_none(field, "field must be a function of places (k, 3)")
@@ -145,13 +133,9 @@ class SupportedSolid(Solid):
         4
         """
         named = self.supports.named
-        with self.mesh.ranks.together():
-            if isinstance(where, str) and where in named:
-                self.supports.drop(named[where])
-                return
-            self._release(where, axes, named)
-
-    def _release(self, where: Where, axes: str, named: Mapping[str, Fixing]) -> None:
+        if isinstance(where, str) and where in named:
+            self.supports.drop(named[where])
+            return
         try:
             rows = self.mesh.nodes(where)
         except MeshError as error:

@@ -113,7 +113,7 @@ class Supports:
     def release(self, where: Selected, rows: Ints, axes: str) -> None:
         """Release nodes along axes, whatever has prescribed them; ModelError if nothing has."""
         held = self.fixed[np.ix_(rows, np.array(axis_numbers(axes)))].any()
-        if not self.mesh.ranks.any(bool(held)):
+        if self.mesh.whole and not held:
             raise ModelError(f"nothing is prescribed along {axes} there, so that nothing is released")
         self.apply(Fixing(where, rows, axes, 0.0, None, True, released=True))
 
@@ -236,14 +236,9 @@ class Supports:
 
     def _eliminated(self, values: Array, agree: bool) -> Slaves:
         """Return the slaves for some prescribed values; those of symmetric ties must agree if asked for."""
-        constraints, share = self.turned(agree), self.mesh.subdomain
-        if share is None:
-            return eliminate(constraints, self.fixed, values, self.name)
-        from kratos_lite.distributed.constraints import local_slaves, slaves_over_ranks  # chains cross ranks
+        return eliminate(self._ties(agree), self.fixed, values, self.name)
 
-        return local_slaves(share, slaves_over_ranks(share, constraints, self.fixed, values, self.name))
-
-    def turned(self, agree: bool) -> list[MultiPointConstraint]:
+    def _ties(self, agree: bool) -> list[MultiPointConstraint]:
         """Return the constraints, symmetric ties with a node that supports hold as master.
 
         With `agree`, ModelError where supports move both nodes of a tie, and not alike.
@@ -272,11 +267,8 @@ class Supports:
         """Raise ModelError for constraints of nodes that no element uses, by the mask (n,) of those used."""
         dofs = np.array([dof for slave, (terms, _) in self.slaves().items() for dof in (slave, *terms)], int)
         unused = dofs[~used[dofs // 3]]
-        chosen = np.zeros(self.mesh.n_nodes, dtype=bool)
-        chosen[unused[: None if self.mesh.subdomain else 1] // 3] = True
-        node = self.mesh.first_node(chosen)
-        if node is not None:
-            raise ModelError(UNUSED.format(self.name(int(unused[unused // 3 == node][0]))))
+        if len(unused):
+            raise ModelError(UNUSED.format(self.name(int(unused[0]))))
 
     # ---- for the equations ------------------------------------------------------------------------------
 
@@ -332,25 +324,14 @@ class Supports:
         return forces if self.mesh.hanging is None else self.mesh.hanging.gather(forces)
 
     def constraint_rows(self) -> tuple[Ints, Ints, Array]:
-        """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight).
-
-        Over ranks, what is prescribed for own nodes.
-        """
-        fixed = np.flatnonzero((self.fixed & self.mesh.own_nodes[:, None]).ravel())
+        """Return all that is prescribed, but its values, as sparse rows of equations: (row, dof, weight)."""
+        fixed = np.flatnonzero(self.fixed)
         row, dof, weight = [np.arange(len(fixed))], [fixed], [np.ones(len(fixed))]
-        for r, constraint in enumerate(self.own_constraints, start=len(fixed)):
+        for r, constraint in enumerate(self.constraints, start=len(fixed)):
             row.append(np.full(1 + len(constraint.masters), r))
             dof.append(np.array([constraint.slave, *constraint.masters], dtype=np.int64))
             weight.append(np.array([1.0, *(-w for w in constraint.weights)]))
         return np.concatenate(row), np.concatenate(dof), np.concatenate(weight)
-
-    @property
-    def own_constraints(self) -> tuple[MultiPointConstraint, ...]:
-        """The multi-point constraints of slaves on own nodes: all, unless ranks share the mesh."""
-        if self.mesh.subdomain is None:
-            return self.constraints
-        own = self.mesh.own_nodes
-        return tuple(one for one in self.constraints if own[one.slave // 3])
 
 
 def hanging_constraints(mesh: Mesh) -> tuple[MultiPointConstraint, ...]:

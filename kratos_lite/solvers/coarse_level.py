@@ -21,6 +21,7 @@ from kratos_lite.elements.kinematic_linear_3d8n import KinematicLinear3D8N
 from kratos_lite.mesh.centers import surroundings
 from kratos_lite.mesh.hanging import HangingNodes
 from kratos_lite.shapes import Shape
+from kratos_lite.solvers.plan import EXTREME, PER_EXTREME, PER_STRETCHED, STRETCHED
 from kratos_lite.typing import Array, Ints, Mask, Rows
 
 LINEAR: dict[type[Shape] | None, type[KinematicLinear]] = {
@@ -55,10 +56,6 @@ class LinearLevel:
         return self.assemble()
 
 
-STRETCHED = 3.0
-"""Longest to shortest side of a cell above which smoothing single nodes is slow."""
-EXTREME = 30.0
-"""The same of few cells, which alone stall a smoother of single nodes."""
 SAMPLE = 2000
 """Cells of a group that show whether it is stretched."""
 LONG = 3.0
@@ -142,7 +139,7 @@ def is_stretched(points: Array, groups: Sequence[ElementGroup]) -> bool:
         long, short = sides.max(axis=1), sides.min(axis=1)
         stretched += int(np.count_nonzero(long > STRETCHED * short))
         extreme += int(np.count_nonzero(long > EXTREME * short))
-    return 20 * stretched > seen or 200 * extreme > seen
+    return PER_STRETCHED * stretched > seen or PER_EXTREME * extreme > seen
 
 
 def sides_of(shape: type[Shape], nodes: Array) -> Array:

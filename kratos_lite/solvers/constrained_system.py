@@ -13,28 +13,21 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.gauss_point_fields import internal_load
 from kratos_lite.assembly.sparsity_pattern import Pattern, PatternCache
 from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
-from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
-from kratos_lite.errors import InputError
+from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.solvers.constraint_map import ConstraintMap
-from kratos_lite.solvers.direct import is_quick
-from kratos_lite.solvers.linear_solver import DENSE_MAX, LinearSolver, Solution, choose, quick_to_factorize
+from kratos_lite.solvers.linear_solver import LinearSolver, Solution
+from kratos_lite.solvers.plan import LARGEST_CONTRAST as LARGEST_CONTRAST  # noqa: PLC0414
+from kratos_lite.solvers.plan import Facts, choose
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kratos_lite.assembly.matrix_free import MatrixFree
     from kratos_lite.mesh.hanging import HangingNodes
     from kratos_lite.solvers.coarse_level import LinearLevel
 
-LARGEST_CONTRAST = 1e3
-"""Stiffest to softest material up to which products without a matrix are as exact in soft parts."""
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
-NEARLY = f"few unknowns with a bulk modulus > {NEAR_HALF:g} shear moduli: a factorization is fastest"
-"""Reason for the method ``direct``."""
-LOCKED = 3000.0
-"""Bulk over shear modulus (ν = 0.4998) from which plain elements take too many iterations."""
 
 
 class ConstrainedSystem:
@@ -60,7 +53,7 @@ class ConstrainedSystem:
     points, groups : the nodes that carry equations, and the elements by rows of these.
     nodes : (a,) int, rows of these nodes among all n.
     reduced : the constraint map, from the free degrees of freedom to all 3a.
-    method, reason : which solver is used, and why.
+    plan : how the equations are solved, and why.
     skipped, warnings : what assembly left out, and what is to be said, in words.
 
     Examples
@@ -99,27 +92,43 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        dofs = 3 * len(self.nodes)
-        self.method, self.reason = choose(solver, len(self.reduced.free), dofs)
-        if solver == "auto" and self.method == "amg" and self._is_soon_factorized():
-            self.method, self.reason = "direct", NEARLY
-        if self.method == "dense" and dofs > DENSE_MAX:
-            raise InputError(f"solver='dense' is for up to {DENSE_MAX} degrees of freedom; got {dofs}")
+        self.plan = choose(solver, self._facts())
 
-    def _is_soon_factorized(self) -> bool:
-        """Return whether a material is nearly incompressible and a factorization is fastest."""
-        if not self._is_nearly_incompressible():
-            return False
-        unknowns = len(self.reduced.free)
-        if is_quick(unknowns, lambda: self.pattern):
-            return True
-        from kratos_lite.solvers.dilatation import is_split  # a quick start for small models
+    def _facts(self) -> Facts:
+        return Facts(
+            len(self.reduced.free),
+            3 * len(self.nodes),
+            bulk_over_shear=lambda: largest_bulk_over_shear(self.groups),
+            bandwidth=self._bandwidth,
+            has_product=self._has_product,
+            contrast=lambda: stiffness_contrast(self.groups),
+            is_stretched=self._is_stretched,
+            is_plate=self._is_plate,
+        )
 
-        locked = (group for group in self.groups if bulk_over_shear(group.material.C) > LOCKED)
-        return quick_to_factorize(unknowns) and not all(map(is_split, locked))
+    def _bandwidth(self) -> float:
+        from kratos_lite.solvers.banded import cuthill_mckee, nodal_width  # rarely needed
 
-    def _is_nearly_incompressible(self) -> bool:
-        return any(bulk_over_shear(group.material.C) > NEAR_HALF for group in self.groups)
+        width = nodal_width(self.pattern, self.pattern.rows(), cuthill_mckee(self.pattern)[1])
+        return width * len(self.reduced.free) / len(self.nodes)
+
+    def _has_product(self) -> bool:
+        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
+
+        tied = self.reduced.T is not None or self._hanging is not None
+        return not tied and all(map(MatrixFree.takes, self.groups))
+
+    def _is_stretched(self) -> bool:
+        from kratos_lite.solvers.coarse_level import is_stretched  # a quick start for small models
+
+        return is_stretched(self.points, self.groups)
+
+    def _is_plate(self) -> bool:
+        from kratos_lite.solvers.plate_level import plate_axes  # a quick start for small models
+
+        free = np.zeros(3 * len(self.points), dtype=bool)
+        free[self.reduced.free] = True
+        return plate_axes(self.points, free) is not None
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -130,47 +139,27 @@ class ConstrainedSystem:
     def K(self) -> Any:
         """The stiffness matrix (3a, 3a) in N/m: a BlockMatrix, or a full array for the method ``dense``.
 
-        For the method ``amg`` it is a MatrixFree where that is enough, and a SplitMatrix where elements are
-        nearly incompressible.
+        It is a MatrixFree where the plan needs no matrix, and a SplitMatrix for ``displacement-pressure``.
         """
-        if self.method == "dense":
+        if self.plan.method == "dense":
             return assemble_dense(self.points, self.groups)
-        product = self._matrix_free()
-        return self._assembled(self._is_nearly_incompressible()) if product is None else product
+        if not self.plan.matrix_free:
+            return self._assembled(self.plan.method == "displacement-pressure")
+        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
+
+        if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
+            self.skipped.append(NO_MATRIX)
+        return MatrixFree(self.points, self.groups, self._assembled)
 
     def _assembled(self, split: bool = False) -> Any:
         skipped: set[str] = set()
-        if self.method == "amg" and split:
+        if split:
             from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
         else:
             assemble = assemble_stiffness
         K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
         return K
-
-    def _matrix_free(self) -> MatrixFree | None:
-        """Return the product of K alone, if multigrid smooths well with it.
-
-        A plate, stretched cells and materials of a large contrast need a matrix.
-        """
-        if self.method != "amg" or self.reduced.T is not None or self._hanging is not None:
-            return None
-        from kratos_lite.assembly.matrix_free import MatrixFree  # a quick start for small models
-        from kratos_lite.solvers.coarse_level import is_stretched
-        from kratos_lite.solvers.plate_level import plate_axes
-
-        free = np.zeros(3 * len(self.points), dtype=bool)
-        free[self.reduced.free] = True
-        if (
-            not all(map(MatrixFree.takes, self.groups))
-            or stiffness_contrast(self.groups) > LARGEST_CONTRAST
-            or is_stretched(self.points, self.groups)
-            or plate_axes(self.points, free) is not None
-        ):
-            return None
-        if any(len(group.element.shape.nodes) > group.element.shape.corners for group in self.groups):
-            self.skipped.append(NO_MATRIX)
-        return MatrixFree(self.points, self.groups, self._assembled)
 
     @cached_property
     def norm(self) -> float:
@@ -179,7 +168,7 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.reduced, self.points, self.method, self.reason, self._linear_level)
+        return LinearSolver(self.K, self.reduced, self.points, self.plan, self._linear_level)
 
     def _linear_level(self) -> LinearLevel | None:
         from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
@@ -242,6 +231,17 @@ class ConstrainedSystem:
         out = np.zeros((self.n_nodes, 3))
         out[self.nodes] = values.reshape(-1, 3)
         return out
+
+
+def largest_bulk_over_shear(groups: Sequence[ElementGroup]) -> tuple[float, float]:
+    """Return the largest ratio of moduli of elements with known dilatations, and of the others."""
+    from kratos_lite.solvers.dilatation import has_dilatations  # a quick start for small models
+
+    largest = {True: 0.0, False: 0.0}
+    for group in groups:
+        known = has_dilatations(group)
+        largest[known] = max(largest[known], bulk_over_shear(group.material.C))
+    return largest[True], largest[False]
 
 
 def stiffness_contrast(groups: Sequence[ElementGroup]) -> float:

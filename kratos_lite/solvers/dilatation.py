@@ -18,8 +18,6 @@ from kratos_lite.assembly.element_groups import ElementGroup
 from kratos_lite.assembly.sparsity_pattern import Pattern
 from kratos_lite.assembly.stiffness import add_in_parts, assemble_stiffness
 from kratos_lite.elements.formulations import NEAR_HALF, bulk_over_shear
-from kratos_lite.elements.geometry import GEOMETRY
-from kratos_lite.elements.overridden_steps import MECHANICS
 from kratos_lite.elements.tables import cofactors, tabulate
 from kratos_lite.materials import LinearMaterial
 from kratos_lite.solvers.pressure_means import PressureMeans, pressure_means
@@ -28,8 +26,6 @@ from kratos_lite.typing import Array, Progress
 if TYPE_CHECKING:
     from scipy.sparse import bsr_array, csr_array
 
-REASON = f"a bulk modulus > {NEAR_HALF:g} shear moduli: pressures beside displacements keep multigrid fast"
-"""Reason for the method ``displacement-pressure``."""
 KEPT = 1.0
 """λ / μ that A keeps: pressures are better known the more it is, and multigrid is still as good."""
 
@@ -56,7 +52,6 @@ class SplitMatrix:
     modulus: Array
     means: PressureMeans
     groups: list[ElementGroup]
-    is_split = True
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -120,13 +115,17 @@ def assemble(
 
 
 def is_split(group: ElementGroup) -> bool:
-    """Return whether the dilatations of a group are known and its material is nearly incompressible.
+    """Return whether the dilatations of a group are known and its material is nearly incompressible."""
+    return has_dilatations(group) and bulk_over_shear(group.material.C) > NEAR_HALF
+
+
+def has_dilatations(group: ElementGroup) -> bool:
+    """Return whether the dilatations of a group are known.
 
     Those of the library's B-bar elements are their projected ones, those of enhanced elements their means:
     the modes take up the others.
     """
-    known = group.element.has_kernels(*GEOMETRY, *MECHANICS) and group.strain_tables() is not None
-    return known and bulk_over_shear(group.material.C) > NEAR_HALF
+    return not group.element.custom and group.strain_tables() is not None
 
 
 @dataclass(eq=False)

@@ -19,17 +19,10 @@ from kratos_lite.typing import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from kratos_lite.assembly.sparsity_pattern import Pattern
-
 NO_MEMORY = -2
 """PARDISO's error code for too little memory; the others mean a matrix it cannot factorize."""
 REPLACED_PIVOTS = 14
 """PARDISO's parameter (from 1) that counts pivots too small to divide by."""
-
-FEW, MANY = 1000, 10_000
-"""Up to this many unknowns SuperLU always takes less time than 30 iterations; above the other, never."""
-QUICK = 2e9
-"""Unknowns times the square of their band up to which it does: some 5,000 in one layer of cells."""
 
 
 class Unsuitable(Exception):
@@ -62,33 +55,6 @@ class Factorization:
         """
         x = self.apply(b)
         return x + self.apply(b - self.A @ x)
-
-
-def is_quick(unknowns: int, pattern: Callable[[], Pattern]) -> bool:
-    """Return whether a factorization takes less time than 30 iterations.
-
-    Parameters
-    ----------
-    unknowns : the number of free components.
-    pattern : gives the sparsity of the nodes, which is not needed for `FEW` unknowns.
-
-    Examples
-    --------
-    >>> is_quick(FEW, lambda: None), is_quick(MANY + 1, lambda: None)
-    (True, False)
-    """
-    if unknowns <= FEW or unknowns > MANY:
-        return unknowns <= FEW
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    nodal = pattern()
-    n = nodal.n_nodes
-    graph = csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(n, n))
-    place = np.empty(n, dtype=np.int64)
-    place[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(n)
-    width = np.abs(place[nodal.rows()] - place[nodal.indices]).max(initial=0)
-    return bool(unknowns * (width * unknowns / n) ** 2 <= QUICK)
 
 
 def factorize_dense(A: Array) -> Factorization:

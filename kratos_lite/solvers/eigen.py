@@ -11,14 +11,13 @@ import numpy as np
 
 from kratos_lite.errors import InputError, SolveError
 from kratos_lite.solvers import direct
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.typing import Array, Progress
 from kratos_lite.validation import whole_number
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-DENSE_MODES = 1200
-"""Up to this many unknowns all modes at once take no longer than some by iteration."""
 SHIFTS = (1.0, 1e-2, 1e-4, 1e-6)
 """Shares of the first shift that are tried."""
 RESTARTS = 40

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kratos_lite.solvers import plan
 from kratos_lite.typing import Array, Progress
 
 MAX_ITERATIONS = 1000
@@ -16,14 +17,10 @@ STALLED = 200
 """A multigrid that finds no smaller residual in as many iterations does not converge either."""
 
 
-PATIENCE, PATIENCE_FROM = 400, 60
-"""Iterations that take as long as a factorization, and those that show a rate."""
-
-
 class ConvergenceForecast:
     """Forecasts from the residuals so far, as shares of the first, whether an iteration ends soon.
 
-    It does not if, after 60 iterations, their rate promises more than `PATIENCE` in all.  The rate is
+    It does not if, after 60 iterations, their rate promises more than `plan.PATIENCE` in all.  The rate is
     that between the last two quarters, each the mean of its logarithms: residuals grow at first and jump.
 
     Attributes
@@ -45,12 +42,12 @@ class ConvergenceForecast:
         """Take the next residual; return whether to go on."""
         self._logs.append(math.log(max(residual, 1e-300)))
         done, left = len(self._logs), self._logs[-1] - math.log(self.tolerance)
-        if done < PATIENCE_FROM or left <= 0:
+        if done < plan.PATIENCE_FROM or left <= 0:
             return True
         quarter = done // 4
         before, now = self._logs[-2 * quarter : -quarter], self._logs[-quarter:]
         rate = (math.fsum(before) - math.fsum(now)) / quarter**2
-        self.stopped = (PATIENCE - done) * rate < left
+        self.stopped = (plan.PATIENCE - done) * rate < left
         return not self.stopped
 
 

@@ -8,10 +8,8 @@ import numpy as np
 
 from kratos_lite.solvers.coarse_level import LinearLevel
 from kratos_lite.solvers.constraint_map import rigid_modes
+from kratos_lite.solvers.plan import FLAT
 from kratos_lite.typing import Array, Ints, Mask, Rows
-
-FLAT = 0.1
-"""Thickness of a body to its width, up to which it bends like a plate."""
 
 VERY_THIN = 0.004
 """The same from which single precision no longer holds energies of bending beside those of shear."""

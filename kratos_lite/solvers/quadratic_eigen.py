@@ -17,7 +17,8 @@ import numpy as np
 
 from kratos_lite.errors import InputError
 from kratos_lite.solvers import direct
-from kratos_lite.solvers.eigen import DENSE_MODES, RESTARTS, check_residuals, first_shift, not_converged
+from kratos_lite.solvers.eigen import RESTARTS, check_residuals, first_shift, not_converged
+from kratos_lite.solvers.plan import DENSE_MODES
 from kratos_lite.typing import Array, Complexes
 
 if TYPE_CHECKING:

@@ -95,10 +95,7 @@ def distances(X: Array, Y: Array) -> Array:
 
 
 def inside(shape: type[Shape], count: int) -> Array:
-    """Return seeded points inside a cell, with two digits so that messages show them exactly.
-
-    They lie at no symmetric place: there a derivative with two coordinates mixed up looks right.
-    """
+    """Return seeded points at no symmetric place of a cell, of two digits, as messages show them."""
     corners = shape.nodes[: shape.corners]
     share = np.random.default_rng(7).dirichlet(np.ones(len(corners)), count)
     return (share @ corners).round(2)

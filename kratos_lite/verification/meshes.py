@@ -20,11 +20,7 @@ Place = Callable[[Array], Array]
 
 
 def element(kind: str) -> str:
-    """Return the name of an element.
-
-    >>> element("8N"), element("3D8N"), element("KinematicLinear3D8N")[-4:]
-    ('KinematicLinear3D8N', 'KinematicLinear3D8N', '3D8N')
-    """
+    """Return the name of an element such as ``8N`` or ``3D8N``."""
     names = (f"KinematicLinear3D{kind}", f"KinematicLinear{kind}")
     return next((name for name in names if name in ELEMENTS), kind)
 
@@ -50,11 +46,7 @@ def is_stable(kind: str) -> bool:
 
 
 def short(name: str) -> str:
-    """Return a short name of an element for tables.
-
-    >>> short("KinematicLinear3D8N"), short("EnhancedStrain3D8N"), short("BBar3D27N")
-    ('8N', '8N enhanced', '27N b_bar')
-    """
+    """Return a short name of an element for tables, such as ``8N enhanced``."""
     if (
         name.startswith("KinematicLinear3D")
         or name not in ELEMENTS
@@ -107,10 +99,7 @@ def joined(pieces: Sequence[Mesh]) -> Mesh:
 
 
 def octant(n: int, kind: str, outer: Place) -> Mesh:
-    """Return the space between the unit sphere and an outer surface, x y z ≥ 0, in three blocks of n³ bricks.
-
-    `outer` takes directions (m, 3) to the outer surface.
-    """
+    """Return the space between unit sphere and outer surface, x y z ≥ 0, in three blocks of n³ bricks."""
     center, edges = np.ones(3), np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
 
     def block(k: int) -> Mesh:
@@ -171,10 +160,7 @@ def body_forces(mesh: Mesh, force: Place) -> Array:
 
 
 def face_forces(mesh: Mesh, where: Mask, traction: Callable[[Array, Array], Array]) -> Array:
-    """Return ∫ N t dA over the boundary faces among nodes, as nodal forces (n, 3).
-
-    `traction` takes places and unit normals (m, g, 3) to t.  The normals point outward.
-    """
+    """Return ∫ N t dA (n, 3) over boundary faces among nodes; `traction` takes places and normals."""
     total = np.zeros_like(mesh.points)
     for faces in mesh.faces(where):
         assert faces.shape is not None

@@ -25,11 +25,7 @@ SMALL = 1e-9
 
 
 def number(value: float) -> str:
-    """Return a value to the four digits that matter.
-
-    >>> number(0.10398765), number(-1.3221478e-4), number(6.0), number(float("nan"))
-    ('0.104', '-0.0001322', '6', '–')
-    """
+    """Return a value to the four digits that matter."""
     if not isfinite(value):
         return "–"
     text = f"{value:.4g}"
@@ -77,11 +73,7 @@ def line(row: Row, width: int = 9, told: bool = False) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Return how many rows there are of each grade.
-
-    >>> summary([])
-    '0 rows'
-    """
+    """Return how many rows there are of each grade."""
     grades = [PASS, FAIL, REFUSED, *(letter for _, letter in GRADES), "F"]
     counts = {grade: sum(row.grade == grade for row in rows) for grade in grades}
     told = [f"{count} {grade}" for grade, count in counts.items() if count]

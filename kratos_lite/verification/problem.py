@@ -33,28 +33,16 @@ def every(kind: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A quantity with a known value.
+    """A quantity with a known value."""
 
-    Attributes
-    ----------
-    name : family and problem, such as ``patch/linear``.
-    quantity : what is measured, with its unit.
-    source : a key of `SOURCES`, and where it stands in there.
-    reference : the value known; errors are relative to it, or absolute where it is 0.
-    of : takes the name of an element, or "" where the problem has none, to the value found.
-    tolerance : error up to which a row passes.
-    exact : elements that have to pass; the others are graded.  All are graded without a tolerance.
-    takes : elements that the problem is for; None where it has no element.
-    """
-
-    name: str
-    quantity: str
-    source: str
-    reference: float
-    of: Callable[[str], float]
-    tolerance: float | None = None
-    exact: Of = every
-    takes: Of | None = every
+    name: str  # family/problem
+    quantity: str  # with its unit
+    source: str  # a key of SOURCES, and where it stands in there
+    reference: float  # errors are relative to it, or absolute where it is 0
+    of: Callable[[str], float]  # takes the name of an element, or "", to the value
+    tolerance: float | None = None  # up to which a row passes; all are graded without
+    exact: Of = every  # elements that have to pass; others are graded
+    takes: Of | None = every  # elements that it is for; None where it has none
 
     def __post_init__(self) -> None:
         if self.cited not in SOURCES:
@@ -82,13 +70,7 @@ class Problem:
         return ("",) if self.takes is None else tuple(filter(self.takes, wanted))
 
     def row(self, element: str) -> Row:
-        """Find the value for an element; an error of the library becomes a row that fails.
-
-        Raises
-        ------
-        InputError
-            An element that is not of the library raises any other error.
-        """
+        """Find the value for an element; an error of the library becomes a row that fails."""
         try:
             value, note = float(self.of(element)), ""
         except KratosLiteError as error:
@@ -116,16 +98,10 @@ def bounded(
 
 @dataclass(frozen=True, kw_only=True)
 class StaticProblem(Problem):
-    """A problem whose answer follows from the displacements of one or several models at rest.
+    """A problem whose answer follows from the displacements of one or several models at rest."""
 
-    Attributes
-    ----------
-    models : takes the name of an element to the models.
-    measure : takes their results to the value.
-    """
-
-    models: Callable[[str], tuple[Model, ...]]
-    measure: Callable[..., float]
+    models: Callable[[str], tuple[Model, ...]]  # of the name of an element
+    measure: Callable[..., float]  # takes their results to the value
     of: Callable[[str], float] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -144,22 +120,13 @@ def solved(models: Callable[[str], tuple[Model, ...]], element: str) -> tuple[Re
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table.
-
-    Attributes
-    ----------
-    problem : what is asked.
-    element : its name, or "".
-    value : what was found.
-    others : what other programs find, by their names.
-    note : why there is no value.
-    """
+    """One line of the table."""
 
     problem: Problem
     element: str
     value: float
-    others: dict[str, float] = field(default_factory=dict)
-    note: str = ""
+    others: dict[str, float] = field(default_factory=dict)  # what other programs find, by their names
+    note: str = ""  # why there is no value
 
     @property
     def error(self) -> float:

@@ -179,8 +179,8 @@ def test_a_stiffness_that_kernels_do_not_know_has_a_matrix():
     with ELEMENTS.temporary():
 
         class Own(kl.KinematicLinear3D27N):
-            def stiffness(self, C):
-                return 2.0 * super().stiffness(C)
+            def B(self, xi):
+                return 2.0 * super().B(xi)
 
     group = model_of("27N").element_groups()[0]
     assert MatrixFree.takes(group)

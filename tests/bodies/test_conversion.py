@@ -154,7 +154,7 @@ def test_the_other_body_is_another(brick):
     assert not np.shares_memory(body.u, other.u)
 
 
-@pytest.mark.parametrize("target", [kl.Obstacle, "obstacle", None])
+@pytest.mark.parametrize("target", [kl.FixedBody, "fixed", None])
 def test_a_kind_that_is_none_is_refused(target, brick):
     with pytest.raises(kl.InputError, match="becomes a RigidBody, PseudoRigidBody or FiniteElementBody"):
         kl.convert(brick(kl.RigidBody), target)

@@ -239,7 +239,7 @@ def test_equilibrium_takes_a_following_pressure():
     ("body", "words"),
     [
         (lambda: cube(kind=kl.RigidBody), "single deformable body"),
-        (lambda: kl.Obstacle(kl.box()), "single deformable body"),
+        (lambda: kl.FixedBody(kl.box()), "single deformable body"),
         (
             lambda: cube(formulation="modal"),
             "modal bodies.*take formulation='total_lagrangian' or 'corotational'",

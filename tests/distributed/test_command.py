@@ -101,9 +101,7 @@ def test_processes_that_another_mpi_has_started(beam):
     ("words", "text"),
     [
         (["--modes", "3"], "--modes does not go with --engine petsc"),
-        (["--picture", "a.png"], "--picture is drawn on one process"),
-        (["-o", "a.html"], "a.html: .html is written by one process"),
-        (["-o", "a.xyz"], "a.xyz: results cannot be written as '.xyz'"),
+        (["--error", "1%"], "--error is for one process"),
         (["--nonsense"], "--nonsense: there is no such option"),
     ],
 )
@@ -120,64 +118,92 @@ def test_a_missing_input(tmp_path):
 
 # ---- an error, a defect or a signal on one rank -----------------------------------------------------
 
-CHANGED = """import os
-from kratos_lite.cli import apply_options
+CHANGED = """import os, sys
 from kratos_lite.cli.ranks import launched
-rank, read = launched()[0], apply_options.read_case
-def changed(*words, **options):
-    case = read(*words, **options)
-    {}
-    return case
-apply_options.read_case = changed
+from kratos_lite.distributed import equations
+rank, real = launched()[0], equations.Equations
+class Changed(real):
+    def __init__(self, *words):
+        {}
+        super().__init__(*words)
+import kratos_lite.distributed.petsc_system as system
+system.Equations = Changed
 """
 
 
-def after_reading(what):
-    """Return lines by which ranks do something once the input is read."""
+def in_equations(what):
+    """Return lines by which ranks do something before they make their equations."""
     return CHANGED.format(what)
 
 
-def test_an_error_of_the_user_on_one_rank(beam):
-    text = after_reading(
-        "if rank == 1: from kratos_lite.errors import MeshError; raise MeshError('torn in two')"
-    )
-    assert_refused(script(2, text, "solve", beam, "--engine", "petsc"), "error: torn in two")
+@pytest.mark.parametrize(
+    ("what", "text"),
+    [
+        ("if rank == 1: raise KeyError('odd')", "rank 1: KeyError: 'odd'"),
+        ("if rank == 1: raise MemoryError", "rank 1: MemoryError"),
+        ("if rank == 1: sys.exit(0)", "rank 1: SystemExit: 0"),
+        ("if rank == 1: 1 / 0", "rank 1: ZeroDivisionError"),
+    ],
+)
+def test_a_defect_on_one_rank_ends_all(beam, what, text):
+    run = script(3, in_equations(what), "solve", beam, "--engine", "petsc")
+    assert_refused(run, text)
 
 
-@pytest.mark.parametrize("what", ["raise KeyError('odd')", "raise MemoryError"])
-def test_a_defect_on_one_rank_ends_all(beam, what):
-    run = script(3, after_reading(f"if rank == 1: {what}"), "solve", beam, "--engine", "petsc")
-    assert_refused(run, "rank 1: ", code=1 if "odd" in what else 2)
+def test_an_error_of_the_user_on_all_ranks_is_told_once(beam):
+    text = "from kratos_lite.errors import MeshError; raise MeshError('torn in two')"
+    run = script(3, in_equations(text), "solve", beam, "--engine", "petsc")
+    assert_refused(run, "error: torn in two")
 
 
-def test_a_defect_on_all_ranks_is_told_once(beam):
-    run = script(3, after_reading("raise KeyError('odd')"), "solve", beam, "--engine", "petsc")
-    assert_refused(run, "rank 0: internal error: KeyError: 'odd'", code=1)
-
-
-def test_debug_shows_the_traceback_of_the_rank(beam):
-    run = script(
-        2, after_reading("if rank == 1: raise KeyError('odd')"), "solve", beam, "--engine", "petsc", "--debug"
-    )
-    assert run.returncode == 1
-    assert run.stderr.count("Traceback") == 1
-    assert "rank 1: Traceback" in run.stderr
-
-
-def test_a_rank_that_is_killed_ends_all(beam):
-    text = after_reading("if rank == 1: import signal; os.kill(os.getpid(), signal.SIGKILL)")
-    run = script(
-        3, text, "solve", beam, "--engine", "petsc", "-o", "out.pvtu", "--json", "out.json", cwd=beam.parent
-    )
+@pytest.mark.parametrize("signal", ["SIGKILL", "SIGTERM"])
+def test_a_rank_that_is_killed_ends_all(beam, signal):
+    text = in_equations(f"if rank == 1: import signal; os.kill(os.getpid(), signal.{signal})")
+    words = ["solve", beam, "--engine", "petsc", "-o", "out.pvtu", "--json", "out.json"]
+    run = script(3, text, *words, cwd=beam.parent)
     assert run.returncode != 0
     assert files_of(beam.parent) == ["beam.mdpa"]
 
 
-def test_a_rank_that_is_terminated_ends_all(beam):
-    """Those that the launcher then ends have nothing to add."""
-    text = after_reading("if rank == 1: import signal; os.kill(os.getpid(), signal.SIGTERM)")
+LACKS = "if launched()[0] == 1: import sys; sys.modules[{!r}] = None"
+
+
+@pytest.mark.parametrize("package", ["petsc4py", "mpi4py"])
+def test_a_package_that_one_rank_lacks(beam, package):
+    text = (
+        "from kratos_lite.cli.ranks import launched\n"
+        "from kratos_lite.distributed import petsc as module; module.DEBIAN = '/nowhere'\n"
+        + LACKS.format(package)
+    )
+    run = script(2, text, "solve", beam, "--engine", "petsc")
+    assert run.returncode != 0
+    assert package in run.stderr
+    assert run.stderr.count("error:") == 1
+    assert run.stdout == ""
+
+
+def test_words_that_one_rank_alone_gets(beam):
+    text = (
+        "from kratos_lite.cli.ranks import launched\n"
+        "if launched()[0] == 1: sys.argv += ['--tolerance', '1e-6']"
+    )
     run = script(3, text, "solve", beam, "--engine", "petsc")
-    assert_refused(run, "rank 1: terminated; nothing half-written is left", code=128 + 15)
+    assert_refused(run, "ranks share one command", "rank 1", "--tolerance 1e-6")
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_rank_that_leaves_early(beam, begun):
+    """With 0, which mpirun does not notice; also one that has begun to communicate."""
+    text = (
+        "from kratos_lite.cli.ranks import launched\n"
+        "from kratos_lite.distributed import communicator\n"
+        "communicator.LIMIT = 3.0\n"
+        + "from mpi4py import MPI\n" * begun
+        + "if launched()[0] == 1: sys.exit(0)"
+    )
+    run = script(3, text, "solve", beam, "--engine", "petsc")
+    assert run.returncode != 0
+    assert run.stdout == ""
 
 
 def test_an_inverted_element_that_one_rank_holds(beam):
@@ -195,11 +221,8 @@ def test_a_folder_that_is_not_there_or_may_not_be_written(beam):
     run = command(2, "solve", beam, "--engine", "petsc", "-o", "none/out.pvtu", cwd=beam.parent)
     assert_refused(run, "error: none/out.pvtu: the folder none does not exist")
     (beam.parent / "out.pvtu").mkdir()
-    run = command(2, "solve", beam, "--engine", "petsc", "-o", "out.vtu", cwd=beam.parent)
+    run = command(2, "solve", beam, "--engine", "petsc", "-o", "out.pvtu", cwd=beam.parent)
     assert_refused(run, "error: out.pvtu: cannot be written: it is a folder or a device")
-    (beam.parent / "out_1.vtu").write_text("input")
-    run = command(2, "solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.pvtu", cwd=beam.parent)
-    assert_refused(run, "error: a.pvtu: is an input or another output")
 
 
 # ---- part files -----------------------------------------------------------------------------------
@@ -231,7 +254,7 @@ def test_part_files_that_disagree_on_the_place_of_a_node(parts):
     text = last.read_text()
     first = re.search(r"Begin Nodes\n (\d+) (\S+) ", text)
     last.write_text(text.replace(first[0], f"Begin Nodes\n {first[1]} {float(first[2]) + 0.01} "))
-    assert_refused(command(2, "check", parts / "beam.mdpa", "--engine", "petsc"), f"node {first[1]}")
+    assert_refused(command(2, "solve", parts / "beam.mdpa", "--engine", "petsc"), f"node {first[1]}")
 
 
 # ---- what is solved and written -------------------------------------------------------------------
@@ -261,28 +284,33 @@ def test_the_summary_is_that_of_one_process_and_printed_once(beam):
         assert list(shared) == [name for name in serial if name != "iterations" or name in shared]
 
 
-def test_pieces_and_summary_of_ranks(beam):
-    words = ["solve", beam, "--engine", "petsc", "-o", "a.vtu", "--json", "a.json"]
+def test_files_are_those_of_one_process(beam):
+    words = ["solve", beam, "--engine", "petsc", "-o", "a.vtu", "-o", "a.csv", "--json", "a.json"]
     run = command(3, *words, cwd=beam.parent)
-    assert "written               a.pvtu\nwritten               a.json\n" in run.stdout
-    assert files_of(beam.parent) == ["a.json", "a.pvtu", "a_0.vtu", "a_1.vtu", "a_2.vtu", "beam.mdpa"]
+    assert "written               a.vtu\nwritten               a.csv\nwritten" in run.stdout
+    assert files_of(beam.parent) == ["a.csv", "a.json", "a.vtu", "beam.mdpa"]
     shared = json.loads((beam.parent / "a.json").read_text())
     command(1, "solve", beam, "--json", "b.json", cwd=beam.parent)
     serial = json.loads((beam.parent / "b.json").read_text())
-    assert set(serial) - set(shared) == {"displacement", "reaction"}
-    extremes = {"smallest_displacements": np.min, "largest_displacements": np.max}
-    assert set(shared) - set(serial) == {"ranks", "left_out", "reaction_of_parts", *extremes}
-    assert shared["ranks"] == 3
-    for name, extreme in extremes.items():
-        u = np.array(list(serial["displacement"].values()))
-        assert shared[name] == pytest.approx(extreme(u, axis=0), abs=1e-9 * np.abs(u).max())
-    for name in ("nodes", "elements", "unknowns"):
+    assert set(serial) == set(shared)
+    for name in ("displacement", "reaction"):
+        found, expected = (np.array(list(one[name].values())) for one in (shared, serial))
+        assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+def test_part_files_are_solved_as_the_whole(parts):
+    serial = rows_of(command(1, "solve", parts.parent / "beam.mdpa"))
+    run = command(2, "solve", parts / "beam.mdpa", "--engine", "petsc", "-o", "a.pvtu", cwd=parts)
+    shared = rows_of(run)
+    for name in ("nodes", "elements", "unknowns", "total load", "strain energy"):
         assert shared[name] == serial[name]
-    assert shared["largest_displacement"]["value"] == pytest.approx(serial["largest_displacement"]["value"])
-    assert shared["strain_energy"] == pytest.approx(serial["strain_energy"])
-    assert shared["estimated_error"]["relative"] == pytest.approx(serial["estimated_error"]["relative"])
-    of_stress = "largest_von_mises_stress"
-    assert shared[of_stress]["value"] == pytest.approx(serial[of_stress]["value"])
+    for name in ("largest displacement", "largest von Mises"):
+        assert shared[name].split()[0] == serial[name].split()[0]
+    assert files_of(parts) == ["a.pvtu", "a_0.vtu", "a_1.vtu", "beam_partitioned"]
+    run = command(3, "solve", parts / "beam.mdpa", "--engine", "petsc")
+    assert_refused(run, "there are 2 part files", "mpirun -n 2")
+    run = command(2, "solve", parts / "beam.mdpa", "--engine", "petsc", "-o", "a.vtu", cwd=parts)
+    assert_refused(run, "a.vtu: no process has the whole of a mesh in part files; write -o OUT.pvtu")
 
 
 def test_more_ranks_than_elements(tmp_path):
@@ -290,12 +318,11 @@ def test_more_ranks_than_elements(tmp_path):
     model.fix("x-")
     model.add(kl.Traction("x+", (1e6, 0, 0)))
     kl.write(tmp_path / "two.mdpa", model)
-    words = ["solve", "two.mdpa", "--engine", "petsc", "-o", "two.pvtu", "--json", "two.json"]
+    words = ["solve", "two.mdpa", "--engine", "petsc", "--json", "two.json"]
     serial = rows_of(command(1, "solve", "two.mdpa", cwd=tmp_path))
     shared = rows_of(command(4, *words, cwd=tmp_path))
     for name in EQUAL[:-1]:  # the error is rounding
         assert shared[name] == serial[name]
-    assert 1 <= len(list(tmp_path.glob("two_*.vtu"))) <= 2
 
 
 def test_one_rank_writes_as_one_process_does(beam):
@@ -312,32 +339,6 @@ def test_options_that_petsc_does_not_know(beam):
     assert_refused(run, "nonsense")
     run = command(2, "solve", beam, "--engine", "petsc", "--petsc=-pc_typo 3")
     assert run.stdout.count("pc_typo") == 1
-
-
-DYING = """import os, signal
-from kratos_lite.cli.ranks import launched
-from kratos_lite.io.writers import pieces
-real = pieces.writer_of
-def dying(*words):
-    write = real(*words)
-    def half(file):
-        file.write(b"half")
-        file.flush()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return half if launched()[0] == 1 else write
-pieces.writer_of = dying
-"""
-
-
-def test_a_rank_that_is_killed_while_it_writes(beam):
-    """What was there stays; the others take their unfinished files away."""
-    words = ["solve", beam, "--engine", "petsc", "-o", "a.pvtu"]
-    assert command(3, *words, cwd=beam.parent).returncode == 0
-    before = {path: path.read_bytes() for path in beam.parent.iterdir()}
-    assert script(3, DYING, *words, cwd=beam.parent).returncode != 0
-    after = {path: path.read_bytes() for path in beam.parent.iterdir()}
-    assert {path: after[path] for path in before} == before
-    assert [data for path, data in after.items() if path not in before] == [b"half"]
 
 
 def test_expected_values_are_told_once_and_give_the_exit_code(tmp_path):

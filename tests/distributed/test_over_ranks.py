@@ -5,15 +5,13 @@ from pathlib import Path
 import pytest
 from over_ranks import mpirun, needs_mpi
 
-HERE = Path(__file__).parent
-FILES = sorted(path.stem for path in HERE.glob("ranks_*.py"))
+RUNNER = Path(__file__).with_name("runner.py")
 
 pytestmark = needs_mpi
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-@pytest.mark.parametrize("file", FILES)
-def test_over_ranks(file, ranks):
-    run = mpirun(ranks, HERE / "runner.py", HERE / f"{file}.py")
+def test_over_ranks(ranks):
+    run = mpirun(ranks, RUNNER)
     assert run.returncode == 0, run.stdout[-6000:] + run.stderr[-3000:]
-    assert " 0 failed" in run.stdout
+    assert " passed" in run.stdout

@@ -9,8 +9,7 @@ import kratos_lite as kl
 from kratos_lite.assembly.block_matrix import BlockMatrix
 from kratos_lite.mesh import Block
 from kratos_lite.native import kernels
-from kratos_lite.solvers import coarse_level
-from kratos_lite.solvers import linear_solver as equations
+from kratos_lite.solvers import coarse_level, plan
 from kratos_lite.solvers.constrained_system import ConstrainedSystem
 from kratos_lite.solvers.constraint_map import rigid_modes
 from kratos_lite.solvers.multigrid import Compiled
@@ -49,7 +48,7 @@ def check(model, rtol=1e-8):
 @pytest.fixture(autouse=True)
 def to_the_tolerance(monkeypatch):
     """Few unknowns are iterated to round-off otherwise, like a factorization."""
-    monkeypatch.setattr(equations, "ROUND_OFF", 1e-10)
+    monkeypatch.setattr(plan, "ROUND_OFF", 1e-10)
 
 
 @pytest.mark.parametrize("element", CELLS)
@@ -374,7 +373,7 @@ def incompressible():
 
 
 def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
-    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
     model = incompressible()
     result = model.solve("amg")
     assert result.report.solver == "direct"
@@ -386,21 +385,14 @@ def test_an_iteration_slower_than_a_factorization_stops_early(monkeypatch):
 
 
 def test_a_slow_iteration_goes_on_where_a_factorization_is_slower(monkeypatch):
-    monkeypatch.setattr("kratos_lite.solvers.iteration.PATIENCE", 70)
-    monkeypatch.setattr(equations, "quick_to_factorize", lambda unknowns: False)
+    monkeypatch.setattr("kratos_lite.solvers.plan.PATIENCE", 70)
+    monkeypatch.setattr("kratos_lite.solvers.linear_solver.is_quick_to_factorize", lambda unknowns: False)
     model = incompressible()
     result = model.solve("amg")
     assert result.report.solver == "amg"
     assert result.report.iterations > 70
     exact = model.solve("direct").u
     np.testing.assert_allclose(result.u, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
-
-
-@pytest.mark.parametrize(("installed", "limit"), [(True, 150_000), (False, 30_000)])
-def test_superlu_is_quick_on_fewer_unknowns(monkeypatch, installed, limit):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if installed else None)
-    assert equations.quick_to_factorize(limit)
-    assert not equations.quick_to_factorize(limit + 1)
 
 
 def bonded(kind, thickness, layers=40):

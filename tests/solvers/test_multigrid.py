@@ -287,12 +287,13 @@ def test_an_element_of_a_user_with_seven_nodes(path):
         assert_solved(clamped(seven))
 
 
-def test_an_element_class_that_redefines_its_stress(path):
+def test_an_element_class_with_a_local_system_of_its_own(path):
     with ELEMENTS.temporary():
 
         class KinematicLinear3D8NDoubled(ELEMENTS["KinematicLinear3D8N"]):
-            def stress(self, C, u):
-                return 2 * super().stress(C, u)
+            def local_system(self, C, u):
+                K, r = super().local_system(C, u)
+                return 2 * K, 2 * r
 
         mesh = box()
         cells = mesh.blocks[0].nodes

@@ -245,7 +245,7 @@ def test_an_element_of_ones_own_gets_the_same_rows(folder, capsys):
 
 
 def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
-    more = "    def stiffness(self, C):\n        return super().stiffness(C) * 1.01"
+    more = "    def B(self, xi):\n        return super().B(xi) * 1.01"
     Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
     assert main(["verify", "own.py", "element/uniaxial", "--element", "Stiff8N", "-o", "own.md"]) == 1
     assert "FAIL" in capsys.readouterr().out
@@ -253,7 +253,7 @@ def test_a_broken_element_of_ones_own_fails_with_exit_code_1(folder, capsys):
 
 
 def test_rows_that_fail_stand_first(folder, capsys):
-    more = "    def stiffness(self, C):\n        return super().stiffness(C) * 1.01"
+    more = "    def B(self, xi):\n        return super().B(xi) * 1.01"
     Path("own.py").write_text(OWN.format(name="Stiff8N", more=more))
     assert main(["verify", "own.py", "element"]) == 1
     told = capsys.readouterr().out.splitlines()[1:-1]

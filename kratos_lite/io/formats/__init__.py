@@ -9,7 +9,6 @@ from pathlib import Path
 
 from kratos_lite.errors import InputError, naming
 from kratos_lite.io.formats.document import Document
-from kratos_lite.mesh.subdomain import ALONE, Alone
 
 PROJECT = "ProjectParameters.json"
 """The run file of Kratos, which stands for its folder."""
@@ -41,18 +40,13 @@ def _is_stem(path: Path) -> bool:
     return bool(name) and any(path.with_name(name + ending).is_file() for ending in (".elem", ".node"))
 
 
-def read_document(path: str | Path, *, strict: bool = True, ranks: Alone = ALONE) -> Document:
+def read_document(path: str | Path, *, strict: bool = True) -> Document:
     """Return what a model file says: .mdpa, any file of an .elem set or its stem, or what meshio reads.
 
-    `strict` refuses `.mdpa` rows that do not stand on lines of their own.  Each of several `ranks` gets its
-    share.
+    `strict` refuses `.mdpa` rows that do not stand on lines of their own.
     """
     with naming(str(path)):
-        if ranks is ALONE:
-            return _read(Path(path), strict)
-        from kratos_lite.io.formats.ranks import read_shared  # one process does without it
-
-        return read_shared(Path(path), ranks, strict, _read)
+        return _read(Path(path), strict)
 
 
 def _read(path: Path, strict: bool) -> Document:

@@ -1,7 +1,7 @@
 """Part files of Kratos: an `.mdpa` file of its own for each rank, ``name_partitioned/name_0.mdpa`` and so on.
 
-Source: MetisDivideHeterogeneousInputProcess of Kratos. Each element and each condition stands in one file;
-NodalData PARTITION_INDEX names the rank that owns a node.
+Source: MetisDivideHeterogeneousInputProcess of Kratos. Each element and each condition stands in one file,
+each node in every file that uses it.
 """
 
 from __future__ import annotations
@@ -10,14 +10,9 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from kratos_lite.errors import InputError
-from kratos_lite.io.formats.document import Data, Document
+from kratos_lite.io.formats.document import Document
 from kratos_lite.io.formats.mdpa.reader import read_mdpa
-from kratos_lite.io.formats.pieces import joined, piece_of
-from kratos_lite.mesh.subdomain import Alone
-from kratos_lite.typing import Ints
 
 OWNER = "PARTITION_INDEX"
 FOLDER = "_partitioned"
@@ -67,47 +62,9 @@ def _listed(files: dict[int, Path]) -> str:
     return ", ".join(names) if len(names) <= 3 else f"{names[0]} … {names[-1]}"
 
 
-def read_part_files(files: dict[int, Path], path: Path, ranks: Alone, strict: bool) -> Document:
-    """Return what this rank holds of a model in part files, of which it reads its own.
-
-    Raises
-    ------
-    InputError
-        A file is missing, or has problems of its own.
-    MeshError
-        Ranks disagree on the place of a node, or two files have the same element.
-    """
-    with ranks.together():
-        check_part_files(path, files, ranks.size)
-        mine = files[ranks.rank]
-        document = read_mdpa(mine, strict=strict)
-        mesh = document.mesh
-        owners = _owners(document, mine, ranks)
-        nodal = [one for one in document.nodal_data if one.variable != OWNER]
-        notes = [note for note in document.notes if not re.search(f"CommunicatorData|{OWNER}", note.text)]
-        piece = piece_of(mesh, owners, merge=True)
-    return joined(ranks, replace(document, nodal_data=nodal, notes=notes), piece, str(mine))
-
-
-def _owners(document: Document, file: Path, ranks: Alone) -> Ints | None:
-    """Return the owner of each node that the file names; InputError for a rank that does not exist."""
-    found = next((one for one in document.nodal_data if one.variable == OWNER), None)
-    if not ranks.any(found is not None):
-        return None
-    mesh = document.mesh
-    owners = np.full(mesh.n_nodes, -1, dtype=np.int64)
-    if found is not None:
-        _check_owners(found, file, ranks.size)
-        rows = mesh.node_rows(found.ids)
-        owners[rows[rows >= 0]] = found.values[rows >= 0].astype(np.int64)
-    return owners
-
-
-def _check_owners(found: Data, file: Path, size: int) -> None:
-    wrong = (found.values != np.round(found.values)) | (found.values < 0) | (found.values >= size)
-    if wrong.any():
-        at = int(np.argmax(wrong))
-        raise InputError(
-            f"{file}:{found.line}: {OWNER} of node {found.ids[at]} is {found.values[at]:g}; "
-            f"with {size} part files it is 0 … {size - 1}. Make the parts anew"
-        )
+def read_part(file: Path, strict: bool = True) -> Document:
+    """Return what one part file says; its named parts may be empty, as other files hold the rest of them."""
+    document = read_mdpa(file, strict=strict)
+    nodal = [data for data in document.nodal_data if data.variable != OWNER]
+    notes = [note for note in document.notes if not re.search(f"CommunicatorData|{OWNER}", note.text)]
+    return replace(document, mesh=document.mesh.replace(whole=False), nodal_data=nodal, notes=notes)

@@ -35,7 +35,7 @@ def _assign(entry: Settings, context: RunContext, document: Document, number: in
     """Give the elements of the part their properties id."""
     rows, parts = context.part(entry).elements, context.mesh.parts
     filled = [len(rows) > 0, *(len(part.elements) > 0 for part in parts.values())]
-    is_there, *filled = context.mesh.ranks.any(np.array(filled)).tolist()
+    is_there, *filled = filled
     have = [f"{context.root} (all)", *(name for name, some in zip(parts, filled, strict=True) if some)]
     text = f"part {entry.text('model_part_name')!r} has no elements to carry a material; parts with elements"
     entry.expect(is_there, "model_part_name", f"{text} are {', '.join(have)}")
@@ -89,8 +89,7 @@ def _used(found: dict[int, LinearMaterial], document: Document) -> dict[int, Lin
     """Return the materials that elements have, those of the mesh file too; name elements without any."""
     mesh, used = document.mesh, {}
     for block in mesh.blocks:
-        numbers = mesh.ranks.gather(np.unique(block.properties))  # all ranks have the same materials
-        for number in map(int, np.unique(np.concatenate(numbers))):
+        for number in map(int, np.unique(block.properties)):
             material = found.get(number) or _of_mesh_file(document, number)
             if material is None:
                 raise _without_material(mesh, block, number)
@@ -99,8 +98,7 @@ def _used(found: dict[int, LinearMaterial], document: Document) -> dict[int, Lin
 
 
 def _without_material(mesh: Mesh, block: Block, number: int) -> ModelError:
-    cells = np.flatnonzero(block.properties == number)
-    place = mesh.ranks.first(mesh.place(block, int(cells[0])) if len(cells) else None)
+    place = mesh.place(block, int(np.argmax(block.properties == number)))
     return ModelError(f"{place} has no material (property {number}); name its part in the materials file")
 
 

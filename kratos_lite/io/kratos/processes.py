@@ -200,7 +200,7 @@ def notes_of(actions: Sequence[Action], context: RunContext) -> list[str]:
     notes = []
     for action in actions:
         where = action.settings.path.removesuffix(".Parameters")
-        if not action.steps or not context.mesh.ranks.any(len(action.rows) > 0):
+        if not action.steps or (context.mesh.whole and not len(action.rows)):
             why = "its part has none to act on" if action.steps else "its interval holds no step"
             notes.append(f"{where}: {action.component} is never set: {why}")
         elif context.moved and action.steps[-1] > 1 and action.mentions("xyz"):

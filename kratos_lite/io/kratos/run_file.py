@@ -11,6 +11,7 @@ from kratos_lite.errors import Problems, nearest
 from kratos_lite.io.case import Case
 from kratos_lite.io.formats import read_document
 from kratos_lite.io.formats.document import Document
+from kratos_lite.io.formats.part_files import part_files, read_part
 from kratos_lite.io.kratos.context import RunContext, module_of, times_of
 from kratos_lite.io.kratos.expected_values import COMPARISONS, Comparison
 from kratos_lite.io.kratos.materials import materials_of
@@ -22,7 +23,6 @@ from kratos_lite.io.kratos.to_model import check_elements, model_from
 from kratos_lite.io.kratos.variables import Variables
 from kratos_lite.io.settings import Settings, find_file, read_settings
 from kratos_lite.materials import LinearMaterial
-from kratos_lite.mesh.subdomain import ALONE, Alone
 
 ROOT_KEYS = ("problem_data", "solver_settings", "processes", "output_processes", "ale")
 HARMLESS = frozenset(
@@ -49,7 +49,7 @@ def read_kratos_project(
     allow_outside: bool = False,
     *,
     initial_displacement: bool = True,
-    ranks: Alone = ALONE,
+    part: int | None = None,
 ) -> Case:
     """Return the case of a Kratos run file; errors name what is wrong, or no linear solid."""
     settings, folder = read_settings(path), path.parent
@@ -68,7 +68,7 @@ def read_kratos_project(
         notes.append(
             f"supports, loads and motion are taken at the end of the run: those at t = {times[-1]:g} s"
         )
-    document = _read_mesh(solver, folder, allow_outside, notes, ranks)
+    document = _read_mesh(solver, folder, allow_outside, notes, part)
     root, moved = solver.text("model_part_name", "Structure"), solver.flag("move_mesh_flag", True)
     context = RunContext(document.mesh, root, folder, times, moved, allow_outside)
     materials = _read_materials(solver, context, document, notes)
@@ -130,24 +130,26 @@ def _check_solver(solver: Settings) -> list[str]:
     return notes + ([f"linear solver {chosen}: kratos_lite chooses its own"] if chosen else [])
 
 
-def _mesh_file(source: Settings, folder: Path, outside: bool, ranks: Alone) -> tuple[Path, str]:
-    """Return the mesh file, and a note if it stands elsewhere; over ranks it may stand for part files."""
-    if ranks is not ALONE:
-        from kratos_lite.io.formats.part_files import part_files  # one process does without it
-
-        path = folder / (source.text("input_filename") + ".mdpa")
-        for place in (path, folder / path.name):
-            if part_files(place):
-                return place, ""
-    return find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+def part_files_of(run_file: Path) -> dict[int, Path]:
+    """Return the part files that hold the mesh of a run file, by number; none where it is in one file."""
+    return _part_files(read_settings(run_file).section("solver_settings", required=True), run_file.parent)
 
 
-def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], ranks: Alone) -> Document:
+def _part_files(solver: Settings, folder: Path) -> dict[int, Path]:
+    source = solver.section("model_import_settings", required=True)
+    path = folder / (source.text("input_filename") + ".mdpa")
+    return part_files(path) or part_files(folder / path.name)
+
+
+def _read_mesh(solver: Settings, folder: Path, outside: bool, notes: list[str], part: int | None) -> Document:
     source = solver.section("model_import_settings", required=True)
     kind = source.text("input_type", "mdpa")
     source.expect(kind == "mdpa", "input_type", f"input_type {kind!r} is not supported; use 'mdpa'")
-    path, note = _mesh_file(source, folder, outside, ranks)
-    document = read_document(path, ranks=ranks)
+    if part is None:
+        path, note = find_file(source, "input_filename", folder, outside=outside, ending=".mdpa")
+        document = read_document(path)
+    else:
+        document, note = read_part(_part_files(solver, folder)[part]), ""
     check_elements(document)
     notes += [note] if note else []
     unused = len(document.constraints)

@@ -14,8 +14,7 @@ from kratos_lite.io.formats.document import Data, Document, Note
 from kratos_lite.io.kratos.properties import USED, apply_properties
 from kratos_lite.io.kratos.variables import LOADING, SPLIT, VECTORS, Variables, components
 from kratos_lite.io.names import misspelt
-from kratos_lite.io.text import MAX_ID
-from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids, with_rows
+from kratos_lite.mesh import Mesh, distinct, ids_of, rows_of_ids
 from kratos_lite.typing import Array, Ints
 
 PRESENT = ("SmallDisplacementElement", "TotalLagrangianElement", "UpdatedLagrangianElement", "Element3D")
@@ -35,8 +34,7 @@ def model_from(
     model = Model(document.mesh)
     model.notes += [str(note) for note in document.notes]
     model.notes += _renamed(document.mesh)
-    found = document.mesh.ranks.gather([distinct(block.properties) for block in document.mesh.blocks])
-    used = {int(p) for blocks in found for numbers in blocks for p in numbers}
+    used = {int(p) for block in document.mesh.blocks for p in distinct(block.properties)}
     sources = [properties.source for properties in document.properties.values() if properties.source]
     problems = Problems(sources[0] if sources else document.mesh.source)
     for number in sorted(used & document.properties.keys()):
@@ -58,16 +56,13 @@ def model_from(
 def check_elements(document: Document) -> None:
     """Raise InputError for every element block of unknown kind that is not empty."""
     mesh, problems = document.mesh, Problems(document.mesh.source)
-    for block, at in with_rows(mesh.blocks):
-        if block.name in ELEMENTS:
-            continue
-        if count := mesh.ranks.sum(int(mesh.own_elements[at].sum())):
-            mine = None if block.lines is None or not len(block) else int(block.lines.min())
-            line = min((one for one in mesh.ranks.gather(mine) if one is not None), default=None)
+    for block in mesh.blocks:
+        if len(block) and block.name not in ELEMENTS:
+            line = None if block.lines is None else int(block.lines.min())
             known = [*ELEMENTS, *(alias for name in ELEMENTS for alias in ELEMENTS.aliases(name))]
             hint = nearest(block.name, known) if "3D" in block.name else ""
             have = ", ".join(sorted(ELEMENTS, key=lambda name: (len(name), name)))
-            text = f"unknown element {block.name!r} ({count} of them);{hint} Known are {have}"
+            text = f"unknown element {block.name!r} ({len(block)} of them);{hint} Known are {have}"
             problems.add(f"{text} and their Kratos names", line)
     problems.raise_if_any()
 
@@ -98,7 +93,7 @@ def _renamed(mesh: Mesh) -> list[str]:
     notes = {}
     for block in mesh.blocks:
         name = ELEMENTS[block.name].__name__ if block.name in ELEMENTS else block.name
-        if mesh.ranks.any(len(block) > 0) and name != block.name and not is_unnamed(block.name):
+        if len(block) and name != block.name and not is_unnamed(block.name):
             large = " with small displacements" if "Lagrangian" in block.name else ""
             notes[block.name] = f"{block.name} is solved as {name}{large}"
     return list(notes.values())
@@ -107,20 +102,19 @@ def _renamed(mesh: Mesh) -> list[str]:
 def _fill(values: Variables, document: Document, model: Model) -> None:
     """Put the data blocks of a document into variables."""
     mesh, problems = document.mesh, Problems()
-    any_rank = mesh.ranks.any
     for data in document.nodal_data:
         if not _fits(data, model, problems, mesh.source):
             continue
         rows = mesh.node_rows(data.ids)
         known = rows >= 0
-        if any_rank(data.values.size > 0):
+        if data.values.size:
             _note_overridden(values, data, rows, model)
             values.nodal.put(data.variable, rows[known], data.values[known])
-        if any_rank(bool(data.fixed.any())):
+        if data.fixed.any():
             values.fix(data.variable, rows[known & data.fixed])
     for data in document.condition_data:
         rows = rows_of_ids(ids_of(mesh.conditions), data.ids)
-        if any_rank(data.values.size > 0) and _fits(data, model, problems, mesh.source):
+        if data.values.size and _fits(data, model, problems, mesh.source):
             values.conditional.put(data.variable, rows[rows >= 0], data.values[rows >= 0])
     for data in document.element_data:
         _note(model, data, f"ElementalData {data.variable} is not used")
@@ -135,9 +129,8 @@ def _activate(model: Model, u0: Array) -> None:
     """
     u0 = np.where(model.supports.fixed, 0.0, u0)
     mesh = model.mesh
-    count = mesh.ranks.sum(int((u0.any(axis=1) & mesh.own_nodes).sum()))
-    names = [block.name for block in mesh.blocks if mesh.ranks.any(len(block) > 0)]
-    others = [name for name in names if name.startswith(PRESENT)]
+    count = int(u0.any(axis=1).sum())
+    others = [block.name for block in mesh.blocks if len(block) and block.name.startswith(PRESENT)]
     if count and others:
         text = f"initial DISPLACEMENT of {count} free nodes is not used: {others[0]} takes it for a guess"
         model.notes.append(f"{text}, only KinematicLinear3D and its kin for the state without stress")
@@ -154,7 +147,7 @@ def _note(model: Model, data: Data, text: str) -> None:
 def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
     """Whether the values have the size of their variable; note what is unused, refuse what is wrong."""
     wanted = (3,) if data.variable in SPLIT else ()
-    if not model.mesh.ranks.any(data.values.size > 0) or data.values.shape[1:] == wanted:
+    if not data.values.size or data.values.shape[1:] == wanted:
         return True
     size = list(data.values.shape[1:]) or "of one number"
     if data.variable in VECTORS or data.variable in LOADING:
@@ -167,17 +160,15 @@ def _fits(data: Data, model: Model, problems: Problems, source: str) -> bool:
 
 def _note_overridden(values: Variables, data: Data, rows: Ints, model: Model) -> None:
     """Note fixed values that an earlier block gave otherwise."""
-    here, ranks = rows >= 0, model.mesh.ranks
+    here = rows >= 0
     rows, ids = rows[here], data.ids[here]
     for name, new in components(data.variable, data.values).items():
         if name in values.fixed:
-            fixed = model.mesh.own_nodes[rows] & values.fixed[name][rows]
-            changed = fixed & (values.nodal[name][rows] != new[here])
-            if count := ranks.sum(int(changed.sum())):
+            changed = values.fixed[name][rows] & (values.nodal[name][rows] != new[here])
+            if count := int(changed.sum()):
                 more = f" (and {count - 1} more)" if count > 1 else ""
-                node = ranks.min(int(ids[changed].min(initial=MAX_ID)))
-                text = f"{name} of node {node}{more} is fixed to another value before; the last one counts"
-                _note(model, data, text)
+                fixed = f"{name} of node {ids[changed].min()}{more}"
+                _note(model, data, f"{fixed} is fixed to another value before; the last one counts")
 
 
 def _constrain(model: Model, document: Document) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kratos_lite.analysis.model import Model
-from kratos_lite.io.text import MAX_ID
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
 from kratos_lite.model.loads.conditions import ConditionLoads
@@ -113,7 +112,7 @@ class Variables:
     def gravity(self) -> Gravity | None:
         """Return the weight that the nodes state, or None."""
         g = self.nodal.vector("VOLUME_ACCELERATION")
-        return Gravity(g) if self.mesh.ranks.any(g.any()) else None  # all ranks have the same loads
+        return Gravity(g) if g.any() else None
 
     def apply(self, model: Model) -> None:
         """Add the supports and loads that the values mean to a model, and note those without effect."""
@@ -124,17 +123,17 @@ class Variables:
         self.note_idle(model.notes)
         for name in sorted({*self.nodal, *self.conditional} - LOADING):
             given = self.nodal.scalar(name).any() or self.conditional.scalar(name).any()
-            if self.mesh.ranks.any(given):
+            if given:
                 model.notes.append(f"{name} is set in the file; a static linear solution does not use it")
 
     def _apply_supports(self, model: Model) -> None:
         for axis in "XYZ":
             name = f"DISPLACEMENT_{axis}"
             rows = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
-            if self.mesh.ranks.any(len(rows) > 0):  # all ranks fix something, or none
+            if len(rows):
                 model.fix(rows, axis.lower(), self.nodal.scalar(name)[rows, None], override=True)
         others = [name for name in sorted(self.fixed) if not name.startswith("DISPLACEMENT_")]
-        others = [name for name in others if self.mesh.ranks.any(self.fixed[name].any())]
+        others = [name for name in others if self.fixed[name].any()]
         if others:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")
 
@@ -154,7 +153,7 @@ class Variables:
             fields.scalar(positive) - fields.scalar(negative) for fields in (self.conditional, self.nodal)
         )
         values = (force, *nodal_force.values(), pressure, nodal_pressure)
-        if not self.mesh.ranks.any(len(carriers) > 0 and any(value.any() for value in values)):
+        if not (len(carriers) > 0 and any(value.any() for value in values)):
             return None
         return ConditionLoads(force, nodal_force, pressure, nodal_pressure)
 
@@ -163,8 +162,8 @@ class Variables:
 
         It adds the stiffness of the pressure to K; its small-displacement conditions do not.
         """
-        found = self.mesh.ranks.gather([block.name for block in self.mesh.conditions if len(block)])
-        names = {name for some in found for name in some if name.startswith("SurfaceLoadCondition")}
+        names = {block.name for block in self.mesh.conditions if len(block)}
+        names = {name for name in names if name.startswith("SurfaceLoadCondition")}
         for name in sorted(names):
             notes.append(
                 f"{name}: the pressure acts on the undeformed body, as that of SmallDisplacement{name} in "
@@ -177,25 +176,27 @@ class Variables:
         shown._note_uncarried(notes)
         loads = shown.condition_loads()
         pressed = loads is not None and (loads.pressure.any() or loads.nodal_pressure.any())
-        if self.mesh.ranks.any(pressed):
+        if pressed:
             shown._note_followers(notes)
 
     def _note_uncarried(self, notes: list[str]) -> None:
         """Note load values on conditions of another kind, and on nodes without conditions that carry them."""
         mesh = self.mesh
-        of_conditions = ids_of(mesh.conditions), mesh.own_conditions
-        of_nodes = mesh.node_ids, mesh.own_nodes  # whose conditions are all here
         for variable in (*dict.fromkeys(LOADS.values()), *PRESSURES):
             cells = [c for c, load in LOADS.items() if load == variable] or SURFACES
             on_conditions, on_nodes = self._carriers(cells)
             kinds = "faces" if cells[0] in SURFACES else f"{cells[0]} conditions"
-            for word, idle, (ids, own), more in (
-                ("conditions", self.conditional.loaded(variable) & ~on_conditions, of_conditions, ""),
-                ("nodes", self.nodal.loaded(variable) & ~on_nodes, of_nodes, NO_CONDITION),
+            for word, idle, ids, more in (
+                (
+                    "conditions",
+                    self.conditional.loaded(variable) & ~on_conditions,
+                    ids_of(mesh.conditions),
+                    "",
+                ),
+                ("nodes", self.nodal.loaded(variable) & ~on_nodes, mesh.node_ids, NO_CONDITION),
             ):
-                if count := mesh.ranks.sum(int((idle & own).sum())):
-                    first = mesh.ranks.min(int(ids[idle & own].min(initial=MAX_ID)))
-                    where = f"{count} {word} (first {first})"
+                if idle.any():
+                    where = f"{idle.sum()} {word} (first {ids[idle].min()})"
                     notes.append(f"{variable} on {where} has no effect: only {kinds} carry it{more}")
 
     def _carriers(self, cells: Iterable[str]) -> tuple[Mask, Mask]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from kratos_lite.analysis.result import Result
 from kratos_lite.io.case import Case
-from kratos_lite.io.outputs import write_at_end, written_as
+from kratos_lite.io.outputs import write_at_end
 
 WIDTH = 22
 """Of the left column of tables."""
@@ -73,5 +73,4 @@ class Outcome:
         """
         if self.result is not None:
             write_at_end(self.case.outputs, self.result, in_time=self.case.time is not None)
-        ranks = self.case.model.mesh.ranks.size if self.case.is_of_model else 1
-        return [written_as(path, ranks) for path in self.case.outputs.paths()]
+        return self.case.outputs.paths()

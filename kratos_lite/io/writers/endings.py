@@ -8,8 +8,6 @@ from kratos_lite.errors import InputError
 
 RESULTS = (".vtu", ".vtk", ".json", ".html", ".csv", ".pvtu")
 """Formats that keep fields on nodes; most others of meshio drop them unsaid."""
-OF_RANKS = (".pvtu", ".vtu", ".json")
-"""Formats that many processes write together: a piece of each, or sums over all."""
 SERIES = (".pvd", ".html", ".csv", ".npz")
 """Formats of states in time: for ParaView, a page for the browser, a table, arrays."""
 
@@ -39,32 +37,13 @@ def check_result(path: str | Path, mode: str | None = None) -> None:
             )
 
 
-def check_result_of_ranks(path: str | Path) -> None:
-    """Raise InputError for a format that many processes cannot write."""
-    ending = Path(path).suffix.lower()
-    if ending in RESULTS and ending not in OF_RANKS:
-        raise InputError(
-            f"{path}: {ending} is written by one process, and none holds the whole result; "
-            "write .pvtu for ParaView or .json with the summary, or solve without --engine petsc"
-        )
-
-
-def index_of(path: str | Path) -> Path:
-    """Return the `.pvtu` file that is written for a path over many processes.
-
-    >>> index_of("out/beam.vtu").name
-    'beam.pvtu'
-    """
-    return Path(path).with_suffix(".pvtu")
-
-
-def piece_of(path: str | Path, rank: int) -> Path:
-    """Return the `.vtu` file of a rank.
+def piece_of(path: str | Path, number: int) -> Path:
+    """Return the `.vtu` file of one part of a `.pvtu` file.
 
     >>> piece_of("out/beam.pvtu", 3).name
     'beam_3.vtu'
     """
-    return Path(path).with_name(f"{Path(path).stem}_{rank}.vtu")
+    return Path(path).with_name(f"{Path(path).stem}_{number}.vtu")
 
 
 def check_series(path: str | Path) -> None:

@@ -11,25 +11,18 @@ from kratos_lite.analysis.fields import fields
 from kratos_lite.analysis.report import element_counts
 from kratos_lite.atomic import write_whole
 from kratos_lite.errors import SolveError
-from kratos_lite.io.writers.endings import check_result, check_result_of_ranks
+from kratos_lite.io.writers.endings import check_result
 from kratos_lite.io.writers.table import write_table
 
 if TYPE_CHECKING:
     from kratos_lite.analysis.result import Result
 
-LEFT_OUT = "displacement and reaction by node: no rank knows those of all; the pieces of a .pvtu hold them"
-
 
 def write_result(path: str | Path, result: Result, mode: str | None = None) -> None:
-    """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv.
-
-    Of a result of many processes, all of them call this: its .vtu is a .pvtu, too.
-    """
-    ending, is_of_many = Path(path).suffix.lower(), result.mesh.ranks.size > 1
-    if is_of_many:
-        check_result_of_ranks(path)
+    """Write a result by the ending of `path`: .vtu or .pvtu (in a mode), .vtk, .json, .html or .csv."""
+    ending = Path(path).suffix.lower()
     check_result(path, mode)
-    if ending == ".pvtu" or (is_of_many and ending == ".vtu"):
+    if ending == ".pvtu":
         from kratos_lite.io.writers.pieces import write_pieces  # rarely needed
 
         write_pieces(path, result, mode or "binary")
@@ -67,8 +60,8 @@ def summary(result: Result) -> dict[str, Any]:
         history = [vars(step) for step in report.history]
         asked = {"requested_error": {"relative": report.error, "of": report.error_of, "history": history}}
     return {
-        "nodes": mesh.totals.counts["nodes"],
-        "elements": element_counts(mesh, result.kinds, report.formulation),
+        "nodes": mesh.n_nodes,
+        "elements": element_counts(mesh, result.groups, report.formulation),
         **({"formulation": report.formulation} if report.formulation else {}),
         "unknowns": report.unknowns,
         "total_load": report.total_load.tolist(),
@@ -100,14 +93,12 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def write_json(path: str | Path, result: Result) -> None:
-    """Write the table and, of a mesh on one process, displacements and reactions (m, N) by node id."""
+    """Write the table, and displacements and reactions (m, N) by node id."""
     import json
 
     from kratos_lite import __version__
 
-    ranks = result.mesh.ranks
-    content = {"kratos_lite": __version__, "units": "SI", **summary(result)}
-    content |= _by_node(result) if ranks.size == 1 else _of_all(result)
+    content = {"kratos_lite": __version__, "units": "SI", **summary(result), **_by_node(result)}
     try:
         text = json.dumps(content, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -115,25 +106,7 @@ def write_json(path: str | Path, result: Result) -> None:
             f"{path}: not written: some results exceed the numbers that a computer holds (1.8e308); "
             "look for loads, supports or constants in wrong units"
         ) from None
-    with ranks.together():
-        if ranks.rank == 0:
-            write_whole(path, text.encode())
-
-
-def _of_all(result: Result) -> dict[str, Any]:
-    """Return what ranks know together in place of values of nodes: extremes, and resultants of parts."""
-    mesh, own = result.mesh, result.mesh.own_nodes
-    ranks, u = mesh.ranks, result.u[own]
-    reactions = np.where(own[:, None], result.reactions, 0.0)
-    sums = [reactions[part.nodes].sum(axis=0) for part in mesh.parts.values()]
-    totals = dict(zip(mesh.parts, ranks.sum(np.reshape(sums, (-1, 3))), strict=True))
-    return {
-        "ranks": ranks.size,
-        "smallest_displacements": ranks.min(u.min(axis=0, initial=np.inf)).tolist(),
-        "largest_displacements": ranks.max(u.max(axis=0, initial=-np.inf)).tolist(),
-        "reaction_of_parts": {name: total.tolist() for name, total in totals.items() if total.any()},
-        "left_out": LEFT_OUT,
-    }
+    write_whole(path, text.encode())
 
 
 def _by_node(result: Result) -> dict[str, Any]:

@@ -70,7 +70,7 @@ class PointLoad(Load):
             total[nodes] = N[:, None] * self.force
             return total
         rows = mesh.nodes(self.where)
-        if not mesh.ranks.any(len(rows) > 0):
+        if mesh.whole and not len(rows):
             raise ModelError(f"a point load finds no node in {self.where!r}")
         total[rows] += self.force
         return total
@@ -83,20 +83,17 @@ class PointLoad(Load):
 
 def _around(mesh: Mesh, point: Array) -> tuple[Ints, Array]:
     """Return the nodes (k,) on which a force on a point acts, and its share (k,) on each."""
-    rows, nearby = nodes_at(point, mesh.points, mesh.ranks)
-    mine = rows[(mesh.used_nodes() & mesh.own_nodes)[rows]][:1]
-    at = [(float(np.linalg.norm(mesh.points[row] - point)), int(mesh.node_ids[row])) for row in mine]
-    off, node = min((one for all_of in mesh.ranks.gather(at) for one in all_of), default=(np.inf, -1))
-    rows = mesh.node_rows([node])
-    rows = rows[rows >= 0]
-    if off <= ONE_PLACE * float(np.linalg.norm(mesh.extent[1] - mesh.extent[0])):
-        return rows, np.ones(len(rows))
+    nodes, nearby = nodes_at(point, mesh.points)
+    nodes = nodes[mesh.used_nodes()[nodes]][:1]
+    size = float(np.linalg.norm(mesh.extent[1] - mesh.extent[0]))
+    if len(nodes) and np.linalg.norm(mesh.points[nodes[0]] - point) <= ONE_PLACE * size:
+        return nodes, np.ones(1)
     found = mesh.locate(point)
-    if mesh.ranks.any(bool(found.inside)):
+    if found.inside:
         return found.nodes_and_weights()
-    if not np.isfinite(off):
+    if mesh.whole and not len(nodes):
         raise MeshError(f"a point load at {point.tolist()} m acts outside the mesh; {nearby}")
-    return rows, np.ones(len(rows))
+    return nodes, np.ones(len(nodes))
 
 
 class NodalForces(Load):

@@ -148,7 +148,7 @@ def _faces(mesh: Mesh, where: Where, what: str, cells: Sequence[str] = SURFACES)
             raise ModelError(
                 f"{what} acts on {wanted}; it meets {kind} {block.name} (the first is {block.ids[0]})"
             )
-    if not mesh.ranks.any(bool(faces)):
+    if mesh.whole and not faces:
         name = f"part {where!r}" if isinstance(where, str) else "the chosen nodes"
         raise ModelError(
             f"{what} finds no {wanted[:-1]} on {name}: it has no conditions and no element face "

@@ -1,0 +1,137 @@
+"""The start of static solutions: a checked structure, its Dirichlet conditions, load sets and equations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kratos_lite.analysis.engines import System
+from kratos_lite.analysis.nodal_loads import external_loads, initial_loads
+from kratos_lite.analysis.solution_checks import Phases
+from kratos_lite.assembly.element_groups import ElementGroup
+from kratos_lite.errors import InputError
+from kratos_lite.model import checks
+from kratos_lite.model.free_motions import FreeMotions
+from kratos_lite.model.loads import Load
+from kratos_lite.model.structure import Structure
+from kratos_lite.model.supports import Supports
+from kratos_lite.typing import Array, Ints, Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A structure that has passed its checks.
+
+    Attributes
+    ----------
+    version : of the structure.
+    groups, warnings : its elements, and what the checks found.
+    free : the rigid motions that supports leave to its components.
+    initial : (n, 3) N, nodal forces of the initial state, or None.
+    """
+
+    version: tuple[int, int]
+    groups: list[ElementGroup]
+    warnings: list[str]
+    free: FreeMotions
+    initial: Array | None
+
+    @cached_property
+    def component(self) -> Ints:
+        """The component of each node (n,), -1 without elements."""
+        return self.free.part
+
+    @cached_property
+    def used(self) -> Mask:
+        """Whether elements use each node (n,)."""
+        return np.asarray(self.component >= 0)
+
+    def components_with(self, nodes: Mask) -> Mask:
+        """Return the components with one of some nodes, a mask (n,)."""
+        found = np.zeros(len(self.free.counts), dtype=bool)
+        found[self.component[nodes & self.used]] = True
+        return found
+
+
+def prepared(model: Structure) -> Prepared:
+    """Return a structure checked; MeshError, ModelError or InputError where it is broken."""
+    version = model.version
+    groups, warnings = model.checked()
+    return Prepared(version, groups, warnings, model.free_motions(groups), initial_loads(model, groups))
+
+
+@dataclass(frozen=True, eq=False)
+class DirichletConditions:
+    """Which nodes (n,) are displaced and which constrained at rest; how many components are prescribed."""
+
+    version: int
+    displaced: Mask
+    at_rest: Mask
+    count: int
+
+
+def dirichlet_conditions(supports: Supports, used: Mask) -> DirichletConditions:
+    """Return what supports prescribe; ModelError where their constraints contradict one another."""
+    slaves = supports.slaves()
+    moved = supports.fixed & (supports.values != 0)
+    moved.flat[[slave for slave, (_, constant) in slaves.items() if constant]] = True
+    displaced = any_axis(moved)
+    at_rest = ~any_axis(~supports.fixed) & ~displaced
+    return DirichletConditions(supports.value_version, displaced, at_rest, int(supports.fixed[used].sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of some components (p,), and how many of their elements have all nodes at rest.
+
+    `prescribed` (3a,) is what supports prescribe where it differs from that of the system.
+    """
+
+    system: System
+    components: Mask
+    n_at_rest: int
+    prescribed: Array | None = None
+
+
+@dataclass(eq=False)
+class LoadSet:
+    """Loads, their nodal forces (n, 3) in N without and with initial stress, and components they strain."""
+
+    loads: list[Load]
+    external: Array
+    forces: Array
+    moving: Mask
+    phase: Phases
+
+
+def load_set(
+    model: Structure,
+    state: Prepared,
+    dirichlet: DirichletConditions,
+    given: Load | Sequence[Load],
+    phase: Phases,
+) -> LoadSet:
+    """Return loads as nodal forces; an error where they do not fit, or a free component is not in balance."""
+    if not isinstance(given, (Load, list, tuple)):
+        raise InputError(f"a load, or a list of them, is needed; got {type(given).__name__}")
+    loads = [given] if isinstance(given, Load) else list(given)
+    for load in loads:
+        if not isinstance(load, Load):
+            raise InputError(f"a load such as Gravity or Traction is needed; got {type(load).__name__}")
+    mesh, supports = model.mesh, model.supports
+    with phase("load"):
+        external = supports.on_masters(external_loads(mesh, state.groups, loads))
+        forces = external if state.initial is None else external - state.initial
+        checks.check_carried(mesh, forces, state.used)
+        pushed = any_axis((forces != 0) & ~supports.fixed)
+        moving = state.components_with(pushed | dirichlet.displaced)
+        state.free.check((load.forces(mesh, state.groups) for load in loads), moving)
+    return LoadSet(loads, external, forces, moving, phase)
+
+
+def any_axis(mask: Mask) -> Mask:
+    """Return mask.any(axis=1) of a mask (n, 3), faster."""
+    return mask[:, 0] | mask[:, 1] | mask[:, 2]
