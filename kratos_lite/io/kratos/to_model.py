@@ -175,13 +175,13 @@ def _constrain(model: Model, document: Document) -> None:
     """Add the multi-point constraints of a document."""
     index_of = document.mesh.node_rows
     for constraint in document.constraints:
-        dofs = [constraint.slave, *constraint.masters]
+        dofs = [constraint.dependent, *constraint.independents]
         if not all(name in ("DISPLACEMENT_X", "DISPLACEMENT_Y", "DISPLACEMENT_Z") for _, name in dofs):
             text = f"constraint {constraint.id} is not on displacements; ignored"
             model.notes.append(str(Note(constraint.line, text)))
             continue
-        slave, *masters = [(int(index_of([node])[0]), name[-1].lower()) for node, name in dofs]
+        dependent, *independents = [(int(index_of([node])[0]), name[-1].lower()) for node, name in dofs]
         weights: dict[tuple[int, str], float] = {}
-        for master, weight in zip(masters, constraint.weights, strict=True):
-            weights[master] = weights.get(master, 0.0) + weight
-        model.constrain(slave, weights, constraint.constant)
+        for dof, weight in zip(independents, constraint.weights, strict=True):
+            weights[dof] = weights.get(dof, 0.0) + weight
+        model.constrain(dependent, weights, constraint.constant)
