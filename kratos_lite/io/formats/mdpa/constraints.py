@@ -12,7 +12,7 @@ from kratos_lite.typing import Ints
 CONSTRAINT = re.compile(rb"\s*([^\s\[\]]+)\s+([^\s\[\]]+)\s*\[([^\[\]]*)\]")
 
 
-def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[Constraint]:
+def read_constraints(source: Source, frame: Frame, nodes: Ints) -> list[Constraint]:
     """Return the rows ``id constant [w1, w2] dependent independent …`` of a block.
 
     The variables in the header are those of the dependent and of each independent node, or one for all.
@@ -21,12 +21,12 @@ def read_constraints(source: Source, frame: Frame, nodes: Ints | None) -> list[C
     if len(frame.arguments) < 2:
         source.problem("expected 'Begin Constraints NAME VARIABLE [VARIABLE …]'", frame.offset)
         return []
-    node_ids = None if nodes is None else set(nodes.tolist())
+    node_ids = set(nodes.tolist())
 
     def read(at: int, end: int) -> tuple[Constraint, int]:
         constraint, after = _constraint(source, frame, (at, end))
         named = [node for node, _ in (constraint.dependent, *constraint.independents)]
-        missing = [] if node_ids is None else [node for node in named if node not in node_ids]
+        missing = [node for node in named if node not in node_ids]
         if missing:
             raise ValueError(f"there is no node {missing[0]}")
         return constraint, after
