@@ -16,15 +16,14 @@ from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.linear_solver import LinearSolver, Solution
-from kratos_lite.solvers.plan import LARGEST_CONTRAST as LARGEST_CONTRAST  # noqa: PLC0414
-from kratos_lite.solvers.plan import Facts, choose
+from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kratos_lite.mesh.hanging import HangingNodes
-    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
 
 NO_MATRIX = "the stiffness matrix, as its products are computed element by element"
 """What is skipped with linear elements inside the quadratic ones."""
@@ -35,40 +34,6 @@ class ConstrainedSystem:
 
     Pattern, matrix and whatever the solver prepares (factors, multigrid) are made when they are first
     needed and kept.  Nodes that no element uses carry no equations.
-
-    Parameters
-    ----------
-    points : (n, 3) m.
-    groups : the elements, by rows of the points.
-    constraints : gives the constraint map of the nodes that carry equations, by their rows (a,), such as
-        ``model.supports.constraint_map``.
-    solver : ``auto``, ``dense``, ``direct`` or ``amg``.
-    tolerance : relative residual at which the iterative solver stops.
-    patterns : where sparsity patterns are kept from one system to the next.
-    progress : called with the phase and the share done, 0 … 1.
-    hanging : the nodes of the mesh that hang on larger neighbors, which the constraints hold, too.
-
-    Attributes
-    ----------
-    points, groups : the nodes that carry equations, and the elements by rows of these.
-    nodes : (a,) int, rows of these nodes among all n.
-    reduced : the constraint map, from the free degrees of freedom to all 3a.
-    plan : how the equations are solved, and why.
-    skipped, warnings : what assembly left out, and what is to be said, in words.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import kratos_lite as kl
-    >>> model = kl.Model(kl.box(), kl.Isotropic3D(E=1e9, nu=0.0))
-    >>> model.fix("z-")
-    >>> constraints = model.supports.constraint_map
-    >>> system = ConstrainedSystem(model.mesh.points, model.element_groups(), constraints)
-    >>> f = np.zeros((8, 3))
-    >>> f[model.mesh.nodes("z+"), 2] = 1.0
-    >>> u, solution = system.solve(f)
-    >>> print(f"{u[:, 2].max():.3e} m, {solution.method}")
-    4.000e-09 m, dense
     """
 
     def __init__(
@@ -92,7 +57,10 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        self.plan = choose(solver, self._facts())
+        self.plan = self._planned(solver)
+
+    def _planned(self, solver: str) -> Plan:
+        return choose(solver, self._facts())
 
     def _facts(self) -> Facts:
         return Facts(
@@ -153,10 +121,9 @@ class ConstrainedSystem:
 
     def _assembled(self, split: bool = False) -> Any:
         skipped: set[str] = set()
+        assemble: Callable[..., Any] = assemble_stiffness
         if split:
             from kratos_lite.solvers.dilatation import assemble  # a quick start for small models
-        else:
-            assemble = assemble_stiffness
         K = assemble(self.points, self.groups, self.pattern, self.progress, skipped)
         self.skipped += sorted(skipped)
         return K
@@ -168,13 +135,13 @@ class ConstrainedSystem:
 
     @cached_property
     def _equations(self) -> LinearSolver:
-        return LinearSolver(self.K, self.reduced, self.points, self.plan, self._linear_level)
+        return LinearSolver(self.K, self.reduced, self.points, self.plan, self._p_coarse_level)
 
-    def _linear_level(self) -> LinearLevel | None:
-        from kratos_lite.solvers.coarse_level import linear_level  # a quick start for small models
+    def _p_coarse_level(self) -> PCoarseLevel | None:
+        from kratos_lite.solvers.coarse_level import p_coarse_level  # a quick start for small models
 
         groups = getattr(self.K, "groups", self.groups)  # those of a split matrix have other materials
-        return linear_level(self.points, groups, self._hanging)
+        return p_coarse_level(self.points, groups, self._hanging)
 
     def solve(
         self,
@@ -183,20 +150,7 @@ class ConstrainedSystem:
         tolerance: float | None = None,
         start: Array | None = None,
     ) -> tuple[Array, Solution]:
-        """Return the displacements (n, 3) under nodal forces (n, 3), and how they were found.
-
-        Parameters
-        ----------
-        forces : (n, 3) N.
-        prescribed : (3a,) m, in place of c of the constraint map.
-        tolerance : in place of that of the system.
-        start : (n, 3) m, near the solution; an iteration begins there.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular or the accuracy asked for cannot be reached.
-        """
+        """Return the displacements (n, 3) under nodal forces (n, 3), and the Solution."""
         tolerance = self.tolerance if tolerance is None else tolerance
         near = None if start is None else self.gather(start)
         solution = self._equations.solve(self.gather(forces), tolerance, self.progress, prescribed, near)
@@ -211,6 +165,9 @@ class ConstrainedSystem:
         out = 0.0 - forces
         out[self.nodes] = (self.K @ self.gather(u) - self.gather(forces)).reshape(-1, 3)
         return out
+
+    def destroy(self) -> None:
+        """Release what is kept outside of Python."""
 
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""
@@ -262,7 +219,7 @@ def renumber(n_nodes: int, groups: Sequence[ElementGroup]) -> tuple[Ints, list[E
     return nodes, [replace(group, nodes=local[group.nodes]) for group in groups]
 
 
-def among(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
+def select(groups: Sequence[ElementGroup], moving: NDArray[np.bool_]) -> list[ElementGroup]:
     """Return the elements that have a node in `moving` (n,), group by group."""
     if moving.all():
         return list(groups)

@@ -17,52 +17,34 @@ from kratos_lite.solvers.plan import Plan, after, is_quick_to_factorize, toleran
 from kratos_lite.typing import Array, Ints, Mask, Progress
 
 if TYPE_CHECKING:
-    from kratos_lite.solvers.coarse_level import LinearLevel
+    from kratos_lite.solvers.coarse_level import PCoarseLevel
     from kratos_lite.solvers.multigrid import Solver
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The solution of A x = b and how it was found.
+    """The solution of A x = b and how it was computed."""
 
-    Attributes
-    ----------
-    x : (n,) float.
-    method, reason : ``dense``, ``direct``, ``amg`` or ``displacement-pressure``, and why.
-    iterations : 0 for a factorization.
-    backward_error : |b - A x| / (|A| |x| + |b|) in the maximum norm.
-    """
-
-    x: Array
-    method: str
+    x: Array  # (n,) float
+    method: str  # ``dense``, ``direct``, ``amg`` or ``displacement-pressure``, and why
     reason: str
-    iterations: int
-    backward_error: float
+    iterations: int  # 0 for a factorization
+    backward_error: float  # |b - A x| / (|A| |x| + |b|) in the maximum norm
 
 
 @dataclass(eq=False)
 class LinearSolver:
     """K u = f + reactions with u = T q + c, solved as T^T K T q = T^T (f - K c).
 
-    Attributes
-    ----------
-    K : full array for the method ``dense``, split for ``displacement-pressure``, else blocks or a product;
-        (3n, 3n) in N/m.
-    reduced : the supports.
-    points : (n, 3) m, from which multigrid knows the rigid modes.
-    plan : how it is solved.
-    linear_level : makes the linear elements within quadratic ones, for multigrid.
-    symmetric : whether K is symmetric positive definite; otherwise the method is ``dense`` or ``direct``.
-
     What a method prepares (the reduced matrix, its factors, the multigrid hierarchy) is made once and kept.
     """
 
-    K: Any
-    reduced: ConstraintMap
-    points: Array
-    plan: Plan
-    linear_level: Callable[[], LinearLevel | None] | None = None
-    symmetric: bool = True
+    K: Any  # full for ``dense``, split for ``displacement-pressure``, else blocks or a product; (3n, 3n) N/m
+    reduced: ConstraintMap  # the supports
+    points: Array  # (n, 3) m, from which multigrid knows the rigid modes
+    plan: Plan  # how it is solved
+    p_coarse_level: Callable[[], PCoarseLevel | None] | None = None
+    symmetric: bool = True  # positive definite, too; otherwise the plan is ``dense`` or ``direct``
 
     def solve(
         self,
@@ -76,11 +58,6 @@ class LinearSolver:
 
         `prescribed` displacements (3n,) take the place of c of the constraint map.  An iteration begins at
         `start` (3n,), of which the free components count, if that is nearer than 0.
-
-        Raises
-        ------
-        SolveError
-            If the matrix is singular, or the iteration stalls where no factorization fits.
         """
         c = self.reduced.c if prescribed is None else prescribed
         b = self.reduced.reduce(f - self.K @ c)
@@ -101,7 +78,7 @@ class LinearSolver:
         """Return the fraction of |b| that tolerances refer to.
 
         Where prescribed displacements of nearly incompressible bodies are large forces in K, these are no
-        measure of what has to be in equilibrium: the bulk modulus is left out.
+        measure of what has to be in equilibrium: the bulk modulus does not count.
         """
         soft = getattr(self.K, "A", None)
         if soft is None or not c.any():
@@ -186,11 +163,11 @@ class LinearSolver:
 
     @cached_property
     def _multigrid(self) -> Solver:
-        linear, matrix = self.linear_level() if self.linear_level else None, self._blocks
+        linear, matrix = self.p_coarse_level() if self.p_coarse_level else None, self._blocks
         if linear is not None and self.reduced.T is not None:
-            from kratos_lite.solvers.coarse_level import tied  # rarely needed
+            from kratos_lite.solvers.coarse_level import apply_ties  # rarely needed
 
-            linear = tied(linear, self.reduced.T, self.reduced.free)
+            linear = apply_ties(linear, self.reduced.T, self.reduced.free)
         if self.plan.method == "amg":
             from kratos_lite.solvers.multigrid import multigrid  # a quick start for small models
 
@@ -229,9 +206,7 @@ class LinearSolver:
 def constrained(K: BlockMatrix, T: Any, free: Ints) -> BlockMatrix:
     """Return T^T K T in the numbering of all components, in 3x3 blocks; u = T q with q = u[free]."""
     full = on_all(T, free)
-    A = (full.T @ K.scipy().tocsr() @ full).tobsr((3, 3))
-    A.sort_indices()
-    return BlockMatrix(np.ascontiguousarray(A.data), A.indices.astype(np.int32), A.indptr.astype(np.int32))
+    return BlockMatrix.of(full.T @ K.scipy().tocsr() @ full)
 
 
 def on_all(T: Any, free: Ints) -> Any:
