@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kratos_lite.analysis.columns import COMPONENTS
 from kratos_lite.analysis.element_fields import ElementFields
+from kratos_lite.analysis.fields import COMPONENTS, FIELDS
 from kratos_lite.analysis.point_values import PointValues
 from kratos_lite.mesh.crossings import crossings
 from kratos_lite.quadrature.gauss import legendre
@@ -88,7 +88,7 @@ class LineValues(PointValues):
         return self.stress - self.linear
 
     def columns(self) -> dict[str, Numbers]:
-        """Return distance, coordinates, displacements and stresses, with units in the headers.
+        """Return distance, coordinates and fields, with units in the headers.
 
         Returns
         -------
@@ -110,8 +110,7 @@ class LineValues(PointValues):
         Parameters
         ----------
         path : picture to write; .png, .pdf or .svg.
-        values : ``von_mises``, ``tresca``, ``s1``, ``s2``, ``s3``, ``sxx`` … ``szx``, ``displacement``,
-            ``ux``, ``uy``, ``uz``, or strains ``e1`` … ``ezx``.
+        values : a field by its name in pictures, as for `kratos_lite.plot`, but for reactions and errors.
         title : above the picture.
         size : width and height in inches, at 150 dots per inch.
 
@@ -126,12 +125,12 @@ class LineValues(PointValues):
         KratosLiteError
             matplotlib is missing.
         """
-        from kratos_lite.analysis.named_values import NAMES, local_values  # pictures alone need these
+        from kratos_lite.analysis.named_values import NAMES, named_values  # pictures alone need these
         from kratos_lite.view.canvas import checked_size, save
         from kratos_lite.view.curves import curves_figure
 
-        choice(values, "values", [name for name in NAMES if name not in ("reaction", "error")])
-        shown = local_values(values, self.displacement, lambda: self.strain, lambda: self.stress)
+        choice(values, "values", [n for n, (field, _) in NAMES.items() if "point" in FIELDS[field].where])
+        shown = named_values(values, lambda name: getattr(self, name))
         curves = {shown.title: shown.numbers}
         if shown.unit == "Pa":
             seen = np.abs(shown.numbers) > ZERO * np.abs(self.stress).max()

@@ -81,7 +81,7 @@ class ElementGroup:
         N, dN = tabulate(self.element.shape, rule)
         return np.ascontiguousarray(self.nodes, dtype=np.int32), floats(N), floats(dN), floats(rule.weights)
 
-    def law(self) -> tuple[Array, Array | None]:
+    def kernel_arguments(self) -> tuple[Array, Array | None]:
         """Return C (6, 6) and the prestress, as kernels take them."""
         return floats(self.material.C), None if self.prestress is None else floats(self.prestress)
 

@@ -83,7 +83,7 @@ def internal_load(
     for group in groups:
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
-            total += module.internal_load(*_placed(points, group), *step, *group.law())
+            total += module.internal_load(*_placed(points, group), *step, *group.kernel_arguments())
             continue
         for chunk in group.chunks():
             element, at = _moved(points, group, chunk, q, dq, damping)
@@ -123,7 +123,7 @@ def stiffness(
         if module := _compiled(group):
             step = _displaced(q, dq, damping)
             rows = (pattern.indptr, pattern.indices)
-            module.add_stiffness(*_placed(points, group), *step, *group.law(), *rows, data)
+            module.add_stiffness(*_placed(points, group), *step, *group.kernel_arguments(), *rows, data)
             continue
 
         def tangent(chunk: slice, group: ElementGroup = group) -> Array:
@@ -140,7 +140,7 @@ def strain_energy(points: Array, groups: Sequence[ElementGroup], q: Array) -> fl
     energy = 0.0
     for group in groups:
         if module := _compiled(group):
-            energy += module.totals(*_placed(points, group), floats(q), *group.law())[0]
+            energy += module.totals(*_placed(points, group), floats(q), *group.kernel_arguments())[0]
             continue
         for chunk in group.chunks():
             element, displaced = group.at(points, chunk), q[group.nodes[chunk]]

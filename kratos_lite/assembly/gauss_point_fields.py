@@ -25,7 +25,7 @@ def compiled_law(group: ElementGroup, stress: bool = True) -> Any:
 def displaced(points: Array, group: ElementGroup, u: Array, stress: bool = True) -> tuple[Any, ...]:
     """Return what kernels take to compute strains, or stresses, of displacements u (n, 3)."""
     nodes, _, dN, weights = group.tables()
-    law = group.law() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
+    law = group.kernel_arguments() if stress else (np.eye(6), None)  # a strain is the stress of C = 1
     return floats(points), nodes, dN, weights, floats(u), *law, group.strain_tables()
 
 

@@ -93,7 +93,7 @@ class MatrixFree:
 def _tables(group: ElementGroup) -> tuple[Any, ...]:
     """Return nodes, dN, weights, C and factors of a group, as kernels take them."""
     nodes, _, dN, weights = group.tables()
-    C, found = group.law()[0], factors(group.element.shape, group.rule)
+    C, found = group.kernel_arguments()[0], factors(group.element.shape, group.rule)
     if found is None:
         return nodes, dN, weights, C, None
     order, *rest = found

@@ -57,7 +57,7 @@ def _add_compiled(
 ) -> Iterator[tuple[int, bool]]:
     """Add the stiffness of a group; yield the number of elements and whether J was constant in some."""
     nodes, _, dN, weights = group.tables()
-    law = group.law()[0], group.strain_tables()
+    law = group.kernel_arguments()[0], group.strain_tables()
     module = compiled("stiffness", group.element)
     constant = module.add_stiffness(points, nodes, dN, weights, *law, pattern.indptr, pattern.indices, data)
     yield len(group), constant > 0

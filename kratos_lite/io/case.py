@@ -78,7 +78,17 @@ class TimeIntegration:
         flag(self.lumped, "lumped")
 
     def starting_from(self, supports: Supports, displacement: Array | None) -> TimeIntegration:
-        """Return the integration from an initial displacement (n, 3) in m, unless it has one of its own."""
+        """Return the integration from an initial displacement, unless it has one of its own.
+
+        Parameters
+        ----------
+        supports : the values at supports count there.
+        displacement : (n, 3) m, or None.
+
+        Returns
+        -------
+        TimeIntegration
+        """
         if displacement is None or self.displacement is not None:
             return self
         return replace(self, displacement=np.where(supports.fixed, supports.values, displacement))

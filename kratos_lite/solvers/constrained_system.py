@@ -16,8 +16,7 @@ from kratos_lite.assembly.stiffness import assemble_dense, assemble_stiffness
 from kratos_lite.elements.formulations import bulk_over_shear
 from kratos_lite.solvers.constraint_map import ConstraintMap
 from kratos_lite.solvers.linear_solver import LinearSolver, Solution
-from kratos_lite.solvers.plan import LARGEST_CONTRAST as LARGEST_CONTRAST  # noqa: PLC0414
-from kratos_lite.solvers.plan import Facts, choose
+from kratos_lite.solvers.plan import Facts, Plan, choose
 from kratos_lite.typing import Array, Ints, Progress
 
 if TYPE_CHECKING:
@@ -92,7 +91,10 @@ class ConstrainedSystem:
         self.skipped: list[str] = []
         self.warnings: list[str] = []
         self._patterns = patterns or PatternCache()
-        self.plan = choose(solver, self._facts())
+        self.plan = self._planned(solver)
+
+    def _planned(self, solver: str) -> Plan:
+        return choose(solver, self._facts())
 
     def _facts(self) -> Facts:
         return Facts(
@@ -211,6 +213,9 @@ class ConstrainedSystem:
         out = 0.0 - forces
         out[self.nodes] = (self.K @ self.gather(u) - self.gather(forces)).reshape(-1, 3)
         return out
+
+    def destroy(self) -> None:
+        """Release what is kept outside of Python."""
 
     def reduce(self, forces: Array) -> Array:
         """Return what nodal forces (n, 3) do on the free degrees of freedom, (q,)."""

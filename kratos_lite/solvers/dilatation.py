@@ -145,7 +145,7 @@ class _Part:
     def is_all(self) -> bool:
         """Return whether there are no other dilatations: without κ the stiffness is of a softer material."""
         tables = self.group.strain_tables()
-        return tables is not None and tables.C is None and tables.share == 1.0
+        return tables is not None and tables.C is None and tables.fraction == 1.0
 
     def take_off(self, K: BlockMatrix, pattern: Pattern, number: int) -> None:
         """Subtract Dᵀ κ D from the matrix."""

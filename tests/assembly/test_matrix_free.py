@@ -197,7 +197,7 @@ def test_wrong_tables_are_refused():
     module, model = kernels("multigrid"), model_of("8N")
     group = model.element_groups()[0]
     nodes, _, dN, weights = group.tables()
-    C = group.law()[0]
+    C = group.kernel_arguments()[0]
     points = np.ascontiguousarray(model.mesh.points)
     with pytest.raises(ValueError, match="nodes must be rows of points"):
         module.Product(points[:-1].copy(), [(nodes, dN, weights, C, None)])

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from kratos_lite.analysis.fields import listed
 from kratos_lite.analysis.result import Result
 from kratos_lite.errors import InputError
 from kratos_lite.io.kratos.context import RunContext, interval_of
@@ -19,7 +20,8 @@ from kratos_lite.typing import Array, Ints
 
 Comparison: TypeAlias = Callable[[Result], str]
 """Compares a result with what a file expects and says so in one line."""
-FIELDS = ("DISPLACEMENT", "REACTION")
+VECTORS = {field.kratos: name for name, field in listed("node").items() if field.kind == "vector"}
+"""Nodal fields that are compared."""
 NODE_KEYS = (
     "help", "mesh_id", "model_part_name", "variable_name", "interval", "value", "tolerance_rank",
     "reference_conf", "local_axes",
@@ -44,9 +46,9 @@ class NodeComparison:
     def __call__(self, result: Result) -> str:
         """Return ``check … passed`` or ``failed`` with the numbers of the worst node."""
         name, _, axis = self.component.rpartition("_")
-        if name not in FIELDS or axis not in ("X", "Y", "Z"):
+        if name not in VECTORS or axis not in ("X", "Y", "Z"):
             return f"check {self.what} not evaluated: kratos_lite has no nodal {self.component}"
-        values = result.displacement() if name == "DISPLACEMENT" else result.reaction()
+        values = result.field(VECTORS[name], "node")
         if not len(self.indices):
             return f"check {self.what} not evaluated: its part has no nodes"
         found = values[self.indices, "XYZ".index(axis)]
@@ -127,7 +129,7 @@ def file_comparisons(settings: Settings, context: RunContext) -> Iterator[Compar
     indices, data = context.part(settings, key).nodes, read_settings(path)
     tolerances = settings.number("tolerance", 1e-3), settings.number("relative_tolerance", 1e-6)
     for variable in settings.texts("check_variables"):
-        for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in FIELDS else [variable]:
+        for component in [f"{variable}_{axis}" for axis in "XYZ"] if variable in VECTORS else [variable]:
             expected = partial(_from_table, data, component, context.times[-1], tolerances)
             yield NodeComparison(f"{component} {what}", component, indices, expected)
     for variable in settings.texts("gauss_points_check_variables"):

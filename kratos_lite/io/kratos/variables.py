@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.analysis.model import Model
 from kratos_lite.mesh import Mesh, ids_of, with_rows
 from kratos_lite.model.loads.body import Gravity
@@ -26,11 +27,12 @@ LOADS = {
 }
 """Variable that loads a condition, by its cell."""
 PRESSURES = ("POSITIVE_FACE_PRESSURE", "NEGATIVE_FACE_PRESSURE")
-VECTORS = ("DISPLACEMENT", "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
+DISPLACEMENT, VELOCITY = (FIELDS[name].kratos for name in ("displacement", "velocity"))
+VECTORS = (DISPLACEMENT, "VOLUME_ACCELERATION", "POINT_LOAD", "LINE_LOAD", "SURFACE_LOAD")
 LOADING = {*(f"{v}_{a}" for v in VECTORS for a in "XYZ"), *PRESSURES}
 """Components and scalars that a static linear solution uses."""
 NO_CONDITION = ", and none has these nodes"
-SPLIT = (*VECTORS, "VELOCITY")
+SPLIT = (*VECTORS, VELOCITY)
 """Vector variables that are kept by component; velocities are those at the start of a transient."""
 
 
@@ -128,11 +130,11 @@ class Variables:
 
     def _apply_supports(self, model: Model) -> None:
         for axis in "XYZ":
-            name = f"DISPLACEMENT_{axis}"
+            name = f"{DISPLACEMENT}_{axis}"
             indices = np.flatnonzero(self.fixed.get(name, np.zeros(0, dtype=bool)))
             if len(indices):
                 model.fix(indices, axis.lower(), self.nodal.scalar(name)[indices, None], override=True)
-        others = [name for name in sorted(self.fixed) if not name.startswith("DISPLACEMENT_")]
+        others = [name for name in sorted(self.fixed) if not name.startswith(f"{DISPLACEMENT}_")]
         others = [name for name in others if self.fixed[name].any()]
         if others:
             model.notes.append(f"fixed {', '.join(others)} ignored: solids have displacements only")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kratos_lite.analysis.fields import FIELDS
 from kratos_lite.errors import InputError
 from kratos_lite.io.formats.vtu import write_pvd, write_vtu
 from kratos_lite.io.writers.endings import check_modes
@@ -76,9 +77,10 @@ def _write_frames(path: Path, mesh: Mesh, shapes: Array | Complexes, mode: str) 
     frames = []
     for i, shape in enumerate(shapes, 1):
         scaled = shape / (np.linalg.norm(shape, axis=1).max() or 1.0)
-        points = {"DISPLACEMENT": scaled.real, "NODE_ID": mesh.node_ids}
+        variable = FIELDS["displacement"].kratos
+        points = {variable: scaled.real, "NODE_ID": mesh.node_ids}
         if np.iscomplexobj(shape):
-            points["DISPLACEMENT_IMAGINARY"] = scaled.imag
+            points[f"{variable}_IMAGINARY"] = scaled.imag
         name = f"{path.stem}_{i:05d}.vtu"
         write_vtu(path.with_name(name), mesh, points, {}, mode=mode)
         frames.append((float(i), name))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kratos_lite.analysis.fields import Field
 from kratos_lite.io.writers.page.lattices import fineness, lattice_of_cell, lattice_of_face
 from kratos_lite.mesh.blocks import with_rows
 from kratos_lite.typing import Array, Ints
@@ -29,24 +30,6 @@ MOST_EDGED = 5_000
 """Faces up to which their edges are shown at the start."""
 QUANTUM = 30_000
 """Whole numbers for the largest value of a series: 16 bits, an error below 2e-5 of it."""
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a page.
-
-    Attributes
-    ----------
-    name : as people say it.
-    unit : in SI.
-    kind : ``scalar``, ``vector``, or ``stress`` in Voigt order.
-    at : ``node`` or ``element``.
-    """
-
-    name: str
-    unit: str
-    kind: str
-    at: str = "node"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +78,7 @@ class Content:
             "kind": self.kind,
             "shown": self.shown,
             "about": [("size", " × ".join(f"{side:.5g}" for side in self._size()) + " m"), *self.about],
-            "fields": [vars(field) for field in self.fields],
+            "fields": [_described(field) for field in self.fields],
             **self._frame(),
             **_mesh(data, self.mesh, kept, self._center()),
             "frames": [self._packed_frame(data, frame, kept) for frame in self.frames],
@@ -110,7 +93,7 @@ class Content:
 
     def _packed_frame(self, data: _Packer, frame: Frame, kept: Ints) -> dict[str, Any]:
         both = zip(self.fields, frame.values, strict=True)
-        values = [data.field(v[kept] if field.at == "node" else v) for field, v in both]
+        values = [data.field(v if field.nodal_place == "element" else v[kept]) for field, v in both]
         return {"name": frame.name, "values": values}
 
     def scale(self) -> float:
@@ -143,6 +126,10 @@ class Content:
             "reach": ((high - low) / 2).tolist(),
             "scale": self.scale(),
         }
+
+
+def _described(field: Field) -> dict[str, str]:
+    return {"name": field.name, "unit": field.unit, "kind": field.kind, "at": field.nodal_place}
 
 
 def _mesh(data: _Packer, mesh: Mesh, kept: Ints, center: Array) -> dict[str, Any]:
